@@ -1,0 +1,163 @@
+"""One running simulation: the compiled kernels with their memory, events and counters."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics import hybrid
+from grasp_ros.physics.layout import (
+    DAMPING,
+    FORCE,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    STIFFNESS,
+    U_L,
+    U_R,
+    Event,
+    Outcome,
+    Work,
+)
+from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.physics.series import new_tables, series_order
+
+ACCURACY = 1e-14  # default: the work between this and 1e-9 is small, see series_order
+FINEST, COARSEST = 1e-16, 1e-3
+EVENT_ROWS = 1024
+
+
+class Status(Enum):
+    """How a simulation ended; the value is the sentence shown to the user."""
+
+    DONE = "reached the end of the horizon"
+    EVENT_BUDGET = "stopped: the event budget is used up before the end of the horizon"
+    NOT_FINITE = "stopped: a state is not finite any more"
+    STALLED = "stopped: the time does not advance any more"
+
+
+class SwitchEvent(NamedTuple):
+    """One switch of one pair."""
+
+    time: float  # s
+    side: int  # layout.LEFT or layout.RIGHT
+    kind: Event
+    u: float  # penetration, m
+    u_rate: float  # m/s
+
+
+_STATUS = {
+    Outcome.DONE: Status.DONE,
+    Outcome.NOT_FINITE: Status.NOT_FINITE,
+    Outcome.STALLED: Status.STALLED,
+}
+
+
+class Integrator:
+    """Integrates one grasp from its initial state, in pieces of any length.
+
+    Parameters
+    ----------
+    grasp : Grasp
+    state : array (6,), m and m/s
+        x_l, v_l, x_o, v_o, x_r, v_r.
+    continuous : bool
+        True: the paper's feedback acts all the time, (4), (5). False: the arms get the forces of `hold`.
+    accuracy : float
+        Size of the first neglected Taylor term of a contact relative to the impact, in [1e-16, 1e-3].
+    max_events : int
+        Budget of switches; the integration stops with `Status.EVENT_BUDGET` beyond it.
+
+    Raises
+    ------
+    ValueError
+        If the accuracy is outside its range or the state is not finite.
+    """
+
+    def __init__(
+        self, grasp: Grasp, state: Array, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = 10**7
+    ) -> None:
+        if not FINEST <= accuracy <= COARSEST:
+            raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+        state = np.asarray(state, dtype=float)
+        if state.shape != (6,) or not np.isfinite(state).all():
+            raise ValueError(f"state: {state!r} is not an array of six finite numbers")
+        self.status = Status.DONE
+        self.events: list[SwitchEvent] = []
+        self.work = np.zeros(len(Work), dtype=np.int64)
+        self._accuracy = accuracy
+        self._max_events = max_events
+        self._bodies = np.zeros((3, 4))
+        for row, arm in ((LEFT, grasp.left), (RIGHT, grasp.right)):
+            gains = (arm.position_gain, arm.velocity_gain) if continuous else (0.0, 0.0)
+            self._bodies[row, MASS] = arm.mass
+            self._bodies[row, STIFFNESS] = arm.stiffness + gains[0]
+            self._bodies[row, DAMPING] = arm.damping + gains[1]
+        self._bodies[OBJECT, MASS] = grasp.object_mass
+        self._pairs = np.array([grasp.left_contact, grasp.right_contact])
+        self._y = np.concatenate([state, [state[0] - state[2], state[2] - state[4]]])
+        self._mode = np.zeros(2, dtype=np.int64)
+        self._tables = new_tables(series_order(accuracy))
+        self._event_rows = np.zeros((EVENT_ROWS, 5))
+        hybrid.classify(self._bodies, self._pairs, self._y, self._mode)
+
+    @property
+    def state(self) -> Array:
+        """Copy of the state (6,): x_l, v_l, x_o, v_o, x_r, v_r."""
+        return self._y[:6].copy()
+
+    @property
+    def penetration(self) -> Array:
+        """Copy of (u_l, u_r) in m, exact where the difference of the positions is not."""
+        return self._y[[U_L, U_R]]
+
+    def hold(self, force_left: float, force_right: float) -> None:
+        """Set the constant input forces of the arms in N, for feedback that is sampled."""
+        self._bodies[LEFT, FORCE] = force_left
+        self._bodies[RIGHT, FORCE] = force_right
+
+    def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
+        """Integrate for `duration` seconds.
+
+        Parameters
+        ----------
+        duration : float, s
+        grid : array (n,), s
+            Ascending output times in [0, duration], counted from the beginning of this call.
+        start : float, s
+            Time of the beginning of this call on the clock of the recorded events.
+
+        Returns
+        -------
+        array (n, 6)
+            States at the grid; only the rows reached, if `status` is not DONE afterwards.
+
+        Raises
+        ------
+        ValueError
+            If the duration is negative or not finite.
+        """
+        if not (math.isfinite(duration) and duration >= 0.0):
+            raise ValueError(f"duration: {duration!r} is not a finite number of seconds >= 0")
+        times = np.zeros(0) if grid is None else np.ascontiguousarray(grid, dtype=float)
+        out = np.empty((len(times), 6))
+        clock = np.zeros(2)
+        filled = 0
+        while self.status is Status.DONE:
+            outcome, rows, count = hybrid.advance(
+                self._tables, self._bodies, self._pairs, self._y, self._mode, clock, duration, self._accuracy,
+                times[filled:], out[filled:], self._event_rows, self.work,
+            )
+            filled += rows
+            for time, side, kind, u, u_rate in self._event_rows[:count].tolist():
+                self.events.append(SwitchEvent(start + time, int(side), Event(int(kind)), u, u_rate))
+            if outcome != Outcome.EVENTS_FULL:
+                self.status = _STATUS[Outcome(outcome)]
+                break
+            if len(self.events) > self._max_events:
+                self.status = Status.EVENT_BUDGET
+        return out[:filled]

@@ -1,0 +1,50 @@
+"""Array layouts shared by the compiled kernels: one place for every index, mode, event and status.
+
+The state y (8,) is x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r. The penetrations are carried beside the positions
+because x_l - x_o loses the digits of a shallow contact. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
+pairs are rows LEFT, RIGHT of an array (2, 2).
+"""
+
+from enum import IntEnum
+
+LEFT, RIGHT, OBJECT = 0, 1, 2
+MASS, STIFFNESS, DAMPING, FORCE = 0, 1, 2, 3  # columns of bodies: kg, N/m, N s/m, N
+HERTZ, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
+X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)
+
+
+class Pair(IntEnum):
+    """What one pair of arm and object does during a segment; frozen until the next event."""
+
+    OPEN = 0  # u <= 0, no force
+    CONTACT = 1  # condition (10) holds
+    CLAMPED = 2  # u > 0 and u' < -1/p: no force, may re-enter
+    LEAVING = 3  # u > 0, separating, the rest of its impulse is below rounding
+    HELD = 4  # u = 0 with no direction yet, the first of its impulse is below rounding
+
+
+class Event(IntEnum):
+    """Switches of one pair."""
+
+    TOUCH = 0  # u rises through 0
+    RELEASE = 1  # u falls through 0
+    CLAMP = 2  # u' falls through -1/p while u > 0
+    REENTRY = 3  # u' rises through -1/p while u > 0
+
+
+class Outcome(IntEnum):
+    """Why the kernel returned."""
+
+    DONE = 0
+    EVENTS_FULL = 1
+    NOT_FINITE = 2
+    STALLED = 3
+
+
+class Work(IntEnum):
+    """Columns of the work counters."""
+
+    FLIGHTS = 0  # closed-form segments
+    CONTACT_STEPS = 1  # Taylor steps
+    REJECTED_STEPS = 2  # Taylor steps shortened after a failed defect test
+    ROOT_ITERATIONS = 3  # evaluations of an event function

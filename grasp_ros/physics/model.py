@@ -1,0 +1,153 @@
+"""The grasp of Fukuda, Shoji and Inaba (1990): equations of motion, control law, impact law, energy.
+
+Everything here is written with the paper's letters; every function works on scalars and on NumPy arrays.
+The integrators in this package do not call it, so that tests can hold their results against it.
+
+References
+----------
+T. Fukuda, Y. Shoji, M. Inaba: Stable Position/Force Control of Robotic Manipulator with Consideration of
+Collision Phenomena. IFAC 11th World Congress, Tallinn 1990. Equation numbers below are the paper's.
+"""
+
+from __future__ import annotations
+
+from enum import IntFlag
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Arm(NamedTuple):
+    """One manipulator with its linear state feedback, (1), (2), (4), (5)."""
+
+    mass: float  # m, kg
+    stiffness: float  # k, N/m
+    damping: float  # c, N s/m
+    position_gain: float  # Kp, N/m
+    velocity_gain: float  # Kv, N s/m
+
+
+class Contact(NamedTuple):
+    """One pair of arm and object, (6), (7)."""
+
+    hertz: float  # H, N/m^1.5
+    dissipation: float  # p, s/m
+
+
+class Grasp(NamedTuple):
+    """Left arm, object and right arm on one line."""
+
+    left: Arm
+    right: Arm
+    left_contact: Contact
+    right_contact: Contact
+    object_mass: float  # m_o, kg
+
+
+class Mode(IntFlag):
+    """Which pairs are in contact in the sense of (10)."""
+
+    NONE = 0
+    LEFT = 1
+    RIGHT = 2
+    BOTH = 3
+
+
+class Energy(NamedTuple):
+    """The paper's V (16), its continuous repair V_c, the rate V' (18) and the contact mode."""
+
+    V: Array  # twice the energy without the clamped pairs, J
+    V_c: Array  # twice the energy, J
+    V_rate: Array  # W
+    mode: NDArray[np.int64]  # Mode
+
+
+def feedback(arm: Arm, x: float, v: float) -> float:
+    """Input force of the linear state feedback in N, (4), (5)."""
+    return -arm.position_gain * x - arm.velocity_gain * v
+
+
+def in_contact(contact: Contact, u: Array, u_rate: Array) -> NDArray[np.bool_]:
+    """Condition (10): penetration, and not separating faster than 1/p."""
+    return (u >= 0.0) & (1.0 + contact.dissipation * u_rate >= 0.0)
+
+
+def hertz_force(contact: Contact, u: Array) -> Array:
+    """The elastic part H u^(3/2) of the impact force in N; 0 without penetration."""
+    depth = np.maximum(u, 0.0)
+    return contact.hertz * (depth * np.sqrt(depth))
+
+
+def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
+    """Impact force fw in N, never negative: (6), (7).
+
+    Parameters
+    ----------
+    contact : Contact
+    u : array, m
+        Penetration (8); negative is a gap.
+    u_rate : array, m/s
+    """
+    force = (1.0 + contact.dissipation * u_rate) * hertz_force(contact, u)
+    return np.where(in_contact(contact, u, u_rate), force, 0.0)
+
+
+def penetration(state: Array) -> tuple[Array, Array, Array, Array]:
+    """u_l, u_l', u_r, u_r' of states (..., 6): (8)."""
+    x_l, v_l, x_o, v_o, x_r, v_r = np.moveaxis(np.asarray(state), -1, 0)
+    return x_l - x_o, v_l - v_o, x_o - x_r, v_o - v_r
+
+
+def impact_forces(grasp: Grasp, state: Array) -> tuple[Array, Array]:
+    """fw_l and fw_r in N of states (..., 6)."""
+    u_l, d_l, u_r, d_r = penetration(state)
+    return impact_force(grasp.left_contact, u_l, d_l), impact_force(grasp.right_contact, u_r, d_r)
+
+
+def acceleration(grasp: Grasp, state: Array) -> tuple[Array, Array, Array]:
+    """x_l'', x_o'', x_r'' in m/s^2 of states (..., 6) under continuous feedback: (1) to (5)."""
+    x_l, v_l, _, _, x_r, v_r = np.moveaxis(np.asarray(state), -1, 0)
+    fw_l, fw_r = impact_forces(grasp, state)
+    left, right = grasp.left, grasp.right
+    f_l = -left.stiffness * x_l - left.damping * v_l + feedback(left, x_l, v_l)
+    f_r = -right.stiffness * x_r - right.damping * v_r + feedback(right, x_r, v_r)
+    return (f_l - fw_l) / left.mass, (fw_l - fw_r) / grasp.object_mass, (f_r + fw_r) / right.mass
+
+
+def energy(grasp: Grasp, state: Array) -> Energy:
+    """V, V_c, V' and the contact mode of states (..., 6).
+
+    V drops the elastic term of a pair that separates faster than 1/p while u > 0 and takes it up again
+    later, so it can jump; V_c keeps the term whenever u >= 0 and never increases under continuous feedback.
+    In such a pair V' has the term 2 H u^(3/2) u', which is the rate of V_c.
+
+    Parameters
+    ----------
+    grasp : Grasp
+    state : array (..., 6), m and m/s
+        x_l, v_l, x_o, v_o, x_r, v_r.
+    """
+    x_l, v_l, _, v_o, x_r, v_r = np.moveaxis(np.asarray(state, dtype=float), -1, 0)
+    left, right = grasp.left, grasp.right
+    kinetic = left.mass * v_l * v_l + grasp.object_mass * v_o * v_o + right.mass * v_r * v_r
+    springs = (left.stiffness + left.position_gain) * x_l * x_l + (right.stiffness + right.position_gain) * x_r * x_r
+    V = kinetic + springs
+    V_c = V
+    V_rate = -2.0 * ((left.damping + left.velocity_gain) * v_l * v_l + (right.damping + right.velocity_gain) * v_r * v_r)
+    mode = np.zeros(np.shape(V), dtype=np.int64)
+    u_l, d_l, u_r, d_r = penetration(state)
+    for flag, contact, u, d in (
+        (Mode.LEFT, grasp.left_contact, u_l, d_l),
+        (Mode.RIGHT, grasp.right_contact, u_r, d_r),
+    ):
+        force = hertz_force(contact, u)
+        touching = in_contact(contact, u, d)
+        stored = 0.8 * force * u  # a = b = 4/5, (19)
+        V_c = V_c + stored
+        V = V + np.where(touching, stored, 0.0)
+        V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
+        mode = mode | np.where(touching, int(flag), 0)
+    return Energy(V, V_c, V_rate, mode)

@@ -1,0 +1,160 @@
+"""Run a scene without ROS: the paper's continuous feedback, or the sampled one of the graph."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent
+from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.physics.model import Array, energy, feedback
+from grasp_ros.scene import Scene
+
+GRID_POINTS = 2001
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A simulated or recorded motion.
+
+    Attributes
+    ----------
+    scene : Scene
+    sampled : bool
+        Whether the commands were held over control periods.
+    t : array (n,), s
+    state : array (n, 6), m and m/s
+        x_l, v_l, x_o, v_o, x_r, v_r.
+    command : array (n, 2), N
+        Input forces f_l, f_r computed from the state, (4), (5).
+    events : tuple of SwitchEvent
+        In the order of time.
+    work : array of int
+        Counters, see `layout.Work`.
+    status : Status
+    """
+
+    scene: Scene
+    sampled: bool
+    t: Array
+    state: Array
+    command: Array
+    events: tuple[SwitchEvent, ...]
+    work: np.ndarray
+    status: Status
+
+    def times(self, kind: Event, side: int) -> Array:
+        """Times in s of one side's events of a kind."""
+        return np.array([event.time for event in self.events if event.kind == kind and event.side == side])
+
+    def save(self, path: Path) -> None:
+        """Write everything to a .npz file.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
+        level = energy(self.scene.grasp, self.state)
+        with path.open("wb") as file:
+            np.savez_compressed(
+                file, t=self.t, state=self.state, command=self.command, V=level.V, V_c=level.V_c, V_rate=level.V_rate,
+                mode=level.mode, touch_left=self.times(Event.TOUCH, LEFT), touch_right=self.times(Event.TOUCH, RIGHT),
+                release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
+                events=np.array(self.events, dtype=float).reshape(-1, 5), work=self.work,
+                work_names=np.array([entry.name.lower() for entry in Work]), status=self.status.name,
+                sampled=self.sampled, scene_name=self.scene.name, scene=self.scene.to_yaml(),
+            )
+
+
+def simulate(
+    scene: Scene,
+    *,
+    grid: Array | None = None,
+    sampled: bool = False,
+    accuracy: float = ACCURACY,
+    max_events: int = 10**7,
+    progress: Callable[[float], None] | None = None,
+) -> Trajectory:
+    """Simulate a scene from its initial state to the end of its horizon.
+
+    Parameters
+    ----------
+    scene : Scene
+    grid : array (n,), s, optional
+        Ascending output times within the horizon. Default: 2001 equidistant ones, or every control period if the
+        feedback is sampled.
+    sampled : bool
+        False: feedback acts continuously, as in the paper. True: as in the graph, each command is computed from
+        the state at the beginning of a control period and held over it.
+    accuracy : float
+        See `physics.integrator.Integrator`.
+    max_events : int
+        Budget of contact switches.
+    progress : callable, optional
+        Called with the time reached, in s.
+
+    Raises
+    ------
+    ValueError
+        If the accuracy is outside its range or the grid is not ascending within the horizon.
+    """
+    integrator = Integrator(
+        scene.grasp, scene.initial_state, continuous=not sampled, accuracy=accuracy, max_events=max_events
+    )
+    if grid is None:
+        grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
+    grid = np.asarray(grid, dtype=float)
+    if not (np.isfinite(grid).all() and (np.diff(grid) >= 0.0).all()):
+        raise ValueError("grid: allowed: ascending finite times")
+    if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
+        raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+    if sampled:
+        states = _sampled(scene, integrator, grid, progress)
+    else:
+        states = integrator.advance(scene.duration, grid)
+    grid = grid[: len(states)]
+    return Trajectory(
+        scene, sampled, grid, states, commands(scene, states), tuple(integrator.events), integrator.work.copy(),
+        integrator.status,
+    )
+
+
+def tick_times(scene: Scene) -> Array:
+    """Times in s of all control periods of a scene, shape (ticks + 1,)."""
+    return np.array([scene.time_of(tick) for tick in range(scene.ticks + 1)])
+
+
+def command(scene: Scene, state: Array) -> tuple[float, float]:
+    """Input forces f_l, f_r in N that the controllers answer to a state (6,)."""
+    grasp = scene.grasp
+    return feedback(grasp.left, state[0], state[1]), feedback(grasp.right, state[4], state[5])
+
+
+def commands(scene: Scene, states: Array) -> Array:
+    """Input forces (n, 2) in N that the feedback answers to states (n, 6)."""
+    return np.stack(command(scene, states.T), axis=-1)
+
+
+def _sampled(
+    scene: Scene, integrator: Integrator, grid: Array, progress: Callable[[float], None] | None
+) -> Array:
+    period = scene.period_ns / 1e9
+    times = tick_times(scene)
+    # Each period [t_k, t_k+1) delivers its own outputs; a state at a tick is the one that the controllers see.
+    bounds = np.searchsorted(grid, times, side="left")
+    rows = [np.empty((0, 6))]
+    for tick in range(scene.ticks):
+        state = integrator.state
+        integrator.hold(*command(scene, state))
+        inside = grid[bounds[tick] : bounds[tick + 1]]
+        rows.append(integrator.advance(period, np.clip(inside - times[tick], 0.0, period), times[tick]))
+        if integrator.status is not Status.DONE:
+            return np.concatenate(rows)
+        if progress is not None and tick % 100 == 0:
+            progress(times[tick])
+    rows.append(np.repeat(integrator.state[None], len(grid) - bounds[-1], axis=0))
+    return np.concatenate(rows)
