@@ -1,0 +1,112 @@
+"""Starts the four processes of the graph together, waits for them and stops them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grasp_ros.scene import Scene
+
+STOP_SECONDS = 10.0
+POLL_SECONDS = 0.02
+MODULES: Mapping[str, tuple[str, ...]] = {
+    "monitor": ("grasp_ros.nodes.monitor",),
+    "left_controller": ("grasp_ros.nodes.controller", "left"),
+    "right_controller": ("grasp_ros.nodes.controller", "right"),
+    "plant": ("grasp_ros.nodes.plant",),
+}
+
+
+class GraphError(RuntimeError):
+    """A process of the graph failed: names it and its exit status."""
+
+
+@dataclass
+class Graph:
+    """Four processes running one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    directory : Path
+        New directory for the resolved scene and the bag.
+    accuracy : float
+    progress : bool
+        Whether the plant shows a progress bar on the terminal.
+
+    Raises
+    ------
+    FileExistsError
+        If the directory exists.
+    """
+
+    scene: Scene
+    directory: Path
+    accuracy: float
+    progress: bool = False
+    processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+
+    @property
+    def bag(self) -> Path:
+        """Directory of the bag."""
+        return self.directory / "bag"
+
+    def start(self) -> None:
+        """Start the processes, each in a session of its own: a Ctrl-C reaches them through `stop`, once."""
+        self.directory.mkdir(parents=True)
+        scene_file = self.directory / f"{self.scene.name}.yaml"
+        scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+        environment = {
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_LOG_DIR": str(self.directory / "log"),
+            **os.environ,
+        }
+        settings = {
+            "monitor": {"bag": str(self.bag)},
+            "left_controller": {"wait_for_monitor": "true"},
+            "right_controller": {"wait_for_monitor": "true"},
+            "plant": {
+                "scene": str(scene_file),
+                "accuracy": repr(float(self.accuracy)),
+                "wait_for_monitor": "true",
+                "progress": str(self.progress).lower(),
+            },
+        }
+        for name, module in MODULES.items():
+            parameters = [word for key, value in settings[name].items() for word in ("-p", f"{key}:={value}")]
+            command = [sys.executable, "-m", *module, "--ros-args", *parameters]
+            self.processes[name] = subprocess.Popen(command, env=environment, start_new_session=True)
+
+    def wait(self) -> None:
+        """Wait until plant and monitor have finished.
+
+        Raises
+        ------
+        GraphError
+            If a process ends with another status than 0, or a controller ends early.
+        """
+        while any(self.processes[name].poll() is None for name in ("plant", "monitor")):
+            for name, process in self.processes.items():
+                if process.poll() or (process.poll() == 0 and name.endswith("controller")):
+                    raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")
+            time.sleep(POLL_SECONDS)
+
+    def stop(self) -> dict[str, int]:
+        """Interrupt what still runs, wait for it, and return the exit statuses."""
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        deadline = time.monotonic() + STOP_SECONDS
+        for process in self.processes.values():
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        return {name: process.returncode for name, process in self.processes.items()}

@@ -1,0 +1,125 @@
+"""What every node of the graph shares: parameters, health, the wait for its peers, and its life in a process."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.clock import Clock, ClockType
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+
+from grasp_ros.nodes import messages
+from grasp_ros.topics import DIAGNOSTICS, Topic
+
+POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
+PEER_SECONDS = 0.02
+REPORT_SECONDS = 1.0
+PATIENCE_SECONDS = 5.0
+UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
+
+
+class GraspNode(Node):  # type: ignore[misc]
+    """A node with read-only parameters, counters on /diagnostics and an end."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.finished = False
+        self.exit_code = 0
+        self.counters: dict[str, int | float | str] = {}
+        self.state = "waiting for peers"
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._diagnostics = self.publisher(DIAGNOSTICS)
+        self.wall_timer(REPORT_SECONDS, self.report)
+
+    def read_only(self, name: str, default: Any, text: str) -> Any:
+        """Declare a parameter that is set at start only, and return its value."""
+        return self.declare_parameter(name, default, ParameterDescriptor(description=text, read_only=True)).value
+
+    def publisher(self, topic: Topic) -> Publisher:
+        """Create the publisher of a topic of the graph."""
+        return self.create_publisher(messages.TYPES[topic], topic.name, messages.qos(topic))
+
+    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> None:
+        """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
+        self.create_subscription(messages.TYPES[topic], topic.name, callback, messages.qos(topic), raw=raw)
+
+    def wall_timer(self, seconds: float, callback: Callable[[], None]) -> Any:
+        """Timer on wall time: simulated time waits for the nodes, so no node may wait for it."""
+        return self.create_timer(seconds, callback, clock=self._steady)
+
+    def when(self, ready: Callable[[], bool], action: Callable[[], None]) -> None:
+        """Do something once, as soon as a condition holds."""
+
+        def poll() -> None:
+            if ready():
+                timer.cancel()
+                action()
+            else:
+                self.get_logger().info(self.state, throttle_duration_sec=PATIENCE_SECONDS, skip_first=True)
+
+        timer = self.wall_timer(PEER_SECONDS, poll)
+
+    def linked(self, publisher: Publisher, sources: Sequence[Topic]) -> bool:
+        """Whether the nodes that publish the source topics all listen to this publisher.
+
+        Matching is asynchronous and messages sent before it are lost. Names come from discovery, which is earlier
+        than matching; so every discovered subscription must also have been matched.
+        """
+        readers = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
+        for source in sources:
+            writers = self.get_publishers_info_by_topic(source.name)
+            if not writers or any((writer.node_namespace, writer.node_name) not in listening for writer in writers):
+                return False
+        return bool(publisher.get_subscription_count() >= len(readers))
+
+    def report(self) -> None:
+        """Publish the counters."""
+        stamp = self.get_clock().now().to_msg()
+        healthy = self.exit_code == 0 and not any(self.counters[key] for key in self.counters if key.startswith("lost"))
+        self._diagnostics.publish(
+            messages.diagnostics(stamp, self.get_fully_qualified_name(), self.state, healthy, self.counters)
+        )
+
+    def close(self) -> None:
+        """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
+
+
+def run(make: Callable[[], GraspNode], arguments: Sequence[str] | None = None) -> int:
+    """Run one node until it has finished or until SIGINT or SIGTERM; returns the exit status of the process.
+
+    0 after a finished run or a signal, 2 if the node refuses its parameters, otherwise the node's own status.
+    The signal handlers are ours: those of rclpy invalidate the context under a callback, which then raises.
+    """
+    signals: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda received, _: signals.append(received))
+    node = None
+    try:
+        rclpy.init(
+            args=None if arguments is None else list(arguments), signal_handler_options=SignalHandlerOptions.NO
+        )
+        node = make()
+        executor = EventsExecutor()
+        executor.add_node(node)
+        while not (node.finished or signals):
+            executor.spin_once(timeout_sec=POLL_SECONDS)
+        executor.shutdown()
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    finally:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+        rclpy.try_shutdown()
+        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not hit the end of the interpreter
+            signal.signal(number, signal.SIG_IGN)
+    return node.exit_code

@@ -1,0 +1,158 @@
+"""The plant: owner of time. It integrates the collision dynamics and publishes the states.
+
+Lockstep: publish state k, wait for both commands stamped k, advance exactly one period with them. The result does
+not depend on the load of the machine.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from functools import partial
+from typing import Any
+
+from rclpy.duration import Duration
+from tqdm import tqdm
+
+from grasp_ros import scene as scenes
+from grasp_ros.nodes import messages
+from grasp_ros.nodes.node import GraspNode, run
+from grasp_ros.physics.integrator import ACCURACY, Integrator, Status
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import impact_forces
+from grasp_ros.topics import (
+    CLOCK,
+    JOINT_STATES,
+    LEFT_COMMAND,
+    LEFT_CONTACT,
+    LYAPUNOV,
+    RIGHT_COMMAND,
+    RIGHT_CONTACT,
+    SCENE,
+    WINDOW,
+)
+
+ACKNOWLEDGE_SECONDS = 5.0
+
+
+class Plant(GraspNode):
+    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress."""
+
+    def __init__(self) -> None:
+        super().__init__("plant")
+        scene = self.read_only("scene", "case_01", "name of a scene of the package, or path of a .yaml file")
+        accuracy = self.read_only("accuracy", ACCURACY, "relative size of the first neglected term of a contact")
+        self._monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
+        progress = self.read_only("progress", False, "show a progress bar on the terminal")
+        self._scene = scenes.load(scene)
+        self._integrator = Integrator(
+            self._scene.grasp, self._scene.initial_state, continuous=False, accuracy=accuracy
+        )
+        self._tick = 0
+        self._recorded = -1  # last tick that the monitor has complete
+        self._commands: list[float | None] = [None, None]
+        self._applied = (0.0, 0.0)
+        self.counters.update(tick=0, **{"stale commands": 0, "repeated commands": 0, "refused commands": 0})
+        self._bar = tqdm(total=self._scene.ticks, unit="tick", desc=self._scene.name, disable=not progress)
+        self._states = self.publisher(JOINT_STATES)
+        self._contacts = (self.publisher(LEFT_CONTACT), self.publisher(RIGHT_CONTACT))
+        self._simulated = self.publisher(CLOCK)
+        self._description = self.publisher(SCENE)
+        self._description.publish(messages.text(self._scene.to_yaml()))
+        self.subscribe(LEFT_COMMAND, partial(self._on_command, LEFT))
+        self.subscribe(RIGHT_COMMAND, partial(self._on_command, RIGHT))
+        if self._monitored:
+            self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
+        if progress:
+            self.wall_timer(0.1, self._show)
+        self.when(self._ready, self._start)
+
+    def _ready(self) -> bool:
+        if self.count_publishers(JOINT_STATES.name) > 1:
+            raise ValueError(
+                f"{self._states.topic_name}: another plant publishes here; use another ROS_DOMAIN_ID or namespace"
+            )
+        monitor = [LYAPUNOV] if self._monitored else []
+        return self.linked(self._states, [LEFT_COMMAND, RIGHT_COMMAND, *monitor]) and all(
+            self.linked(publisher, monitor) for publisher in self._contacts
+        )
+
+    def _start(self) -> None:
+        self.state = "running"
+        self._publish()
+
+    def _publish(self) -> None:
+        time_ns = self._tick * self._scene.period_ns
+        state = self._integrator.state
+        self._simulated.publish(messages.clock(time_ns))
+        for publisher, force in zip(self._contacts, impact_forces(self._scene.grasp, state), strict=True):
+            publisher.publish(messages.wrench(time_ns, float(force)))
+        self._states.publish(messages.joint_state(time_ns, state, self._applied))
+
+    def _on_command(self, side: int, message: Any) -> None:
+        force = message.wrench.force.x
+        if messages.to_ns(message.header.stamp) != self._tick * self._scene.period_ns:
+            self._count("stale commands")
+        elif not math.isfinite(force):
+            self._count("refused commands")
+        elif self._commands[side] is not None:
+            self._count("repeated commands")
+        else:
+            self._commands[side] = force
+            self._advance()
+
+    def _on_lyapunov(self, cdr: bytes) -> None:
+        self._recorded = messages.raw_stamp_ns(cdr) // self._scene.period_ns
+        self._advance()
+
+    def _advance(self) -> None:
+        left, right = self._commands
+        last = self._tick == self._scene.ticks
+        lead = 0 if last else WINDOW
+        if left is None or right is None or (self._monitored and self._tick - self._recorded > lead):
+            return
+        if last:
+            self.state = "finished"
+            self.finished = True
+            return
+        self._integrator.hold(left, right)
+        self._integrator.advance(self._scene.period_ns / scenes.NANOSECONDS, start=self._scene.time_of(self._tick))
+        if self._integrator.status is not Status.DONE:
+            self._fail()
+            return
+        self._applied = (left, right)
+        self._commands = [None, None]
+        self._tick += 1
+        self.counters["tick"] = self._tick
+        self._publish()
+
+    def _fail(self) -> None:
+        self.state = self._integrator.status.value
+        self.get_logger().fatal(
+            f"{self.state}, t = {self._scene.time_of(self._tick)} s, state {self._integrator.state.tolist()}"
+        )
+        self.exit_code = 1
+        self.finished = True
+
+    def _count(self, counter: str) -> None:
+        self.counters[counter] = int(self.counters[counter]) + 1
+
+    def _show(self) -> None:
+        self._bar.update(self._tick - self._bar.n)
+
+    def close(self) -> None:
+        """Let every reader have the last messages before the process ends."""
+        self._show()
+        self._bar.close()
+        if self.finished:
+            for publisher in (self._states, *self._contacts):
+                publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
+
+
+def main() -> int:
+    """Entry point of `plant`."""
+    return run(Plant)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
