@@ -1,30 +1,51 @@
-"""ament_python package; colcon and pip install the same files."""
+"""ament_python package: `pip install .` and `colcon build` install the same files."""
 
 from glob import glob
 
 from setuptools import find_packages, setup
 
 NAME = "grasp_ros"
-EXECUTABLES = {
-    "plant": "grasp_ros.nodes.plant:main",
-    "left_controller": "grasp_ros.nodes.controller:left_main",
-    "right_controller": "grasp_ros.nodes.controller:right_main",
-    "monitor": "grasp_ros.nodes.monitor:main",
-    "grasp": "grasp_ros.cli:main",
-}
 
 setup(
     name=NAME,
     version="0.1.0",
     description="A grasp held together by impacts: exact simulation, control and measurement over ROS 2",
-    packages=[*find_packages(include=[NAME, f"{NAME}.*"]), f"{NAME}.config"],
-    package_dir={f"{NAME}.config": "config"},
-    package_data={f"{NAME}.config": ["*.yaml"], NAME: ["py.typed"]},
+    license="Apache-2.0",
+    python_requires=">=3.11,<3.13",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    # grasp_ros/config is a link to config: the scenes are part of the package however it is installed.
+    package_data={NAME: ["config/*.yaml", "py.typed"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
+        (f"lib/{NAME}", sorted(glob("resource/lib/*"))),  # where `ros2 run` looks
     ],
-    entry_points={"console_scripts": [f"{name} = {target}" for name, target in EXECUTABLES.items()]},
+    install_requires=[
+        "ros-jazzy-rclpy[fastrtps]",
+        "ros-jazzy-common-interfaces",
+        "numpy",
+        "rosbags",
+        "numba",
+        "matplotlib",
+        "tqdm",
+        "PyYAML",
+    ],
+    extras_require={
+        "test": [
+            "pytest", "gmpy2", "mpmath", "mcap", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML", "types-tqdm",
+            "colcon-common-extensions",
+        ],
+        "study": ["gmpy2", "scipy", "heyoka"],
+    },
+    entry_points={
+        "console_scripts": [
+            "plant = grasp_ros.nodes.plant:main",
+            "left_controller = grasp_ros.nodes.controller:left_main",
+            "right_controller = grasp_ros.nodes.controller:right_main",
+            "monitor = grasp_ros.nodes.monitor:main",
+            "grasp = grasp_ros.cli:main",
+        ]
+    },
     zip_safe=False,
 )

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array, energy, feedback
@@ -68,6 +69,29 @@ class Trajectory:
                 work_names=np.array([entry.name.lower() for entry in Work]), status=self.status.name,
                 sampled=self.sampled, scene_name=self.scene.name, scene=self.scene.to_yaml(),
             )
+
+
+def load(path: Path) -> Trajectory:
+    """Read what `Trajectory.save` wrote.
+
+    Raises
+    ------
+    ValueError
+        If the file is not such a file.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
+            events = tuple(
+                SwitchEvent(time, int(side), Event(int(kind)), u, u_rate)
+                for time, side, kind, u, u_rate in data["events"].tolist()
+            )
+            return Trajectory(
+                scene, bool(data["sampled"]), data["t"], data["state"], data["command"], events, data["work"],
+                Status[str(data["status"])],
+            )
+    except (OSError, KeyError, ValueError) as error:
+        raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
 
 
 def simulate(

@@ -17,7 +17,8 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.nodes import messages
 from grasp_ros.nodes.node import GraspNode, run
-from grasp_ros.physics.integrator import ACCURACY, Integrator, Status
+from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, compile_kernels
+from grasp_ros.physics.jit import COMPILING, kernels_on_disk
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
 from grasp_ros.topics import (
@@ -45,6 +46,9 @@ class Plant(GraspNode):
         self._monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
         progress = self.read_only("progress", False, "show a progress bar on the terminal")
         self._scene = scenes.load(scene)
+        if not kernels_on_disk():
+            self.get_logger().info(COMPILING)
+        compile_kernels()
         self._integrator = Integrator(
             self._scene.grasp, self._scene.initial_state, continuous=False, accuracy=accuracy
         )

@@ -23,7 +23,7 @@ from grasp_ros.physics.layout import (
     Outcome,
     Work,
 )
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.series import new_tables, series_order
 
 ACCURACY = 1e-14  # default: the work between this and 1e-9 is small, see series_order
@@ -161,3 +161,10 @@ class Integrator:
             if len(self.events) > self._max_events:
                 self.status = Status.EVENT_BUDGET
         return out[:filled]
+
+
+def compile_kernels() -> None:
+    """Compile the kernels, or load them from disk, by integrating over no time at all."""
+    arm = Arm(1.0, 1.0, 0.0, 0.0, 0.0)
+    contact = Contact(1.0, 0.0)
+    Integrator(Grasp(arm, arm, contact, contact, 1.0), np.zeros(6), continuous=False).advance(0.0)

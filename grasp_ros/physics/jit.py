@@ -35,6 +35,7 @@ def _cache_directory() -> Path:
     return directory
 
 
+COMPILING = "compiling the kernels; this happens once after an installation and takes some 15 s"
 CACHE_DIRECTORY = _cache_directory()
 
 
@@ -48,6 +49,6 @@ def kernel(function: Callable[..., Any]) -> Any:
         numba.config.CACHE_DIR = before
 
 
-def is_compiled(name: str) -> bool:
-    """Whether the kernel of that name has machine code on disk, so that its first call need not compile it."""
-    return bool(numba.config.DISABLE_JIT) or any(CACHE_DIRECTORY.rglob(f"*.{name}-*.nbi"))
+def kernels_on_disk() -> bool:
+    """Whether the integrator has machine code on disk, so that its first call need not wait for the compiler."""
+    return bool(numba.config.DISABLE_JIT) or any(CACHE_DIRECTORY.rglob("*.advance-*.nbi"))

@@ -1,0 +1,177 @@
+"""`grasp`: the command line for everything that needs no ROS, and for starting the four processes together."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from collections.abc import Callable, Sequence
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Status, compile_kernels
+from grasp_ros.physics.jit import COMPILING, kernels_on_disk
+from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
+
+Command = Callable[[argparse.Namespace], int]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point of `grasp`; returns the exit status: 0, 1 if a run failed, 2 for input that is refused."""
+    options = _parser().parse_args(arguments)
+    command: Command = options.command
+    try:
+        return command(options)
+    except (ValueError, OSError) as error:
+        print(f"grasp: {error}", file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="grasp", description="Simulate, run, inspect and draw the colliding grasp.")
+    commands = parser.add_subparsers(required=True, metavar="command")
+
+    def add(name: str, command: Command, text: str) -> argparse.ArgumentParser:
+        sub = commands.add_parser(name, help=text, description=text)
+        sub.set_defaults(command=command)
+        return sub
+
+    add("scenes", _scenes, "list the scenes that come with the package")
+    sub = add("simulate", _simulate, "simulate a scene without ROS")
+    _add_scene(sub)
+    sub.add_argument("--grid", type=_grid, metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
+    sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as the graph does")
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
+    sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
+    _add_scene(sub)
+    sub.add_argument("-o", "--output", type=Path, metavar="DIRECTORY", help="new directory for the scene and the bag")
+    sub = add("inspect", _inspect, "print what is in a bag")
+    sub.add_argument("bag", type=Path)
+    sub = add("plot", _plot, "draw a bag, a file of `grasp simulate`, or a scene")
+    sub.add_argument("source", metavar="BAG|FILE.npz|SCENE")
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE", help="image file (default: beside the source)")
+    return parser
+
+
+def _add_scene(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument("scene", help="a name that `grasp scenes` lists, or the path of a .yaml file")
+    sub.add_argument(
+        "--set", dest="settings", action="append", default=[], metavar="section.key=value", help="replace a number"
+    )
+    sub.add_argument(
+        "--accuracy", type=float, default=ACCURACY, metavar="A",
+        help=f"relative size of the first neglected term of a contact, {FINEST:g} to {COARSEST:g} (default {ACCURACY:g})",
+    )
+
+
+def _grid(word: str) -> int:
+    number = int(word)
+    if number < 2:
+        raise argparse.ArgumentTypeError(f"{word} is not allowed; allowed: a whole number >= 2")
+    return number
+
+
+def _prepare() -> None:
+    if not kernels_on_disk():
+        print(COMPILING, file=sys.stderr)
+    compile_kernels()
+
+
+def _scenes(_: argparse.Namespace) -> int:
+    for name in scenes.names():
+        print(f"{name}  {scenes.load(name).title}")
+    return 0
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    from grasp_ros.report import describe_trajectory, table
+
+    scene = scenes.load(options.scene, options.settings)
+    _prepare()
+    grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
+    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=not options.sampled, delay=1.0) as bar:
+        trajectory = simulate(
+            scene, grid=grid, sampled=options.sampled, accuracy=options.accuracy,
+            progress=lambda reached: bar.update(reached - bar.n),
+        )
+    print(table(describe_trajectory(trajectory)))
+    if options.output is not None:
+        trajectory.save(options.output)
+        print(f"written to {options.output}")
+    return 0 if trajectory.status is Status.DONE else 1
+
+
+def _run(options: argparse.Namespace) -> int:
+    from grasp_ros import bag, report
+    from grasp_ros.graph import Graph, GraphError
+
+    scene = scenes.load(options.scene, options.settings)
+    directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
+    _prepare()
+    graph = Graph(scene, directory, options.accuracy, progress=sys.stderr.isatty() or options.output is None)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # both signals end a run in the same way
+    begin = time.monotonic()
+    failure = ""
+    interrupted = False
+    try:
+        graph.start()
+        graph.wait()
+    except KeyboardInterrupt:
+        interrupted = True
+    except GraphError as error:
+        failure = str(error)
+    finally:
+        graph.stop()
+    seconds = time.monotonic() - begin
+    if failure:
+        print(f"grasp: {failure}", file=sys.stderr)
+        return 1
+    if not (graph.bag / "metadata.yaml").exists():
+        print("interrupted before the first tick: no bag")
+        return 0
+    recording = bag.read(graph.bag)
+    rows = report.describe_recording(recording)
+    rows += [] if interrupted else report.compare_recording(recording, options.accuracy)
+    print(report.table([*rows, ("wall time", f"{seconds:.1f} s with start and stop")]))
+    return 0
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from grasp_ros import bag, report
+
+    print(report.table(report.describe_recording(bag.read(options.bag))))
+    return 0
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from grasp_ros import bag, plots
+
+    source = Path(options.source)
+    if source.is_dir():
+        recording = bag.read(source)
+        output = options.output or source.with_suffix(".png")
+        plots.draw(recording, output, f"recorded, commands held for {recording.scene.period_ns / 1e6:g} ms")
+    else:
+        trajectory = load(source) if source.suffix == ".npz" else _simulated(options.source)
+        output = options.output or (source.with_suffix(".png") if source.suffix else Path(f"{source.name}.png"))
+        held = f"commands held for {trajectory.scene.period_ns / 1e6:g} ms" if trajectory.sampled else "continuous feedback"
+        plots.draw(trajectory, output, f"simulated, {held}")
+    print(f"written to {output}")
+    return 0
+
+
+def _simulated(reference: str) -> Trajectory:
+    scene = scenes.load(reference)
+    _prepare()
+    return simulate(scene)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

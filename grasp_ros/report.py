@@ -1,0 +1,88 @@
+"""Short tables in plain text: what a simulation or a bag contains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from grasp_ros.bag import Recording
+from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.physics.model import Array, Mode, energy
+from grasp_ros.simulation import Trajectory, simulate
+
+Row = tuple[str, str]
+
+
+def table(rows: Iterable[Row]) -> str:
+    """Two aligned columns."""
+    rows = list(rows)
+    width = max(len(name) for name, _ in rows)
+    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+
+def describe_trajectory(trajectory: Trajectory) -> list[Row]:
+    """What happened in a simulation."""
+    level = energy(trajectory.scene.grasp, trajectory.state)
+    touches = [len(trajectory.times(Event.TOUCH, side)) for side in (LEFT, RIGHT)]
+    clamps = sum(event.kind == Event.CLAMP for event in trajectory.events)
+    rows = [
+        ("scene", trajectory.scene.title),
+        ("feedback", _feedback(trajectory.sampled, trajectory.scene.period_ns)),
+        ("status", trajectory.status.value),
+        ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
+        ("touches left, right", f"{touches[0]}, {touches[1]}" + (f"; {clamps} times u' < -1/p" if clamps else "")),
+        ("work", ", ".join(f"{trajectory.work[entry]} {entry.name.lower().replace('_', ' ')}" for entry in Work)),
+    ]
+    if len(trajectory.t):
+        rows.append(("V_c at both ends", _ends(level.V_c)))
+    return rows
+
+
+def describe_recording(recording: Recording) -> list[Row]:
+    """What is in a bag."""
+    scene = recording.scene
+    per_topic = ", ".join(f"{name} {count}" for name, count in recording.counts.items())
+    missing = {name: count for name, count in recording.missing.items() if count}
+    rows = [
+        ("bag", str(recording.path)),
+        ("scene", scene.title),
+        ("feedback", _feedback(True, scene.period_ns)),
+        ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
+        ("messages", per_topic),
+        ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
+        ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items())),
+    ]
+    if len(recording.tick):
+        mode = recording.lyapunov[:, 3]
+        begun = [_beginnings(mode, flag) for flag in (Mode.LEFT, Mode.RIGHT)]
+        rows.insert(5, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
+        rows.insert(6, ("V at both ends", _ends(recording.lyapunov[:, 0])))
+        rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
+    return rows
+
+
+def compare_recording(recording: Recording, accuracy: float) -> list[Row]:
+    """How far a recorded motion lies from the same scene without ROS, and from the paper's continuous feedback."""
+    times = recording.t
+    same = simulate(recording.scene, sampled=True, grid=times, accuracy=accuracy)
+    ideal = simulate(recording.scene, grid=times, accuracy=accuracy)
+    equal = np.array_equal(same.state, recording.state) and np.array_equal(same.command, recording.command)
+    offset = np.abs(ideal.state - recording.state).max(axis=0)
+    return [
+        ("same without ROS", "equal, bit for bit" if equal else "NOT EQUAL"),
+        ("from continuous feedback", "at most x_l {:.3g}, x_o {:.3g}, x_r {:.3g} m".format(*offset[0::2])),
+    ]
+
+
+def _feedback(sampled: bool, period_ns: int) -> str:
+    return f"sampled, each command held for {period_ns / 1e6:g} ms" if sampled else "continuous"
+
+
+def _ends(values: Array) -> str:
+    return f"{values[0]:.6g} J, {values[-1]:.6g} J"
+
+
+def _beginnings(mode: Array, flag: Mode) -> int:
+    touching = (np.nan_to_num(mode).astype(int) & int(flag)) != 0
+    return int(np.count_nonzero(touching[1:] & ~touching[:-1]) + touching[0])
