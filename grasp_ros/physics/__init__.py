@@ -1,0 +1,26 @@
+"""Physics and exact integration. No ROS, no files but the compiler's cache, no clocks: time is an argument.
+
+Notation. All numbers are SI; the line points to the right, i stands for l or r.
+
+==============  =====================  =========  ==========================================================
+symbol          identifier             unit       meaning, sign, equation of the paper
+==============  =====================  =========  ==========================================================
+x_l, x_o, x_r   x_l, x_o, x_r          m          positions of left arm, object, right arm; (1) to (3)
+v_i, v_o        v_l, v_o, v_r          m/s        velocities
+m, m_o          mass, object_mass      kg         masses
+k, c            stiffness, damping     N/m, Ns/m  spring and damper of an arm; (1), (2)
+Kp, Kv          position_gain, ...     N/m, Ns/m  feedback f = -Kp x - Kv x'; (4), (5)
+f_l, f_r        force, command         N          input forces, positive to the right
+u_l, u_r        u                      m          x_l - x_o, x_o - x_r: positive is penetration; (8)
+u'              d, u_rate              m/s        positive is approach
+fw_l, fw_r      impact_force           N          never negative: it pushes arm and object apart; (6), (7)
+H               hertz                  N/m^1.5    Hertz coefficient; (6), (7)
+p               dissipation            s/m        energy loss of an impact; (6), (7), contact needs u' >= -1/p; (10)
+V, V'           V, V_rate              J, W       the paper's Lyapunov function and its rate; (16), (18)
+V_c             V_c                    J          V with the Hertz term of every pair with u >= 0
+w, s, G         w, s, g                           regularised variables of a contact, see `series`
+==============  =====================  =========  ==========================================================
+
+`model` states the equations; `flight`, `series` and `hybrid` are the compiled kernels on the arrays of `layout`;
+`integrator` is what the rest of the package uses.
+"""
