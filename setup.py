@@ -40,10 +40,10 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "plant = grasp_ros.nodes.plant:main",
-            "left_controller = grasp_ros.nodes.controller:left_main",
-            "right_controller = grasp_ros.nodes.controller:right_main",
-            "monitor = grasp_ros.nodes.monitor:main",
+            "plant = grasp_ros.nodes.start:plant",
+            "left_controller = grasp_ros.nodes.start:left_controller",
+            "right_controller = grasp_ros.nodes.start:right_controller",
+            "monitor = grasp_ros.nodes.start:monitor",
             "grasp = grasp_ros.cli:main",
         ]
     },

@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="grasp", description="Simulate, run, inspect and draw the colliding grasp.")
+    parser = argparse.ArgumentParser(prog="grasp", description="Simulate, run, inspect and draw a colliding grasp.")
     commands = parser.add_subparsers(required=True, metavar="command")
 
     def add(name: str, command: Command, text: str) -> argparse.ArgumentParser:
@@ -51,7 +51,7 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("simulate", _simulate, "simulate a scene without ROS")
     _add_scene(sub)
     sub.add_argument("--grid", type=_grid, metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
-    sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as the graph does")
+    sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
     sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
     _add_scene(sub)
@@ -71,7 +71,7 @@ def _add_scene(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument(
         "--accuracy", type=float, default=ACCURACY, metavar="A",
-        help=f"relative size of the first neglected term of a contact, {FINEST:g} to {COARSEST:g} (default {ACCURACY:g})",
+        help=f"first neglected term of a contact, relative, {FINEST:g} to {COARSEST:g} (default {ACCURACY:g})",
     )
 
 
@@ -113,36 +113,37 @@ def _simulate(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from grasp_ros import bag, report
-    from grasp_ros.graph import Graph, GraphError
+    from grasp_ros import bag, plots, report
+    from grasp_ros.graph import STOP_SIGNALS, Graph, GraphError
 
     scene = scenes.load(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     _prepare()
-    graph = Graph(scene, directory, options.accuracy, progress=sys.stderr.isatty() or options.output is None)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # both signals end a run in the same way
+    graph = Graph(scene, directory, options.accuracy, progress=True)
+    received: list[int] = []
+    for number in STOP_SIGNALS:  # only noted: an exception could leave a process behind
+        signal.signal(number, lambda which, _: received.append(which))
     begin = time.monotonic()
-    failure = ""
-    interrupted = False
     try:
         graph.start()
-        graph.wait()
-    except KeyboardInterrupt:
-        interrupted = True
+        graph.wait(received)
     except GraphError as error:
-        failure = str(error)
+        print(f"grasp: {error}", file=sys.stderr)
+        return 1
     finally:
         graph.stop()
+        for number in STOP_SIGNALS:
+            signal.signal(number, signal.default_int_handler)
     seconds = time.monotonic() - begin
-    if failure:
-        print(f"grasp: {failure}", file=sys.stderr)
-        return 1
     if not (graph.bag / "metadata.yaml").exists():
         print("interrupted before the first tick: no bag")
         return 0
     recording = bag.read(graph.bag)
     rows = report.describe_recording(recording)
-    rows += [] if interrupted else report.compare_recording(recording, options.accuracy)
+    if not received:
+        figure = directory / "figure.png"
+        plots.draw(recording, figure, scene.feedback_in_words(sampled=True))
+        rows += [*report.compare_recording(recording, options.accuracy), ("figure", str(figure))]
     print(report.table([*rows, ("wall time", f"{seconds:.1f} s with start and stop")]))
     return 0
 
@@ -158,15 +159,14 @@ def _plot(options: argparse.Namespace) -> int:
     from grasp_ros import bag, plots
 
     source = Path(options.source)
+    motion: plots.Motion
     if source.is_dir():
-        recording = bag.read(source)
-        output = options.output or source.with_suffix(".png")
-        plots.draw(recording, output, f"recorded, commands held for {recording.scene.period_ns / 1e6:g} ms")
+        motion, sampled = bag.read(source), True
     else:
-        trajectory = load(source) if source.suffix == ".npz" else _simulated(options.source)
-        output = options.output or (source.with_suffix(".png") if source.suffix else Path(f"{source.name}.png"))
-        held = f"commands held for {trajectory.scene.period_ns / 1e6:g} ms" if trajectory.sampled else "continuous feedback"
-        plots.draw(trajectory, output, f"simulated, {held}")
+        motion = load(source) if source.suffix == ".npz" else _simulated(options.source)
+        sampled = motion.sampled
+    output = options.output or (source.with_suffix(".png") if source.exists() else Path(f"{motion.scene.name}.png"))
+    plots.draw(motion, output, motion.scene.feedback_in_words(sampled))
     print(f"written to {output}")
     return 0
 

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -15,12 +15,7 @@ from grasp_ros.scene import Scene
 
 STOP_SECONDS = 10.0
 POLL_SECONDS = 0.02
-MODULES: Mapping[str, tuple[str, ...]] = {
-    "monitor": ("grasp_ros.nodes.monitor",),
-    "left_controller": ("grasp_ros.nodes.controller", "left"),
-    "right_controller": ("grasp_ros.nodes.controller", "right"),
-    "plant": ("grasp_ros.nodes.plant",),
-}
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class GraphError(RuntimeError):
@@ -78,20 +73,23 @@ class Graph:
                 "progress": str(self.progress).lower(),
             },
         }
-        for name, module in MODULES.items():
-            parameters = [word for key, value in settings[name].items() for word in ("-p", f"{key}:={value}")]
-            command = [sys.executable, "-m", *module, "--ros-args", *parameters]
+        # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+        for name, parameters in settings.items():
+            words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+            command = [sys.executable, "-m", "grasp_ros.nodes.start", name, "--ros-args", *words]
             self.processes[name] = subprocess.Popen(command, env=environment, start_new_session=True)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    def wait(self) -> None:
-        """Wait until plant and monitor have finished.
+    def wait(self, received: Sequence[int]) -> None:
+        """Wait until plant and monitor have finished, or until a signal has been received.
 
         Raises
         ------
         GraphError
             If a process ends with another status than 0, or a controller ends early.
         """
-        while any(self.processes[name].poll() is None for name in ("plant", "monitor")):
+        while not received and any(self.processes[name].poll() is None for name in ("plant", "monitor")):
             for name, process in self.processes.items():
                 if process.poll() or (process.poll() == 0 and name.endswith("controller")):
                     raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")

@@ -9,7 +9,6 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-import numpy as np
 from matplotlib.axes import Axes
 
 from grasp_ros.physics.model import Array, Mode, energy
@@ -24,13 +23,20 @@ class Motion(Protocol):
     """What can be drawn: a trajectory or a recording."""
 
     @property
-    def scene(self) -> Scene: ...
+    def scene(self) -> Scene:
+        """The scene."""
+
     @property
-    def t(self) -> Array: ...
+    def t(self) -> Array:
+        """Times (n,) in s."""
+
     @property
-    def state(self) -> Array: ...
+    def state(self) -> Array:
+        """States (n, 6) in m and m/s."""
+
     @property
-    def command(self) -> Array: ...
+    def command(self) -> Array:
+        """Input forces (n, 2) in N."""
 
 
 def draw(motion: Motion, path: Path, caption: str) -> None:
@@ -42,7 +48,7 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
     path : Path
         The ending decides the format.
     caption : str
-        What the motion is: simulated or recorded, continuous or sampled.
+        Second line of the title.
 
     Raises
     ------
@@ -81,8 +87,10 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
     level = energy(motion.scene.grasp, motion.state)
     axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$")
     axes.plot(motion.t, level.V, color="#cc79a7", linewidth=1.0, linestyle="--", label="$V$ of the paper")
-    if (level.V_c > 0.0).all():
+    if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
         axes.set_yscale("log")
+    else:
+        axes.set_ylim(0.0, 1.3 * level.V_c.max() or 1.0)
     axes.set_ylabel("twice the energy, J")
     for flag, low, label, color in (
         (Mode.LEFT, 0.0, "left contact", LEFT_COLOR),
@@ -93,7 +101,3 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
             motion.t, low, low + 0.04, where=touching, step="post", color=color, alpha=0.8, linewidth=0,
             transform=axes.get_xaxis_transform(), label=label,
         )
-    positive = level.V_c[level.V_c > 0.0]
-    if axes.get_yscale() == "log" and np.ptp(np.log10(positive)) < 0.5:
-        axes.set_yscale("linear")
-        axes.set_ylim(0.0, 1.3 * level.V_c.max())

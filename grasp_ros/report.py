@@ -28,7 +28,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     clamps = sum(event.kind == Event.CLAMP for event in trajectory.events)
     rows = [
         ("scene", trajectory.scene.title),
-        ("feedback", _feedback(trajectory.sampled, trajectory.scene.period_ns)),
+        ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
         ("status", trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
         ("touches left, right", f"{touches[0]}, {touches[1]}" + (f"; {clamps} times u' < -1/p" if clamps else "")),
@@ -47,7 +47,7 @@ def describe_recording(recording: Recording) -> list[Row]:
     rows = [
         ("bag", str(recording.path)),
         ("scene", scene.title),
-        ("feedback", _feedback(True, scene.period_ns)),
+        ("feedback", scene.feedback_in_words(sampled=True)),
         ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
         ("messages", per_topic),
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
@@ -73,10 +73,6 @@ def compare_recording(recording: Recording, accuracy: float) -> list[Row]:
         ("same without ROS", "equal, bit for bit" if equal else "NOT EQUAL"),
         ("from continuous feedback", "at most x_l {:.3g}, x_o {:.3g}, x_r {:.3g} m".format(*offset[0::2])),
     ]
-
-
-def _feedback(sampled: bool, period_ns: int) -> str:
-    return f"sampled, each command held for {period_ns / 1e6:g} ms" if sampled else "continuous"
 
 
 def _ends(values: Array) -> str:

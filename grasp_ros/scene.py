@@ -132,9 +132,14 @@ class Scene:
         """Time of a tick in s: an integer number of ns, rounded once."""
         return tick * self.period_ns / NANOSECONDS
 
+    def feedback_in_words(self, sampled: bool) -> str:
+        """What acts on the arms: the paper's continuous feedback, or commands that are held."""
+        return f"each command held for {self.period_ns / 1e6:g} ms" if sampled else "continuous feedback"
+
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
-        document = {"title": self.title, "readings": list(self.readings), **{k: dict(v) for k, v in self.values.items()}}
+        values = {section: dict(numbers) for section, numbers in self.values.items()}
+        document = {"title": self.title, "readings": list(self.readings), **values}
         return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
 
     def _arm(self, side: str) -> Arm:
@@ -199,7 +204,8 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
             raise SceneError(f"{reference}: no such file")
         return parse(path.read_text(encoding="utf-8"), path.stem, str(path), settings)
     if reference not in names():
-        raise SceneError(f"{reference}: no such scene; allowed: a path that ends in .yaml, or one of {', '.join(names())}")
+        known = ", ".join(names())
+        raise SceneError(f"{reference}: no such scene; allowed: a path that ends in .yaml, or one of {known}")
     return parse((_library() / f"{reference}.yaml").read_text(encoding="utf-8"), reference, reference, settings)
 
 
@@ -254,7 +260,8 @@ def _apply(document: dict[Any, Any], setting: str) -> None:
 def _check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str]) -> None:
     for key in found:
         if key not in allowed:
-            raise SceneError(f"{source}: {prefix}{key}: {found[key]!r} has an unknown key; allowed: {', '.join(allowed)}")
+            known = ", ".join(allowed)
+            raise SceneError(f"{source}: {prefix}{key}: unknown key with the value {found[key]!r}; allowed: {known}")
     for key in allowed:
         if key not in found:
             raise SceneError(f"{source}: {prefix}{key}: missing; allowed: exactly the keys {', '.join(allowed)}")

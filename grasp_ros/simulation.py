@@ -12,9 +12,10 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array, energy, feedback
-from grasp_ros.scene import Scene
+from grasp_ros.scene import NANOSECONDS, Scene
 
 GRID_POINTS = 2001
+Progress = Callable[[float], object] | None
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,7 @@ def simulate(
     sampled: bool = False,
     accuracy: float = ACCURACY,
     max_events: int = 10**7,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
 
@@ -136,10 +137,9 @@ def simulate(
         raise ValueError("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
         raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
-    if sampled:
-        states = _sampled(scene, integrator, grid, progress)
-    else:
-        states = integrator.advance(scene.duration, grid)
+    states = (
+        _sampled(scene, integrator, grid, progress) if sampled else integrator.advance(scene.duration, grid)
+    )
     grid = grid[: len(states)]
     return Trajectory(
         scene, sampled, grid, states, commands(scene, states), tuple(integrator.events), integrator.work.copy(),
@@ -163,17 +163,14 @@ def commands(scene: Scene, states: Array) -> Array:
     return np.stack(command(scene, states.T), axis=-1)
 
 
-def _sampled(
-    scene: Scene, integrator: Integrator, grid: Array, progress: Callable[[float], None] | None
-) -> Array:
-    period = scene.period_ns / 1e9
+def _sampled(scene: Scene, integrator: Integrator, grid: Array, progress: Progress) -> Array:
+    period = scene.period_ns / NANOSECONDS
     times = tick_times(scene)
     # Each period [t_k, t_k+1) delivers its own outputs; a state at a tick is the one that the controllers see.
     bounds = np.searchsorted(grid, times, side="left")
     rows = [np.empty((0, 6))]
     for tick in range(scene.ticks):
-        state = integrator.state
-        integrator.hold(*command(scene, state))
+        integrator.hold(*command(scene, integrator.state))
         inside = grid[bounds[tick] : bounds[tick + 1]]
         rows.append(integrator.advance(period, np.clip(inside - times[tick], 0.0, period), times[tick]))
         if integrator.status is not Status.DONE:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -20,11 +20,11 @@ class Controller(GraspNode):
     stamp.
     """
 
-    def __init__(self, side: str) -> None:
-        super().__init__(f"{side}_controller")
-        self._side = side
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor", False, "answer only once a monitor listens")
-        self._commands = self.publisher(LEFT_COMMAND if side == "left" else RIGHT_COMMAND)
+        self._commands = self.publisher(LEFT_COMMAND if self._side == "left" else RIGHT_COMMAND)
         self._arm: Arm | None = None
         self.counters["answered states"] = 0
         self.subscribe(SCENE, self._on_scene)
@@ -51,15 +51,6 @@ class Controller(GraspNode):
         self.counters["answered states"] = int(self.counters["answered states"]) + 1
 
 
-def left_main() -> int:
-    """Entry point of `left_controller`."""
-    return run(partial(Controller, "left"))
-
-
-def right_main() -> int:
-    """Entry point of `right_controller`."""
-    return run(partial(Controller, "right"))
-
-
-if __name__ == "__main__":
-    sys.exit(left_main() if sys.argv[1] == "left" else right_main())
+def main(name: str, received: Sequence[int]) -> int:
+    """Run `left_controller` or `right_controller`."""
+    return run(partial(Controller, name), received)

@@ -128,7 +128,10 @@ def text(content: str) -> String:
 def diagnostics(stamp: Time, name: str, summary: str, healthy: bool, values: Mapping[str, object]) -> DiagnosticArray:
     """One node's health."""
     status = DiagnosticStatus(
-        level=DiagnosticStatus.OK if healthy else DiagnosticStatus.WARN, name=name, message=summary, hardware_id="grasp_ros",
+        level=DiagnosticStatus.OK if healthy else DiagnosticStatus.WARN,
+        name=name,
+        message=summary,
+        hardware_id="grasp_ros",
         values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
     )
     message = DiagnosticArray(status=[status])

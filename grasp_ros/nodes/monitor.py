@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import sys
 from collections import deque
+from collections.abc import Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -65,7 +65,8 @@ class Monitor(GraspNode):
                 self._complete(newest, {name: pending.popleft()[1] for name, pending in self._pending.items()})
 
     def _complete(self, time_ns: int, tick: dict[str, bytes]) -> None:
-        assert self._scene is not None and self._recorder is not None
+        assert self._scene is not None
+        assert self._recorder is not None
         state = messages.state_of(deserialize_message(tick[JOINT_STATES.name], JointState))
         values = [float(value) for value in energy(self._scene.grasp, state)]
         for topic in INPUTS:
@@ -83,10 +84,6 @@ class Monitor(GraspNode):
             self._values.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
 
 
-def main() -> int:
-    """Entry point of `monitor`."""
-    return run(Monitor)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def main(_: str, received: Sequence[int]) -> int:
+    """Run the monitor."""
+    return run(Monitor, received)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -25,7 +24,7 @@ PATIENCE_SECONDS = 5.0
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 
 
-class GraspNode(Node):  # type: ignore[misc]
+class GraspNode(Node):
     """A node with read-only parameters, counters on /diagnostics and an end."""
 
     def __init__(self, name: str) -> None:
@@ -92,24 +91,20 @@ class GraspNode(Node):  # type: ignore[misc]
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
 
 
-def run(make: Callable[[], GraspNode], arguments: Sequence[str] | None = None) -> int:
-    """Run one node until it has finished or until SIGINT or SIGTERM; returns the exit status of the process.
+def run(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
+    """Run one node until it has finished or a signal has been received; returns the exit status of the process.
 
     0 after a finished run or a signal, 2 if the node refuses its parameters, otherwise the node's own status.
-    The signal handlers are ours: those of rclpy invalidate the context under a callback, which then raises.
+    The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
+    raises.
     """
-    signals: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda received, _: signals.append(received))
     node = None
     try:
-        rclpy.init(
-            args=None if arguments is None else list(arguments), signal_handler_options=SignalHandlerOptions.NO
-        )
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         node = make()
         executor = EventsExecutor()
         executor.add_node(node)
-        while not (node.finished or signals):
+        while not (node.finished or received):
             executor.spin_once(timeout_sec=POLL_SECONDS)
         executor.shutdown()
     except ValueError as error:
@@ -120,6 +115,4 @@ def run(make: Callable[[], GraspNode], arguments: Sequence[str] | None = None) -
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()
-        for number in (signal.SIGINT, signal.SIGTERM):  # a second Ctrl-C must not hit the end of the interpreter
-            signal.signal(number, signal.SIG_IGN)
     return node.exit_code

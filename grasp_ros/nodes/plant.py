@@ -7,7 +7,7 @@ not depend on the load of the machine.
 from __future__ import annotations
 
 import math
-import sys
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -153,10 +153,6 @@ class Plant(GraspNode):
                 publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
 
 
-def main() -> int:
-    """Entry point of `plant`."""
-    return run(Plant)
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def main(_: str, received: Sequence[int]) -> int:
+    """Run the plant."""
+    return run(Plant, received)

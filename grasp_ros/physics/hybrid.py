@@ -34,10 +34,10 @@ from grasp_ros.physics.series import (
     D_L,
     E_L,
     EVENT,
-    G,
     TIME,
     W_L,
     W_R,
+    G,
     evaluate,
     expand_both,
     expand_one,
@@ -50,6 +50,7 @@ from grasp_ros.physics.series import (
 
 OPEN, CONTACT, CLAMPED, LEAVING, HELD = (int(p) for p in Pair)
 TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in Event)
+GRID, EVENTS = 0, 1  # entries of `filled`
 DONE, EVENTS_FULL, NOT_FINITE, STALLED = (int(o) for o in Outcome)
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
 SLIVER = 1e-7  # part of an impact's depth whose impulse, of relative size SLIVER^2.5, is below rounding
@@ -147,24 +148,25 @@ def tick(clock: Any, step: float) -> None:
 
 
 @kernel
-def fire(pairs: Any, y: Any, mode: Any, side: int, kind: int, now: float, events: Any, n: int) -> int:
-    """Switch one pair and record the event; returns the number of events.
+def fire(y: Any, mode: Any, side: int, kind: int, now: float, events: Any, filled: Any) -> None:
+    """Switch one pair and record the event.
 
     A touch that rounding invents at the turning point of a grazing approach has u' <= 0 and is no event.
     """
     d = y[V_L] - y[V_O] if side == LEFT else y[V_O] - y[V_R]
-    if kind == TOUCH or kind == RELEASE:
+    if kind in (TOUCH, RELEASE):
         y[U_L + side] = 0.0
     if kind == TOUCH and d <= 0.0:
         mode[side] = OPEN
-        return n
+        return
+    n = filled[EVENTS]
+    filled[EVENTS] = n + 1
     mode[side] = OPEN if kind == RELEASE else (CLAMPED if kind == CLAMP else CONTACT)
     events[n, 0] = now
     events[n, 1] = side
     events[n, 2] = kind
     events[n, 3] = y[U_L + side]
     events[n, 4] = d
-    return n + 1
 
 
 @kernel
@@ -198,9 +200,9 @@ def fly_all(flights: Any, t: float, y: Any) -> None:
 
 
 @kernel
-def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, grid: Any, out: Any, n_g: int,
-                   events: Any, n_e: int, work: Any) -> Any:
-    """Fly to the first event or to the end of the span; returns the flight time and the new n_g, n_e."""
+def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, grid: Any, out: Any,
+                   events: Any, filled: Any, work: Any) -> float:
+    """Fly to the first event or to the end of the span; returns the flight time."""
     work[0] += 1
     flights = (
         launch(bodies[LEFT], y[X_L], y[V_L]),
@@ -213,10 +215,12 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
     t = min(span, t_l, t_r) if t_l == t_l and t_r == t_r else math.nan
     first_l, first_r = relative_motion(bodies, y, LEFT), relative_motion(bodies, y, RIGHT)
     now = clock[0] + t
-    while n_g < grid.shape[0] and grid[n_g] <= now:
-        fly_all(flights, max((grid[n_g] - clock[0]) - clock[1], 0.0), y)
-        out[n_g, :] = y[:6]
-        n_g += 1
+    row = filled[GRID]
+    while row < grid.shape[0] and grid[row] <= now:
+        fly_all(flights, max((grid[row] - clock[0]) - clock[1], 0.0), y)
+        out[row, :] = y[:6]
+        row += 1
+    filled[GRID] = row
     fly_all(flights, t, y)
     if mode[LEFT] == HELD:
         y[U_L] = t * (first_l[0] + 0.5 * t * first_l[1])
@@ -224,10 +228,10 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
         y[U_L + 1] = t * (first_r[0] + 0.5 * t * first_r[1])
     tick(clock, t)
     if t_l <= t * TOGETHER:
-        n_e = fire(pairs, y, mode, LEFT, kind_l, clock[0], events, n_e)
+        fire(y, mode, LEFT, kind_l, clock[0], events, filled)
     if t_r <= t * TOGETHER:
-        n_e = fire(pairs, y, mode, RIGHT, kind_r, clock[0], events, n_e)
-    return t, n_g, n_e
+        fire(y, mode, RIGHT, kind_r, clock[0], events, filled)
+    return t
 
 
 @kernel
@@ -293,8 +297,8 @@ def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, span: 
 
 @kernel
 def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, tolerance: float,
-                    n: int, grid: Any, out: Any, n_g: int, events: Any, n_e: int, work: Any) -> Any:
-    """One Taylor step, cut at its first event or at the end of the span; returns its time and the new n_g, n_e."""
+                    n: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
+    """One Taylor step, cut at its first event or at the end of the span; returns its time."""
     work[1] += 1
     left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
     c = tables.c
@@ -309,24 +313,26 @@ def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clo
         t = span
     now = clock[0] + t
     low = 0.0
-    while n_g < grid.shape[0] and grid[n_g] <= now:
-        low = invert_time(c, g, n, max((grid[n_g] - clock[0]) - clock[1], 0.0), low, s)
+    row = filled[GRID]
+    while row < grid.shape[0] and grid[row] <= now:
+        low = invert_time(c, g, n, max((grid[row] - clock[0]) - clock[1], 0.0), low, s)
         state_at(c, n, low, left, right, y)
-        out[n_g, :] = y[:6]
-        n_g += 1
+        out[row, :] = y[:6]
+        row += 1
+    filled[GRID] = row
     state_at(c, n, s, left, right, y)
     tick(clock, t)
     if s_l <= s * TOGETHER:
-        n_e = fire(pairs, y, mode, LEFT, kind_l, clock[0], events, n_e)
+        fire(y, mode, LEFT, kind_l, clock[0], events, filled)
     if s_r <= s * TOGETHER:
-        n_e = fire(pairs, y, mode, RIGHT, kind_r, clock[0], events, n_e)
-    return t, n_g, n_e
+        fire(y, mode, RIGHT, kind_r, clock[0], events, filled)
+    return t
 
 
 @kernel
-def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, tolerance: float, grid: Any,
-            out: Any, events: Any, work: Any) -> Any:
-    """Integrate y in place from the clock to `span` with constant forces on the arms.
+def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, tolerance: float,
+            grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
+    """Integrate y in place from the clock to `span` with constant forces on the arms; returns a `layout.Outcome`.
 
     Parameters
     ----------
@@ -342,45 +348,40 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         Ascending output times on the clock, and the states at them.
     events : array (m, 5)
         Filled with time, side, kind, u, u'.
+    filled : int array (2,)
+        Rows of `out` and of `events` in use, updated in place.
     work : int array (4,)
         Counters, see `layout.Work`.
-
-    Returns
-    -------
-    (outcome, rows of out filled, rows of events filled)
     """
     n = tables.c.shape[1] - 1
-    n_g = 0
-    n_e = 0
     idle = 0
     while True:
-        left = (span - clock[0]) - clock[1]
-        if not left > 0.0:
+        limit = (span - clock[0]) - clock[1]
+        if not limit > 0.0:
             break
-        if n_e + 2 > events.shape[0]:
-            return EVENTS_FULL, n_g, n_e
+        if filled[EVENTS] + 2 > events.shape[0]:
+            return EVENTS_FULL
         settle(bodies, pairs, y, mode)
         held_l, held_r = mode[LEFT] == HELD, mode[RIGHT] == HELD
-        limit = left
         if held_l:
             limit = min(limit, hold_time(bodies, pairs, y, LEFT))
         if held_r:
             limit = min(limit, hold_time(bodies, pairs, y, RIGHT))
         if mode[LEFT] == CONTACT or mode[RIGHT] == CONTACT:
-            t, n_g, n_e = contact_segment(tables, bodies, pairs, y, mode, clock, limit, tolerance, n, grid, out, n_g,
-                                          events, n_e, work)
+            t = contact_segment(tables, bodies, pairs, y, mode, clock, limit, tolerance, n, grid, out, events,
+                                filled, work)
         else:
-            t, n_g, n_e = flight_segment(bodies, pairs, y, mode, clock, limit, grid, out, n_g, events, n_e, work)
+            t = flight_segment(bodies, pairs, y, mode, clock, limit, grid, out, events, filled, work)
         if held_l:
             mode[LEFT] = judge(bodies, pairs, y, LEFT, mode[RIGHT] == CONTACT)
         if held_r:
             mode[RIGHT] = judge(bodies, pairs, y, RIGHT, mode[LEFT] == CONTACT)
         idle = 0 if t > 0.0 else idle + 1
         if not math.isfinite(y.sum()) or t != t:
-            return NOT_FINITE, n_g, n_e
+            return NOT_FINITE
         if idle > MAX_IDLE:
-            return STALLED, n_g, n_e
-    while n_g < grid.shape[0] and grid[n_g] <= span:
-        out[n_g, :] = y[:6]
-        n_g += 1
-    return DONE, n_g, n_e
+            return STALLED
+    while filled[GRID] < grid.shape[0] and grid[filled[GRID]] <= span:
+        out[filled[GRID], :] = y[:6]
+        filled[GRID] += 1
+    return DONE

@@ -146,21 +146,21 @@ class Integrator:
         times = np.zeros(0) if grid is None else np.ascontiguousarray(grid, dtype=float)
         out = np.empty((len(times), 6))
         clock = np.zeros(2)
-        filled = 0
+        filled = np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
-            outcome, rows, count = hybrid.advance(
+            outcome = hybrid.advance(
                 self._tables, self._bodies, self._pairs, self._y, self._mode, clock, duration, self._accuracy,
-                times[filled:], out[filled:], self._event_rows, self.work,
+                times, out, self._event_rows, filled, self.work,
             )
-            filled += rows
-            for time, side, kind, u, u_rate in self._event_rows[:count].tolist():
+            for time, side, kind, u, u_rate in self._event_rows[: filled[1]].tolist():
                 self.events.append(SwitchEvent(start + time, int(side), Event(int(kind)), u, u_rate))
+            filled[1] = 0
             if outcome != Outcome.EVENTS_FULL:
                 self.status = _STATUS[Outcome(outcome)]
                 break
             if len(self.events) > self._max_events:
                 self.status = Status.EVENT_BUDGET
-        return out[:filled]
+        return out[: filled[0]]
 
 
 def compile_kernels() -> None:

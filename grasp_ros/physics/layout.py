@@ -6,8 +6,14 @@ pairs are rows LEFT, RIGHT of an array (2, 2).
 """
 
 from enum import IntEnum
+from typing import Any
 
-LEFT, RIGHT, OBJECT = 0, 1, 2
+import numpy as np
+
+# Typed integers: numba would compile every function once per literal side.
+LEFT: Any = np.int64(0)
+RIGHT: Any = np.int64(1)
+OBJECT: Any = np.int64(2)
 MASS, STIFFNESS, DAMPING, FORCE = 0, 1, 2, 3  # columns of bodies: kg, N/m, N s/m, N
 HERTZ, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
 X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)

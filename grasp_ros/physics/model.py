@@ -136,7 +136,8 @@ def energy(grasp: Grasp, state: Array) -> Energy:
     springs = (left.stiffness + left.position_gain) * x_l * x_l + (right.stiffness + right.position_gain) * x_r * x_r
     V = kinetic + springs
     V_c = V
-    V_rate = -2.0 * ((left.damping + left.velocity_gain) * v_l * v_l + (right.damping + right.velocity_gain) * v_r * v_r)
+    damping = (left.damping + left.velocity_gain) * v_l * v_l + (right.damping + right.velocity_gain) * v_r * v_r
+    V_rate = -2.0 * damping
     mode = np.zeros(np.shape(V), dtype=np.int64)
     u_l, d_l, u_r, d_r = penetration(state)
     for flag, contact, u, d in (

@@ -1,0 +1,36 @@
+"""A ROS domain of this test run alone, checked messages, and results that several tests look at."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
+
+RUN_SECONDS = 90.0
+
+
+def grasp(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own, with a deadline."""
+    command = [sys.executable, "-m", "grasp_ros.cli", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=RUN_SECONDS, check=False)
+
+
+@pytest.fixture(scope="session")
+def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """Two directories of `grasp run`, of the same scene: case 1 over its first contacts."""
+    os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("log"))
+    directories = []
+    for name in ("first", "second"):
+        cwd = tmp_path_factory.mktemp(name)
+        result = grasp("run", "case_01", "--set", "time.duration_s=3", "-o", "run", cwd=cwd)
+        assert result.returncode == 0, result.stderr
+        (cwd / "stdout").write_text(result.stdout)
+        directories.append(cwd / "run")
+    return directories[0], directories[1]

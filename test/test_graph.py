@@ -1,0 +1,217 @@
+"""The graph: four real processes, real DDS, real bags."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from grasp_ros import bag, scene
+from grasp_ros.nodes import messages
+from grasp_ros.physics.model import energy, impact_forces
+from grasp_ros.simulation import command, simulate
+from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, PER_TICK, RIGHT_COMMAND, SCENE
+
+DEADLINE = 60.0
+START = [sys.executable, "-m", "grasp_ros.nodes.start"]
+
+
+def wait_for(condition: Callable[[], bool], what: str) -> None:
+    deadline = time.monotonic() + DEADLINE
+    while not condition():
+        assert time.monotonic() < deadline, f"waited in vain for {what}"
+        time.sleep(0.01)
+
+
+def content(directory: Path) -> list[tuple[str, int, bytes]]:
+    with (directory / "bag" / "bag.mcap").open("rb") as file:
+        rows = make_reader(file).iter_messages()
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in rows]
+
+
+def test_graph_bag_and_simulation_are_equal_bit_for_bit(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    simulated = simulate(scene.load("case_01", ["time.duration_s=3"]), sampled=True)
+    assert len(recording.tick) == 3001
+    assert simulated.state.tobytes() == recording.state.tobytes()
+    assert simulated.command.tobytes() == recording.command.tobytes()
+    assert simulated.t.tobytes() == recording.t.tobytes()
+    assert np.array_equal(recording.effort[1:], recording.command[:-1])
+    assert len({*simulated.events}) >= 12  # the run has contacts to be equal in
+
+
+def test_two_runs_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:
+    first, second = (content(directory) for directory in two_runs)
+    assert first == second
+    assert len(first) == 6 * 3001 + 1
+
+
+def test_bag_holds_every_tick_of_every_topic(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    assert recording.missing == {topic.name: 0 for topic in PER_TICK}
+    assert recording.scene.values == scene.load("case_01", ["time.duration_s=3"]).values
+    assert {"python", "numpy", "grasp_ros", "rclpy"} <= set(recording.versions)
+
+
+def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    level = energy(recording.scene.grasp, recording.state)
+    assert np.array_equal(recording.lyapunov, np.stack([*level[:3], level.mode.astype(float)], axis=1))
+    assert set(recording.lyapunov[:, 3]) == {0.0, 1.0, 2.0, 3.0}
+    assert np.array_equal(recording.contact, np.stack(impact_forces(recording.scene.grasp, recording.state), axis=1))
+    assert recording.contact.max() > 10.0
+
+
+def test_an_independent_reader_decodes_the_bag(two_runs: tuple[Path, Path]) -> None:
+    with (two_runs[0] / "bag" / "bag.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        rows = [
+            (schema.name, channel.metadata["offered_qos_profiles"], message.log_time, decoded)
+            for schema, channel, message, decoded in reader.iter_decoded_messages(topics=["/joint_states"])
+        ]
+    names, qos, times, states = zip(*rows, strict=True)
+    assert set(names) == {"sensor_msgs/msg/JointState"}
+    assert "reliab" in qos[0]
+    assert list(times) == [tick * 1_000_000 for tick in range(3001)]
+    assert states[500].name == ["left", "object", "right"]
+    stamp = states[500].header.stamp
+    assert (stamp.sec, stamp.nanosec) == (0, 500_000_000)
+    assert states[500].position[0] == simulate(scene.load("case_01"), sampled=True, grid=np.array([0.5])).state[0, 0]
+
+
+def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
+    printed = (two_runs[0].parent / "stdout").read_text()
+    assert "equal, bit for bit" in printed
+    assert "lost                      nothing" in printed
+    assert (two_runs[0] / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["recording", "starting"])
+def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, moment: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"], cwd=tmp_path, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    recorded = tmp_path / "run" / "bag" / "bag.mcap"
+    if moment == "recording":
+        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 2_000_000, "a bag that grows")
+    else:
+        wait_for(lambda: (tmp_path / "run" / "case_01.yaml").exists(), "the first process")
+    process.send_signal(number)
+    out, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 0, err
+    assert "Traceback" not in err + out
+    if moment == "recording":
+        recording = bag.read(recorded.parent)
+        ticks = len(recording.tick)
+        assert 100 < ticks < 20001
+        assert recording.counts == {topic.name: ticks for topic in PER_TICK}
+        assert np.array_equal(recording.tick, np.arange(ticks))
+        full = simulate(scene.load("case_01"), sampled=True)
+        assert full.state[:ticks].tobytes() == recording.state.tobytes()
+    left_behind = subprocess.run(["pgrep", "-f", str(tmp_path)], capture_output=True, text=True, check=False)
+    assert left_behind.stdout == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", ["plant", "left_controller", "right_controller", "monitor"])
+def test_lonely_node_ends_cleanly_on_a_signal(tmp_path: Path, name: str, number: signal.Signals) -> None:
+    process = subprocess.Popen(
+        [*START, name], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "ROS_DOMAIN_ID": "120"},
+    )
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=120)
+    observer = rclpy.create_node("observer", context=context)
+    wait_for(lambda: name in observer.get_node_names(), name)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=DEADLINE)
+    observer.destroy_node()
+    context.shutdown()
+    assert process.returncode == 0, err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "complaint"),
+    [
+        ("plant", "scene:=case_99", "case_99: no such scene"),
+        ("plant", "scene:=missing.yaml", "missing.yaml: no such file"),
+        ("plant", "accuracy:=1.0", "accuracy: 1.0 is outside"),
+        ("monitor", "bag:=.", "bag: '.' exists"),
+    ],
+)
+def test_bad_parameters_are_refused(tmp_path: Path, name: str, parameter: str, complaint: str) -> None:
+    command_line = [*START, name, "--ros-args", "-p", parameter]
+    result = subprocess.run(command_line, cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert result.returncode == 2
+    assert complaint in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+@pytest.fixture
+def node() -> Iterator[tuple[Any, SingleThreadedExecutor]]:
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    peer = rclpy.create_node("peer", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(peer)
+    yield peer, executor
+    executor.shutdown()
+    peer.destroy_node()
+    context.shutdown()
+
+
+def test_plant_drops_what_is_stale_repeated_or_not_finite(node: tuple[Any, SingleThreadedExecutor]) -> None:
+    """One node plays both controllers and sends garbage between its right answers."""
+    peer, executor = node
+    settings = ["time.duration_s=0.6"]
+    expected = simulate(scene.load("case_01", settings), sampled=True)
+    publishers = [
+        peer.create_publisher(WrenchStamped, topic.name, messages.qos(topic)) for topic in (LEFT_COMMAND, RIGHT_COMMAND)
+    ]
+    states: list[np.ndarray] = []
+    scenes: list[str] = []
+
+    def answer(message: JointState) -> None:
+        states.append(messages.state_of(message))
+        now = messages.to_ns(message.header.stamp)
+        forces = command(expected.scene, states[-1])
+        for publisher in publishers:
+            publisher.publish(messages.wrench(now - 1_000_000, 100.0))
+            publisher.publish(messages.wrench(now, math.nan))
+            publisher.publish(messages.wrench(now, math.inf))
+        publishers[0].publish(messages.wrench(now, forces[0]))
+        publishers[0].publish(messages.wrench(now, 100.0))
+        publishers[1].publish(messages.wrench(now, forces[1]))
+
+    peer.create_subscription(JointState, JOINT_STATES.name, answer, messages.qos(JOINT_STATES))
+    peer.create_subscription(String, SCENE.name, lambda message: scenes.append(message.data), messages.qos(SCENE))
+    file = Path(os.environ["ROS_LOG_DIR"]) / "short.yaml" if "ROS_LOG_DIR" in os.environ else Path("short.yaml")
+    file.write_text(expected.scene.to_yaml())
+    plant = subprocess.Popen([*START, "plant", "--ros-args", "-p", f"scene:={file}"])
+    deadline = time.monotonic() + DEADLINE
+    while plant.poll() is None:
+        assert time.monotonic() < deadline, "the plant does not finish"
+        executor.spin_once(timeout_sec=0.05)
+    file.unlink()
+    assert plant.returncode == 0
+    assert np.array_equal(states, expected.state)
+    assert scene.parse(scenes[0], "scene", "topic").values == expected.scene.values
