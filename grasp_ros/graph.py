@@ -34,6 +34,8 @@ class Graph:
     accuracy : float
     progress : bool
         Whether the plant shows a progress bar on the terminal.
+    errors : int, optional
+        Where the processes' messages go, as in `subprocess.Popen`; default: the terminal.
 
     Raises
     ------
@@ -45,6 +47,7 @@ class Graph:
     directory: Path
     accuracy: float
     progress: bool = False
+    errors: int | None = None
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     @property
@@ -78,7 +81,9 @@ class Graph:
         for name, parameters in settings.items():
             words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
             command = [sys.executable, "-m", "grasp_ros.nodes.start", name, "--ros-args", *words]
-            self.processes[name] = subprocess.Popen(command, env=environment, start_new_session=True)
+            self.processes[name] = subprocess.Popen(
+                command, env=environment, start_new_session=True, stderr=self.errors
+            )
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def wait(self, received: Sequence[int]) -> None:

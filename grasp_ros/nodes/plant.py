@@ -7,6 +7,7 @@ not depend on the load of the machine.
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -56,6 +57,7 @@ class Plant(GraspNode):
         self._recorded = -1  # last tick that the monitor has complete
         self._commands: list[float | None] = [None, None]
         self._applied = (0.0, 0.0)
+        self._begin = math.nan
         self.counters.update(tick=0, **{"stale commands": 0, "repeated commands": 0, "refused commands": 0})
         self._bar = tqdm(total=self._scene.ticks, unit="tick", desc=self._scene.name, disable=not progress)
         self._states = self.publisher(JOINT_STATES)
@@ -83,6 +85,7 @@ class Plant(GraspNode):
 
     def _start(self) -> None:
         self.state = "running"
+        self._begin = time.monotonic()
         self._publish()
 
     def _publish(self) -> None:
@@ -116,8 +119,7 @@ class Plant(GraspNode):
         if left is None or right is None or (self._monitored and self._tick - self._recorded > lead):
             return
         if last:
-            self.state = "finished"
-            self.finished = True
+            self._finish()
             return
         self._integrator.hold(left, right)
         self._integrator.advance(self._scene.period_ns / scenes.NANOSECONDS, start=self._scene.time_of(self._tick))
@@ -129,6 +131,12 @@ class Plant(GraspNode):
         self._tick += 1
         self.counters["tick"] = self._tick
         self._publish()
+
+    def _finish(self) -> None:
+        self.state = "finished"
+        self.finished = True
+        speed = self._scene.ticks / (time.monotonic() - self._begin)
+        self.get_logger().info(f"finished {self._scene.ticks} ticks at {speed:.1f} ticks/s")
 
     def _fail(self) -> None:
         self.state = self._integrator.status.value

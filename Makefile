@@ -1,0 +1,37 @@
+# Two commands: `make demo` sets everything up and runs the main job, `make test` sets everything up and tests.
+# PYTHON must be 3.11 or 3.12.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+export ROS_DOMAIN_ID ?= 42
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+
+.PHONY: demo test lint install study clean
+
+demo: install
+	$(BIN)/grasp run case_01
+
+test: lint
+	$(BIN)/pytest
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+install: $(VENV)/ready
+	$(BIN)/pip install --quiet --no-deps --no-build-isolation --force-reinstall .
+
+# The peers of the benchmarks are large and only wanted here.
+study: install
+	$(BIN)/pip install --quiet -c constraints.txt scipy heyoka
+	$(BIN)/grasp study speed case_01
+	$(BIN)/grasp study graph case_01
+
+$(VENV)/ready: setup.py constraints.txt
+	$(PYTHON) -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12) and 'Python 3.11 or 3.12 is needed')"
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet -c constraints.txt setuptools wheel ".[test]"
+	touch $@
+
+clean:
+	rm -rf build install log *.egg-info $(VENV)

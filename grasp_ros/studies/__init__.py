@@ -1,0 +1,1 @@
+"""Studies: measurements that a reader can repeat."""
