@@ -6,7 +6,6 @@ Every key carries its unit. Nothing is repaired: a file that is not exactly righ
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,8 +14,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import yaml
 
+from grasp_ros import strict_yaml
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 
 NANOSECONDS = 1_000_000_000
@@ -140,7 +139,7 @@ class Scene:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
         values = {section: dict(numbers) for section, numbers in self.values.items()}
         document = {"title": self.title, "readings": list(self.readings), **values}
-        return yaml.safe_dump(document, sort_keys=False, allow_unicode=True, width=120)
+        return strict_yaml.dump(document)
 
     def _arm(self, side: str) -> Arm:
         arm, gains = self.values[f"{side}_arm"], self.values[f"{side}_feedback"]
@@ -152,31 +151,6 @@ class Scene:
     def _contact(self, side: str) -> Contact:
         contact = self.values[f"{side}_contact"]
         return Contact(contact["hertz_N_per_m1_5"], contact["dissipation_s_per_m"])
-
-
-class _Loader(yaml.SafeLoader):
-    """YAML 1.2 numbers (1e4 is a number), and no key twice."""
-
-
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"),
-    list("-+0123456789."),
-)
-
-
-def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
-    loader.flatten_mapping(node)
-    result: dict[Any, Any] = {}
-    for key_node, value_node in node.value:
-        key = loader.construct_object(key_node, deep=True)
-        if key in result:
-            raise SceneError(f"{key}: the key stands twice; allowed: once")
-        result[key] = loader.construct_object(value_node, deep=True)
-    return result
-
-
-_Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
 
 
 def names() -> list[str]:
@@ -202,7 +176,11 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
     if path.suffix in (".yaml", ".yml"):
         if not path.is_file():
             raise SceneError(f"{reference}: no such file")
-        return parse(path.read_text(encoding="utf-8"), path.stem, str(path), settings)
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise SceneError(f"{reference}: {error}; allowed: UTF-8 text") from None
+        return parse(text, path.stem, str(path), settings)
     if reference not in names():
         known = ", ".join(names())
         raise SceneError(f"{reference}: no such scene; allowed: a path that ends in .yaml, or one of {known}")
@@ -218,8 +196,8 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
         If the text is not a scene that can be run as written.
     """
     try:
-        document = yaml.load(text, _Loader)
-    except (yaml.YAMLError, SceneError) as error:
+        document = strict_yaml.load(text)
+    except ValueError as error:
         raise SceneError(f"{source}: {' '.join(str(error).split())}") from None
     if not isinstance(document, dict):
         raise SceneError(f"{source}: not a mapping; allowed: the keys title, readings, {', '.join(PARAMETERS)}")
@@ -250,11 +228,12 @@ def _apply(document: dict[Any, Any], setting: str) -> None:
         known = (f"{name}.{parameter.key}" for name in PARAMETERS for parameter in PARAMETERS[name])
         raise SceneError(f"--set {setting}: no such key; allowed: {', '.join(known)}")
     try:
-        number = yaml.load(value, _Loader)
-    except yaml.YAMLError:
-        number = value
-    document.setdefault(section, {})
-    document[section][key] = number
+        number = strict_yaml.load(value)
+    except ValueError as error:
+        raise SceneError(f"--set {setting}: {error}; allowed: a number") from None
+    numbers = document.setdefault(section, {})
+    if isinstance(numbers, dict):  # anything else is refused with the file
+        numbers[key] = number
 
 
 def _check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str]) -> None:
@@ -278,7 +257,7 @@ def _section(source: str, section: str, found: Any) -> dict[str, float]:
 
 def _number(source: str, section: str, parameter: Parameter, value: Any) -> float:
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
-    if not is_number or not math.isfinite(value) or not parameter.accepts(value):
+    if not is_number or not parameter.accepts(value):  # NaN is in no range
         raise SceneError(f"{source}: {section}.{parameter.key}: {value!r} is not allowed; allowed: {parameter.allowed}")
     return float(value)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -81,7 +82,7 @@ def load(path: Path) -> Trajectory:
         If the file is not such a file.
     """
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
             events = tuple(
                 SwitchEvent(time, int(side), Event(int(kind)), u, u_rate)
@@ -91,7 +92,7 @@ def load(path: Path) -> Trajectory:
                 scene, bool(data["sampled"]), data["t"], data["state"], data["command"], events, data["work"],
                 Status[str(data["status"])],
             )
-    except (OSError, KeyError, ValueError) as error:
+    except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
         raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
 
 

@@ -5,6 +5,7 @@ Nothing here calls a kernel. Everything works in mpmath unless its name says oth
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
@@ -150,7 +151,7 @@ class Ledger(NamedTuple):
     energy: Array  # relative to V_c(0)
 
 
-def ledger(grasp: Grasp, state: Any, duration: float, nodes: int = 40, pieces: int = 4, **options: Any) -> Ledger:
+def ledger(grasp: Grasp, state: Any, duration: float, nodes: int = 40, pieces: int = 16, **options: Any) -> Ledger:
     """O3 along one trajectory with continuous feedback.
 
     Between events the integrands are analytic after t = middle - half cos(theta), because u^(3/2) becomes
@@ -158,12 +159,12 @@ def ledger(grasp: Grasp, state: Any, duration: float, nodes: int = 40, pieces: i
     """
     events = run(grasp, state, duration, **options).integrator.events
     edges = sorted({0.0, duration, *(event.time for event in events)})
-    edges = [a + (b - a) * j / pieces for a, b in zip(edges, edges[1:], strict=False) for j in range(pieces)]
+    edges = [a + (b - a) * j / pieces for a, b in itertools.pairwise(edges) for j in range(pieces)]
     edges.append(duration)
     x, weight = np.polynomial.legendre.leggauss(nodes)
     theta = 0.5 * np.pi * (x + 1.0)
     times, weights = [], []
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in itertools.pairwise(edges):
         times.append(np.concatenate([[a], 0.5 * (a + b) - 0.5 * (b - a) * np.cos(theta)]))
         weights.append(0.25 * np.pi * (b - a) * np.sin(theta) * weight)
     grid = np.append(np.concatenate(times), duration)
@@ -189,7 +190,9 @@ def ledger(grasp: Grasp, state: Any, duration: float, nodes: int = 40, pieces: i
         u_l, d_l, u_r, d_r = penetration(y)
         for contact, u, d in ((grasp.left_contact, u_l, d_l), (grasp.right_contact, u_r, d_r)):
             force = contact.hertz * np.maximum(u, 0.0) ** 1.5
-            total = total + np.where(1.0 + contact.dissipation * d >= 0.0, contact.dissipation * force * d * d, -force * d)
+            total = total + np.where(
+                1.0 + contact.dissipation * d >= 0.0, contact.dissipation * force * d * d, -force * d
+            )
         return total
 
     P = momentum(at_edges) + integral(K[0] * inside[..., 0] + K[1] * inside[..., 4])

@@ -10,6 +10,7 @@ import pytest
 from mpmath import mp, mpf
 
 from grasp_ros.physics.layout import DISSIPATION, HERTZ, LEFT, RIGHT, U_L, U_R, V_L, V_O, V_R, X_O, Work
+from grasp_ros.physics.polynomial import evaluate, evaluate_rate, first_rise, invert_time
 from grasp_ros.physics.series import (
     E_L,
     E_R,
@@ -18,18 +19,14 @@ from grasp_ros.physics.series import (
     W_R,
     G,
     Tables,
-    evaluate,
-    evaluate_rate,
     expand_both,
     expand_one,
-    first_rise,
-    impact_scales,
-    invert_time,
     new_tables,
     series_order,
     state_at,
     step_size,
 )
+from grasp_ros.physics.switching import impact_scales
 
 BODIES = np.array([[1.0, 15.0, 0.7, 0.4], [2.0, 12.0, 1.1, -0.3], [5.0, 0.0, 0.0, 0.0]])
 PAIRS = np.array([[1e2, 0.3], [3e2, 0.7]])
@@ -57,9 +54,9 @@ def expand(name: str, n: int, pairs: Any = PAIRS, bodies: Any = BODIES) -> Table
     if right:
         tables.c[W_R, 0] = math.sqrt(START[name][5])
     if left and right:
-        expand_both(tables.c, tables.f, bodies, pairs, n)
+        expand_both(tables.c, tables.f, bodies, pairs, 1.0, n)
     else:
-        expand_one(tables.c, tables.f, bodies, pairs, LEFT if left else RIGHT, n)
+        expand_one(tables.c, tables.f, bodies, pairs, LEFT if left else RIGHT, 1.0, n)
     return tables
 
 
@@ -170,12 +167,12 @@ def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
     single = new_tables(n)
     single.c[list(ROWS), 0] = START["both"]
     single.c[W_L if other == "left" else W_R, 0] = both[W_L if other == "left" else W_R, 0]
-    expand_one(single.c, single.f, BODIES, PAIRS, LEFT if other == "left" else RIGHT, n)
+    expand_one(single.c, single.f, BODIES, PAIRS, LEFT if other == "left" else RIGHT, 1.0, n)
     one = single.c
     end = np.zeros((2, 8))
-    s = invert_time(both, both[G], n, tau, 0.0, 1.0)
+    s = invert_time(both[TIME], n, tau, 0.0, 1.0)
     state_at(both, n, s, True, True, end[0])
-    s = invert_time(one, one[W_L if other == "left" else W_R], n, tau, 0.0, 0.15)
+    s = invert_time(one[TIME], n, tau, 0.0, 0.15)
     state_at(one, n, s, other == "left", other == "right", end[1])
     assert end[0] == pytest.approx(end[1], rel=1e-12, abs=1e-14)
     assert abs(end[0, 1] - START["both"][1]) > 1e-3
@@ -193,7 +190,7 @@ def test_order_by_slope(name: str, n: int) -> None:
     ]
     slope = math.log(errors[0] / max(errors[1], 1e-17), 4.0)
     # coefficients have gaps at a touch: the next one present may be up to five orders later
-    assert n + 0.5 < slope < n + 6.5
+    assert n + 0.2 < slope < n + 6.5
 
 
 @pytest.mark.parametrize("name", START)
@@ -201,18 +198,18 @@ def test_step_size_keeps_its_promise(name: str) -> None:
     left, right = sides(name)
     y = START[name]
     d_l, d_r = y[1] - y[2], y[2] - y[3]
-    none = (0.0, 0.0)
-    scale_l = impact_scales(PAIRS[0], BODIES[0, 0], BODIES[2, 0], y[4], d_l) if left else none
-    scale_r = impact_scales(PAIRS[1], BODIES[1, 0], BODIES[2, 0], y[5], d_r) if right else none
+    none = (1.0, 0.0)
+    scale_l = impact_scales(PAIRS[0, 0], 5.0 / 6.0, y[4], d_l, 0.0) if left else none
+    scale_r = impact_scales(PAIRS[1, 0], 10.0 / 7.0, y[5], d_r, 0.0) if right else none
+    speed = max(scale_l[1], scale_r[1])
     best = expand(name, 60).c
     for tolerance in (1e-4, 1e-8, 1e-12):
         n = series_order(tolerance)
         c = expand(name, n).c
-        h = step_size(c, left, right, scale_l, scale_r, n, tolerance)
-        squared = step_size(c, left, right, scale_l, scale_r, n, tolerance**2)
+        h = step_size(c, left, right, scale_l[0], scale_r[0], speed, n, tolerance)
+        squared = step_size(c, left, right, scale_l[0], scale_r[0], speed, n, tolerance**2)
         assert squared / h == pytest.approx(tolerance ** (1.0 / (n + 1)), rel=1e-12)
         assert evaluate(best[TIME], 60, h) > 0.0
-        speed = max(scale_l[1], scale_r[1])
         error = max(abs(evaluate(c[row], n, h) - evaluate(best[row], 60, h)) for row in (V_L, V_O, V_R)) / speed
         assert error <= 30.0 * tolerance
         beyond = max(abs(evaluate(c[row], n, 3 * h) - evaluate(best[row], 60, 3 * h)) for row in (V_L, V_O, V_R))
@@ -228,15 +225,20 @@ def test_order_grows_with_the_accuracy() -> None:
 
 def test_scales_are_those_of_a_hertz_impact() -> None:
     depth, speed = (5 * 0.75 * 2.0**2 / (4 * 100.0)) ** 0.4, 2.0  # O1
-    assert impact_scales(np.array([100.0, 0.0]), 1.0, 3.0, 0.0, 2.0) == pytest.approx((math.sqrt(depth), speed))
-    assert impact_scales(np.array([100.0, 0.0]), 1.0, 3.0, depth, 0.0) == pytest.approx((math.sqrt(depth), speed))
+    for state in ((0.0, speed), (depth, 0.0)):
+        w, v = impact_scales(100.0, 0.75, *state, 0.0)
+        assert math.sqrt(depth) <= w <= 2.0 * math.sqrt(depth)
+        assert speed <= v <= 2.0 * speed
+        assert math.frexp(w)[0] == math.frexp(v)[0] == 0.5  # powers of two: scaling a scene costs no rounding
+    pressed = (0.75 * 8.0 / 100.0) ** (2.0 / 3.0)  # m a = H u^(3/2)
+    assert 0.5 < impact_scales(100.0, 0.75, 0.0, 0.0, 8.0)[0] ** 2 / pressed < 8.0
 
 
 def rise(coefficients: Any, h: float) -> float:
     """The kernel's answer for coefficients in ascending order."""
     work = np.zeros(len(Work), dtype=np.int64)
     f = np.array(coefficients, dtype=float)
-    result = first_rise(f, len(f) - 1, h, work)
+    result = first_rise(f, 1.0, 0.0, len(f) - 1, h, work)
     assert work[Work.ROOT_ITERATIONS] < 5000
     return result
 
@@ -282,8 +284,10 @@ def test_first_rise_of_random_products(seed: int) -> None:
     with mp.workdps(40):
         product = [mpf(1)]
         for a in roots:
-            product = [(product[k - 1] if k else 0) - a * (product[k] if k < len(product) else 0)
-                       for k in range(len(product) + 1)]
+            product = [
+                (product[k - 1] if k else 0) - a * (product[k] if k < len(product) else 0)
+                for k in range(len(product) + 1)
+            ]
         sign = -1 if product[0] > 0 else 1
         coefficients = [float(sign * value) for value in product]
     # negative at 0, so it rises at the first root and falls at the second
@@ -297,7 +301,7 @@ def test_time_is_inverted_to_rounding() -> None:
     c, n = expand("both", 30).c, 30
     for s in (0.0, 1e-9, 0.03, 0.2):
         tau = evaluate(c[TIME], n, s)
-        assert evaluate(c[TIME], n, invert_time(c, c[G], n, tau, 0.0, 0.3)) == pytest.approx(tau, rel=4e-16, abs=1e-17)
+        assert evaluate(c[TIME], n, invert_time(c[TIME], n, tau, 0.0, 0.3)) == pytest.approx(tau, rel=4e-16, abs=1e-17)
 
 
 def test_depth_is_never_negative() -> None:
@@ -310,8 +314,7 @@ def test_depth_is_never_negative() -> None:
     assert y[U_L] >= 0.0
 
 
-# DEFECT: the regularised time s of a weak impact is so long that the coefficients c_k of order n underflow (they are of
-# the order of w_max (w_max^2 / T)^k for two pairs): the estimated radius becomes infinite or garbage.
+# In s itself the coefficients of a weak impact leave the range of numbers.
 @pytest.mark.parametrize("speed", [1.0, 1e-6, 1e-9, 1e-12, 1e-15, 1e-20])
 @pytest.mark.parametrize("name", ["left at its touch", "both"])
 def test_the_step_of_an_impact_scales_with_its_speed(name: str, speed: float) -> None:
@@ -324,13 +327,13 @@ def test_the_step_of_an_impact_scales_with_its_speed(name: str, speed: float) ->
     c = tables.c
     c[list(ROWS), 0] = (0.0, speed, 0.0, -speed, u, u if name == "both" else -1.0)
     c[W_L, 0] = math.sqrt(u)
-    scale = impact_scales(pairs[0], 1.0, 1.0, u, speed)
+    w, v = impact_scales(1e4, 0.5, u, speed, 0.0)
     if name == "both":
         c[W_R, 0] = math.sqrt(u)
-        expand_both(c, tables.f, bodies, pairs, n)
-        h = step_size(c, True, True, scale, scale, n, 1e-14)
+        expand_both(c, tables.f, bodies, pairs, 1.0 / v, n)
+        h = step_size(c, True, True, w, w, v, n, 1e-14)
     else:
-        expand_one(c, tables.f, bodies, pairs, LEFT, n)
-        h = step_size(c, True, False, scale, (0.0, 0.0), n, 1e-14)
+        expand_one(c, tables.f, bodies, pairs, LEFT, w / v, n)
+        h = step_size(c, True, False, w, 1.0, v, n, 1e-14)
     duration = 2.9432751843247047 * depth / speed
     assert 0.01 * duration < evaluate(c[TIME], n, h) < duration

@@ -10,6 +10,7 @@ import time
 from functools import partial
 from typing import Any
 
+import numpy as np
 import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -66,7 +67,7 @@ class Bare(Node):
         clock.publish(messages.clock(self._now_ns))
         left.publish(messages.wrench(self._now_ns, 0.0))
         right.publish(messages.wrench(self._now_ns, 0.0))
-        states.publish(messages.joint_state(self._now_ns, [0.0] * 6, (0.0, 0.0)))
+        states.publish(messages.joint_state(self._now_ns, np.zeros(6), (0.0, 0.0)))
 
     def _on_command(self, name: str, _: Any) -> None:
         self._heard.add(name)

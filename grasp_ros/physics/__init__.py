@@ -21,6 +21,6 @@ V_c             V_c                    J          V with the Hertz term of every
 w, s, G         w, s, g                           regularised variables of a contact, see `series`
 ==============  =====================  =========  ==========================================================
 
-`model` states the equations; `flight`, `series` and `hybrid` are the compiled kernels on the arrays of `layout`;
-`integrator` is what the rest of the package uses.
+`model` states the equations. `flight`, `series`, `polynomial`, `switching` and `hybrid` are the compiled kernels on
+the arrays of `layout`; `integrator` is what the rest of the package uses.
 """

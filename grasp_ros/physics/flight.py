@@ -38,9 +38,9 @@ def launch(body: Any, x: float, v: float) -> Any:
     rate = math.sqrt(abs(discriminant))
     if omega0_2 == 0.0 and sigma == 0.0:
         return (DRIFT, x, v, 0.0, 0.0, push, 0.0, 0.0, 0.0)
-    if discriminant <= 0.0 and rate > 0.5 * sigma:
+    x_e = body[FORCE] / k if k > 0.0 else math.inf
+    if discriminant <= 0.0 and rate > 0.5 * sigma and abs(x_e) > abs(x):
         return (OVER, x, v, 0.0, 0.0, push, sigma, rate, omega0_2)
-    x_e = body[FORCE] / k
     return (UNDER if discriminant > 0.0 else NEAR, x, v, x - x_e, x_e, push, sigma, rate, omega0_2)
 
 
@@ -48,9 +48,10 @@ def launch(body: Any, x: float, v: float) -> Any:
 def fly(flight: Any, t: float) -> Any:
     """Position and velocity after the time t >= 0 of flight.
 
-    Short flights use the power series of the equation: a weak spring under a force has a rest position too far
-    away to be subtracted from. `NEAR` (critical or slightly over-damped) and `OVER` use expm1, so that neither
-    the limit of equal roots nor that of a vanishing spring loses digits.
+    `UNDER` and `NEAR` (critical or over-damped) describe the swing around the rest position, which decays without
+    loss of digits. `OVER` is for an over-damped body whose rest position is too far away to be subtracted from,
+    or does not exist; for the same reason short flights use the power series of the equation. expm1 keeps the
+    digits in the limits of equal roots and of a vanishing spring.
     """
     regime, x, v, swing, x_e, push, sigma, rate, omega0_2 = flight
     if regime == DRIFT:
@@ -182,7 +183,7 @@ def flight_root(kind: int, arm: Any, body: Any, arm_flight: Any, object_flight: 
             noise = EPS * (abs(x) + abs(x_o))
         if g >= -noise and g_rate > 0.0:
             return t
-        step = safe_step(min(g, 0.0), g_rate, curvature)
+        step = safe_step(min(g, -noise), g_rate, curvature)
         if kind == TOUCH_ROOT:
             step = max(step, envelope_step(arm, body, x, v, x_o, v_o, sign))
         if not step <= left:

@@ -25,8 +25,8 @@ class Pair(IntEnum):
     OPEN = 0  # u <= 0, no force
     CONTACT = 1  # condition (10) holds
     CLAMPED = 2  # u > 0 and u' < -1/p: no force, may re-enter
-    LEAVING = 3  # u > 0, separating, the rest of its impulse is below rounding
-    HELD = 4  # u = 0 with no direction yet, the first of its impulse is below rounding
+    LEAVING = 3  # u > 0, separating, the rest of its impulse is below the tolerance
+    HELD = 4  # u = 0 with no direction yet, the first of its impulse is below the tolerance
 
 
 class Event(IntEnum):

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.flight import EPS, MAX_ITERATIONS, safe_step
 from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -38,10 +37,11 @@ from grasp_ros.physics.layout import (
     V_R,
     X_O,
 )
+from grasp_ros.physics.polynomial import evaluate
 
 # Rows of the coefficient table. x_o, v_l, ..., u_r stand in their places of the state y (x_l and x_r follow from
-# them); then time, w, G, u', 1 + p u', and an event function.
-TIME, W_L, W_R, G, D_L, D_R, E_L, E_R, EVENT, ROWS = range(8, 18)
+# them); then time, w, G, u' and 1 + p u'.
+TIME, W_L, W_R, G, D_L, D_R, E_L, E_R, ROWS = range(8, 17)
 LANES = 16  # products of series in one step, see `convolve`
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
@@ -81,212 +81,151 @@ def convolve(f: Any, k: int, lane: int) -> Any:
 
 
 @kernel
-def evaluate(a: Any, n: int, s: float) -> float:
-    """Polynomial of degree n at s (Horner)."""
-    total = a[n]
-    for k in range(n - 1, -1, -1):
-        total = total * s + a[k]
-    return total
-
-
-@kernel
-def evaluate_rate(a: Any, n: int, s: float) -> float:
-    """Derivative of a polynomial of degree n at s."""
-    total = n * a[n]
-    for k in range(n - 1, 0, -1):
-        total = total * s + k * a[k]
-    return total
-
-
-@kernel
-def linear_part(c: Any, bodies: Any, k: int) -> Any:
-    """Coefficient k of v_o, u_l', u_r' and of the arms' forces without contact, (1), (2)."""
-    x_o, v_l, v_o, v_r = c[X_O, k], c[V_L, k], c[V_O, k], c[V_R, k]
-    a_l = -bodies[LEFT, STIFFNESS] * (x_o + c[U_L, k]) - bodies[LEFT, DAMPING] * v_l
-    a_r = -bodies[RIGHT, STIFFNESS] * (x_o - c[U_R, k]) - bodies[RIGHT, DAMPING] * v_r
+def linear_part(c: Any, bodies: Any, k: int, x: Any) -> Any:
+    """Coefficient k of v_o, u_l', u_r' and of the arms' forces without contact, (1), (2), from that of the state x."""
+    x_o, u_l, u_r, v_l, v_o, v_r = x
+    a_l = -bodies[LEFT, STIFFNESS] * (x_o + u_l) - bodies[LEFT, DAMPING] * v_l
+    a_r = -bodies[RIGHT, STIFFNESS] * (x_o - u_r) - bodies[RIGHT, DAMPING] * v_r
     if k == 0:
         a_l += bodies[LEFT, FORCE]
         a_r += bodies[RIGHT, FORCE]
-    d_l = v_l - v_o
-    d_r = v_o - v_r
-    c[D_L, k] = d_l
-    c[D_R, k] = d_r
-    return v_o, d_l, d_r, a_l, a_r
+    c[D_L, k] = v_l - v_o
+    c[D_R, k] = v_o - v_r
+    return v_o, v_l - v_o, v_o - v_r, a_l, a_r
 
 
 @kernel
-def integrate_coefficients(c: Any, inverse_mass: Any, k: int, g: float, gv_o: float, gd_l: float, gd_r: float,
-                           ga_l: float, ga_r: float, gf_l: float, gf_r: float) -> None:
-    """Coefficients k + 1 of time, positions and velocities from coefficient k of their rates, (1) to (3)."""
-    step = 2.0 / (k + 1)
+def next_coefficients(c: Any, inverse_mass: Any, step: float, k: int, g: float, weighted: Any, gf_l: float,
+                      gf_r: float) -> Any:
+    """Coefficients k + 1 of time and of the state from coefficient k of their rates, (1) to (3).
+
+    Returned as well as stored: reading them back would wait for the stores.
+    """
+    gv_o, gd_l, gd_r, ga_l, ga_r = weighted
+    x = (
+        step * gv_o,
+        step * gd_l,
+        step * gd_r,
+        step * inverse_mass[LEFT] * (ga_l - gf_l),
+        step * inverse_mass[OBJECT] * (gf_l - gf_r),
+        step * inverse_mass[RIGHT] * (ga_r + gf_r),
+    )
     c[TIME, k + 1] = step * g
-    c[X_O, k + 1] = step * gv_o
-    c[U_L, k + 1] = step * gd_l
-    c[U_R, k + 1] = step * gd_r
-    c[V_L, k + 1] = step * inverse_mass[LEFT] * (ga_l - gf_l)
-    c[V_O, k + 1] = step * inverse_mass[OBJECT] * (gf_l - gf_r)
-    c[V_R, k + 1] = step * inverse_mass[RIGHT] * (ga_r + gf_r)
+    c[X_O, k + 1], c[U_L, k + 1], c[U_R, k + 1], c[V_L, k + 1], c[V_O, k + 1], c[V_R, k + 1] = x
+    return x
 
 
 @kernel
-def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, n: int) -> None:
+def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, n: int) -> None:
     """Fill the Taylor table c (ROWS, n + 1) from its column 0, with one side in contact: G = w.
 
-    w fw = H u^2 (1 + p u'), (6), is the product of u and u (1 + p u'). Each product is the sum of `convolve` and
-    of its two outer terms.
+    The series are in s / unit.
+
+    w fw = H u^2 (1 + p u'), (6), is the product of H u and u (1 + p u'). Each product is the sum of `convolve` and
+    of its two outer terms; what does not need the newest coefficient is added first, because each order waits for
+    the one before.
     """
     hertz, loss = pairs[side, HERTZ], pairs[side, DISSIPATION]
     inverse_mass = (1.0 / bodies[LEFT, MASS], 1.0 / bodies[RIGHT, MASS], 1.0 / bodies[OBJECT, MASS])
-    a0, b0 = f[0, 0], f[0, 1]
-    b0[:] = 0.0
+    x = (c[X_O, 0], c[U_L, 0], c[U_R, 0], c[V_L, 0], c[V_O, 0], c[V_R, 0])
+    w = c[W_L + side, 0]
+    w0 = e0 = q0 = 0.0
+    a0 = f[0, 0]
     for k in range(np.uint64(n)):
-        v_o, d_l, d_r, a_l, a_r = linear_part(c, bodies, k)
+        v_o, d_l, d_r, a_l, a_r = linear_part(c, bodies, k, x)
+        u = x[1] if side == LEFT else x[2]
         d = d_l if side == LEFT else d_r
-        u, w = c[U_L + side, k], c[W_L + side, k]
         e = loss * d + (1.0 if k == 0 else 0.0)
         gv_o, gd_l, gd_r, ga_l, ga_r, ue, uq, _ = convolve(f, k, 0)
         a, b = f[k, 0], f[k, 1]
-        if k == 0:
-            a0[0], a0[1], a0[2], a0[3], a0[4], a0[5], a0[6] = v_o, d_l, d_r, a_l, a_r, u, u
-        w0 = b0[0]
-        q = ue + a0[5] * e + u * b0[5]
-        z = hertz * (uq + a0[6] * q + u * b0[6])
-        gv_o += a0[0] * w + v_o * w0
-        gd_l += a0[1] * w + d_l * w0
-        gd_r += a0[2] * w + d_r * w0
-        ga_l += a0[3] * w + a_l * w0
-        ga_r += a0[4] * w + a_r * w0
-        a[0], a[1], a[2], a[3], a[4], a[5], a[6] = v_o, d_l, d_r, a_l, a_r, u, u
+        a[0], a[1], a[2], a[3], a[4], a[5], a[6] = v_o, d_l, d_r, a_l, a_r, u, hertz * u
+        q = (ue + u * e0) + a0[5] * e
+        z = (uq + hertz * u * q0) + a0[6] * q
         b[0], b[1], b[2], b[3], b[4], b[5], b[6] = w, w, w, w, w, e, q
+        weighted = (
+            gv_o + a0[0] * w + v_o * w0,
+            gd_l + a0[1] * w + d_l * w0,
+            gd_r + a0[2] * w + d_r * w0,
+            ga_l + a0[3] * w + a_l * w0,
+            ga_r + a0[4] * w + a_r * w0,
+        )
+        if k == 0:
+            w0, e0, q0 = w, e, q
         c[E_L + side, k] = e
-        c[W_L + side, k + 1] = d / (k + 1)
-        integrate_coefficients(c, inverse_mass, k, w, gv_o, gd_l, gd_r, ga_l, ga_r, z if side == LEFT else 0.0,
-                               0.0 if side == LEFT else z)
+        step = unit / (k + 1)
+        x = next_coefficients(c, inverse_mass, 2.0 * step, k, w, weighted, z if side == LEFT else 0.0,
+                              0.0 if side == LEFT else z)
+        w = step * d
+        c[W_L + side, k + 1] = w
 
 
 @kernel
-def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, n: int) -> None:
-    """Fill the Taylor table c (ROWS, n + 1) from its column 0, with both sides in contact: G = w_l w_r."""
+def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) -> None:
+    """Fill the Taylor table c (ROWS, n + 1) from its column 0, with both sides in contact: G = w_l w_r.
+
+    The series are in s / unit. w_l w_r is summed in both orders, so that a mirrored grasp has mirrored roundings.
+    """
+    hertz_l, loss_l = pairs[LEFT, HERTZ], pairs[LEFT, DISSIPATION]
+    hertz_r, loss_r = pairs[RIGHT, HERTZ], pairs[RIGHT, DISSIPATION]
     inverse_mass = (1.0 / bodies[LEFT, MASS], 1.0 / bodies[RIGHT, MASS], 1.0 / bodies[OBJECT, MASS])
+    x = (c[X_O, 0], c[U_L, 0], c[U_R, 0], c[V_L, 0], c[V_O, 0], c[V_R, 0])
+    w_l, w_r = c[W_L, 0], c[W_R, 0]
     a0, b0 = f[0, 0], f[0, 1]
     b0[:] = 0.0
     for k in range(np.uint64(n)):
-        v_o, d_l, d_r, a_l, a_r = linear_part(c, bodies, k)
-        u_l, u_r, w_l, w_r = c[U_L, k], c[U_R, k], c[W_L, k], c[W_R, k]
-        unit = 1.0 if k == 0 else 0.0
-        e_l = pairs[LEFT, DISSIPATION] * d_l + unit
-        e_r = pairs[RIGHT, DISSIPATION] * d_r + unit
+        v_o, d_l, d_r, a_l, a_r = linear_part(c, bodies, k, x)
+        u_l, u_r = x[1], x[2]
+        one = 1.0 if k == 0 else 0.0
+        e_l = loss_l * d_l + one
+        e_r = loss_r * d_r + one
         gv_o, gd_l, gd_r, ga_l, ga_r, ue_l, uq_l, _ = convolve(f, k, 0)
-        ue_r, uq_r, g, wd_r, wd_l, wz_l, wz_r, _ = convolve(f, k, 8)
+        ue_r, uq_r, ww, wd_r, wd_l, wz_l, wz_r, ww_mirrored = convolve(f, k, 8)
         a, b = f[k, 0], f[k, 1]
-        if k == 0:
-            a0[0], a0[1], a0[2], a0[3], a0[4], a0[5], a0[6] = v_o, d_l, d_r, a_l, a_r, u_l, u_l
-            a0[8], a0[9], a0[10], a0[11], a0[12], a0[13], a0[14] = u_r, u_r, w_l, w_l, w_r, w_r, w_l
-        g += a0[10] * w_r + w_l * b0[10]
-        g0 = b0[0] if k > 0 else 0.0
-        q_l = ue_l + a0[5] * e_l + u_l * b0[5]
-        q_r = ue_r + a0[8] * e_r + u_r * b0[8]
-        z_l = pairs[LEFT, HERTZ] * (uq_l + a0[6] * q_l + u_l * b0[6])
-        z_r = pairs[RIGHT, HERTZ] * (uq_r + a0[9] * q_r + u_r * b0[9])
-        gv_o += a0[0] * g + v_o * g0
-        gd_l += a0[1] * g + d_l * g0
-        gd_r += a0[2] * g + d_r * g0
-        ga_l += a0[3] * g + a_l * g0
-        ga_r += a0[4] * g + a_r * g0
-        wd_r += a0[11] * d_r + w_l * b0[11]
-        wd_l += a0[12] * d_l + w_r * b0[12]
-        wz_l += a0[13] * z_l + w_r * b0[13]
-        wz_r += a0[14] * z_r + w_l * b0[14]
-        a[0], a[1], a[2], a[3], a[4], a[5], a[6] = v_o, d_l, d_r, a_l, a_r, u_l, u_l
-        a[8], a[9], a[10], a[11], a[12], a[13], a[14] = u_r, u_r, w_l, w_l, w_r, w_r, w_l
+        a[0], a[1], a[2], a[3], a[4], a[5], a[6] = v_o, d_l, d_r, a_l, a_r, u_l, hertz_l * u_l
+        a[8], a[9], a[10], a[11], a[12], a[13], a[14] = u_r, hertz_r * u_r, w_l, w_l, w_r, w_r, w_l
+        a[15] = w_r
+        g0 = b0[0]
+        g = 0.5 * ((ww + (w_l * b0[10] + a0[10] * w_r)) + (ww_mirrored + (w_r * b0[15] + a0[15] * w_l)))
+        q_l = (ue_l + u_l * b0[5]) + a0[5] * e_l
+        q_r = (ue_r + u_r * b0[8]) + a0[8] * e_r
+        z_l = (uq_l + hertz_l * u_l * b0[6]) + a0[6] * q_l
+        z_r = (uq_r + hertz_r * u_r * b0[9]) + a0[9] * q_r
+        force_l = (wz_l + w_r * b0[13]) + a0[13] * z_l
+        force_r = (wz_r + w_l * b0[14]) + a0[14] * z_r
+        weighted = (
+            gv_o + a0[0] * g + v_o * g0,
+            gd_l + a0[1] * g + d_l * g0,
+            gd_r + a0[2] * g + d_r * g0,
+            ga_l + a0[3] * g + a_l * g0,
+            ga_r + a0[4] * g + a_r * g0,
+        )
+        step = unit / (k + 1)
+        w_l = step * ((wd_l + w_r * b0[12]) + a0[12] * d_l)
+        w_r = step * ((wd_r + a[11] * b0[11]) + a0[11] * d_r)
         b[0], b[1], b[2], b[3], b[4], b[5], b[6] = g, g, g, g, g, e_l, q_l
-        b[8], b[9], b[10], b[11], b[12], b[13], b[14] = e_r, q_r, w_r, d_r, d_l, z_l, z_r
+        b[8], b[9], b[10], b[11], b[12], b[13], b[14] = e_r, q_r, a[12], d_r, d_l, z_l, z_r
+        b[15] = a[10]
         c[G, k], c[E_L, k], c[E_R, k] = g, e_l, e_r
-        c[W_L, k + 1] = wd_l / (k + 1)
-        c[W_R, k + 1] = wd_r / (k + 1)
-        integrate_coefficients(c, inverse_mass, k, g, gv_o, gd_l, gd_r, ga_l, ga_r, wz_l, wz_r)
+        c[W_L, k + 1], c[W_R, k + 1] = w_l, w_r
+        x = next_coefficients(c, inverse_mass, 2.0 * step, k, g, weighted, force_l, force_r)
 
 
 @kernel
-def impact_scales(contact: Any, m_a: float, m_o: float, u: float, d: float) -> Any:
-    """Scales of sqrt(u) and u' of an impact that has the pair's present energy (O1 read backwards)."""
-    mu = m_a * m_o / (m_a + m_o)
-    energy = 0.5 * mu * d * d + 0.4 * contact[HERTZ] * u * u * math.sqrt(u)
-    return (2.5 * energy / contact[HERTZ]) ** 0.2, math.sqrt(2.0 * energy / mu)
+def step_size(c: Any, left: bool, right: bool, w_l: float, w_r: float, v: float, n: int, tolerance: float) -> float:
+    """Step in s / unit at which the first neglected term is `tolerance` times the scales of the impact.
 
-
-@kernel
-def step_size(c: Any, left: bool, right: bool, scale_l: Any, scale_r: Any, n: int, tolerance: float) -> float:
-    """Step at which the first neglected term is `tolerance` times the scales of the impact; inf for a state at rest.
-
-    The radius of convergence is estimated from the last TAIL coefficients of w and of the velocities.
+    The radius of convergence is estimated from the last TAIL coefficients of w and of the velocities. A state at
+    rest gives inf.
     """
-    per_w_l = 1.0 / scale_l[0] if left else 0.0
-    per_w_r = 1.0 / scale_r[0] if right else 0.0
-    per_v = 1.0 / max(scale_l[1], scale_r[1])
     inverse_radius = 0.0
     for k in range(n - TAIL + 1, n + 1):
-        size = per_v * max(abs(c[V_L, k]), abs(c[V_O, k]), abs(c[V_R, k]))
+        size = max(abs(c[V_L, k]), abs(c[V_O, k]), abs(c[V_R, k])) / v
         if left:
-            size = max(size, per_w_l * abs(c[W_L, k]))
+            size = max(size, abs(c[W_L, k]) / w_l)
         if right:
-            size = max(size, per_w_r * abs(c[W_R, k]))
+            size = max(size, abs(c[W_R, k]) / w_r)
         inverse_radius = max(inverse_radius, size ** (1.0 / k))
     return tolerance ** (1.0 / (n + 1)) / inverse_radius
-
-
-@kernel
-def first_rise(f: Any, n: int, h: float, work: Any) -> float:
-    """First s in (0, h] at which the polynomial f, with f(0) <= 0, rises through zero; inf if there is none.
-
-    The positive coefficients bound f from above and the second derivative is bounded by sums of |f_k|, so the
-    steps of `safe_step` cannot jump over a root.
-    """
-    upper = 0.0
-    size = 0.0
-    curvature = 0.0
-    for k in range(n, 0, -1):
-        upper = (upper + max(f[k], 0.0)) * h
-        size = (size + abs(f[k])) * h
-    if upper < -f[0]:
-        return math.inf
-    for k in range(n, 1, -1):
-        curvature = curvature * h + k * (k - 1) * abs(f[k])
-    noise = EPS * (abs(f[0]) + size)
-    s = 0.0
-    value = f[0]
-    rate = f[1]
-    for _ in range(MAX_ITERATIONS):
-        work[3] += 1
-        step = max(safe_step(min(value, 0.0), rate, curvature), 8.0 * EPS * h)
-        s += step
-        if not s <= h:
-            return math.inf if s > h else math.nan
-        value = evaluate(f, n, s)
-        rate = evaluate_rate(f, n, s)
-        if value >= -noise and rate > 0.0:
-            return s
-    return math.nan
-
-
-@kernel
-def invert_time(c: Any, g: Any, n: int, tau: float, low: float, high: float) -> float:
-    """The s in [low, high] with time tau; time is an increasing polynomial there, its rate is 2 G."""
-    s = high
-    for _ in range(200):
-        rest = evaluate(c[TIME], n, s) - tau
-        if rest > 0.0:
-            high = s
-        else:
-            low = s
-        rate = 2.0 * evaluate(g, n - 1, s)
-        following = s - rest / rate if rate > 0.0 else low
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        if abs(following - s) <= 2.0 * EPS * high:
-            return following
-        s = following
-    return s
 
 
 @kernel

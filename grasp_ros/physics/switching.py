@@ -1,0 +1,189 @@
+"""What a pair of arm and object does: its mode from its state, the scales of its impact, and its switches."""
+
+import math
+from typing import Any
+
+from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.layout import (
+    DAMPING,
+    DISSIPATION,
+    FORCE,
+    HERTZ,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    STIFFNESS,
+    U_L,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
+    Event,
+    Pair,
+)
+
+OPEN, CONTACT, CLAMPED, LEAVING, HELD = (int(p) for p in Pair)
+TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in Event)
+GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
+
+@kernel
+def relative_motion(bodies: Any, y: Any, side: int) -> Any:
+    """u' and the u'' that both bodies would have without impact forces."""
+    x, v = (y[X_L], y[V_L]) if side == LEFT else (y[X_R], y[V_R])
+    sign = 1.0 if side == LEFT else -1.0
+    arm, body = bodies[side], bodies[OBJECT]
+    a = (arm[FORCE] - arm[STIFFNESS] * x - arm[DAMPING] * v) / arm[MASS]
+    a_o = (body[FORCE] - body[STIFFNESS] * y[X_O] - body[DAMPING] * y[V_O]) / body[MASS]
+    return sign * (v - y[V_O]), sign * (a - a_o)
+
+
+@kernel
+def judge(bodies: Any, pairs: Any, y: Any, side: int, other_in_contact: bool) -> int:
+    """Mode of a pair from its state alone: condition (10), and at u = 0 the direction of the motion."""
+    u = y[U_L + side]
+    d, a = relative_motion(bodies, y, side)
+    if u < 0.0:
+        return OPEN
+    if u > 0.0:
+        return CONTACT if 1.0 + pairs[side, DISSIPATION] * d >= 0.0 else CLAMPED
+    if d == 0.0:
+        return HELD if a > 0.0 or (a == 0.0 and other_in_contact) else OPEN
+    return CONTACT if d > 0.0 else OPEN
+
+
+@kernel
+def classify(bodies: Any, pairs: Any, y: Any, mode: Any) -> None:
+    """Modes of both pairs for a run that starts at y."""
+    mode[LEFT] = judge(bodies, pairs, y, LEFT, False)
+    mode[RIGHT] = judge(bodies, pairs, y, RIGHT, mode[LEFT] == CONTACT)
+    if mode[LEFT] == OPEN and mode[RIGHT] == CONTACT:
+        mode[LEFT] = judge(bodies, pairs, y, LEFT, True)
+
+
+@kernel
+def power_of_two(x: float) -> float:
+    """The power of two above x >= 0: a scale that costs no rounding."""
+    return math.ldexp(1.0, math.frexp(x)[1]) if x > 0.0 else 0.0
+
+
+@kernel
+def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
+    """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
+
+    The energy is that of the present motion and penetration, and of the motion that an acceleration a > 0 from
+    outside will bring: it presses the pair to the depth (mu a / H)^(2/3).
+    """
+    energy = 0.5 * mu * d * d + 0.4 * hertz * u * u * math.sqrt(u)
+    if a > 0.0:
+        energy += mu * a * (mu * a / hertz) ** (2.0 / 3.0)
+    return power_of_two((2.5 * energy / hertz) ** 0.2), power_of_two(math.sqrt(2.0 * energy / mu))
+
+
+@kernel
+def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int) -> Any:
+    """Scales of w and u' of one pair's impact; the other pair's impact may push it."""
+    _, a = relative_motion(bodies, y, side)
+    if mode[1 - side] in (CONTACT, HELD):
+        w, v = own_scales(bodies, pairs, y, 1 - side, 0.0)
+        if w > 0.0:
+            a = max(a, 0.0) + v * v / (w * w)
+    return own_scales(bodies, pairs, y, side, a)
+
+
+@kernel
+def own_scales(bodies: Any, pairs: Any, y: Any, side: int, a: float) -> Any:
+    """`impact_scales` of one pair with the acceleration a from outside."""
+    m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
+    d, _ = relative_motion(bodies, y, side)
+    return impact_scales(pairs[side, HERTZ], m * m_o / (m + m_o), y[U_L + side], d, a)
+
+
+@kernel
+def fastest_rate(bodies: Any) -> float:
+    """Power of two above the rates, in 1/s, at which the arms move by themselves."""
+    rate = 0.0
+    for side in (LEFT, RIGHT):
+        arm = bodies[side]
+        rate = max(rate, arm[DAMPING] / arm[MASS], math.sqrt(arm[STIFFNESS] / arm[MASS]))
+    return power_of_two(rate)
+
+
+@kernel
+def sliver(tolerance: float) -> float:
+    """Part of an impact's depth whose impulse, of relative size sliver^2.5, is below the tolerance."""
+    return 0.3 * tolerance**0.4
+
+
+@kernel
+def hold_time(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: float) -> float:
+    """How long a pair that starts at u = 0 may stay without force: a sliver of its impact.
+
+    The impulse lost relative to the impact's is of order (time)^2.5 if the pair approaches, and (time)^4 if it
+    starts at rest and is pushed together.
+    """
+    d, _ = relative_motion(bodies, y, side)
+    w, v = scales(bodies, pairs, y, mode, side)
+    return (sliver(tolerance) if d > 0.0 else 0.3 * tolerance**0.25) * w * w / v
+
+
+@kernel
+def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: float) -> None:
+    """End the hold of a pair, unless it is still so shallow that its force is below rounding."""
+    w, _ = scales(bodies, pairs, y, mode, side)
+    d, _ = relative_motion(bodies, y, side)
+    if d <= 0.0 or y[U_L + side] > 1e-3 * sliver(tolerance) * w * w:
+        mode[side] = judge(bodies, pairs, y, side, mode[1 - side] == CONTACT)
+
+
+@kernel
+def settle(bodies: Any, pairs: Any, y: Any, mode: Any, tolerance: float) -> None:
+    """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time.
+
+    At a simultaneous touch both are held for a sliver; at a simultaneous release both leave a sliver early. A pair
+    that rests at u = 0 is held when the other one begins to push.
+    """
+    for side in (LEFT, RIGHT):
+        if mode[side] == OPEN and y[U_L + side] == 0.0 and mode[1 - side] == CONTACT:
+            mode[side] = judge(bodies, pairs, y, side, True)
+    if mode[LEFT] != CONTACT or mode[RIGHT] != CONTACT:
+        return
+    shallow = sliver(tolerance)
+    approaching = 0
+    leaving = 0
+    for side in (LEFT, RIGHT):
+        d, a = relative_motion(bodies, y, side)
+        w, _ = scales(bodies, pairs, y, mode, side)
+        u = y[U_L + side]
+        if d >= 0.0 and u < 0.3 * shallow * w * w:
+            approaching += 1
+        elif d < 0.0 and u < shallow * w * w and 20.0 * u * abs(a) < d * d:
+            leaving += 1
+    if approaching == 2:
+        mode[:] = HELD
+    elif leaving == 2:
+        mode[:] = LEAVING
+
+
+@kernel
+def fire(y: Any, mode: Any, side: int, kind: int, now: float, events: Any, filled: Any) -> None:
+    """Switch one pair and record the event.
+
+    A touch that rounding invents at the turning point of a grazing approach has u' <= 0 and is no event.
+    """
+    d = y[V_L] - y[V_O] if side == LEFT else y[V_O] - y[V_R]
+    if kind in (TOUCH, RELEASE):
+        y[U_L + side] = 0.0
+    if kind == TOUCH and d <= 0.0:
+        mode[side] = OPEN
+        return
+    n = filled[EVENTS]
+    filled[EVENTS] = n + 1
+    mode[side] = OPEN if kind == RELEASE else (CLAMPED if kind == CLAMP else CONTACT)
+    events[n, 0] = now
+    events[n, 1] = side
+    events[n, 2] = kind
+    events[n, 3] = y[U_L + side]
+    events[n, 4] = d
