@@ -25,7 +25,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     """What happened in a simulation."""
     level = energy(trajectory.scene.grasp, trajectory.state)
     touches = [len(trajectory.times(Event.TOUCH, side)) for side in (LEFT, RIGHT)]
-    clamps = sum(event.kind == Event.CLAMP for event in trajectory.events)
+    clamps = sum(len(trajectory.times(Event.CLAMP, side)) for side in (LEFT, RIGHT))
     rows = [
         ("scene", trajectory.scene.title),
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),

@@ -10,7 +10,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent
+from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array, energy, feedback
 from grasp_ros.scene import NANOSECONDS, Scene
@@ -31,10 +31,8 @@ class Trajectory:
     t : array (n,), s
     state : array (n, 6), m and m/s
         x_l, v_l, x_o, v_o, x_r, v_r.
-    command : array (n, 2), N
-        Input forces f_l, f_r computed from the state, (4), (5).
-    events : tuple of SwitchEvent
-        In the order of time.
+    switches : array (m, 5)
+        Time in s, side, kind, u in m and u' in m/s of every switch, in the order of time; see `events`.
     work : array of int
         Counters, see `layout.Work`.
     status : Status
@@ -44,14 +42,23 @@ class Trajectory:
     sampled: bool
     t: Array
     state: Array
-    command: Array
-    events: tuple[SwitchEvent, ...]
+    switches: Array
     work: np.ndarray
     status: Status
 
+    @property
+    def command(self) -> Array:
+        """Input forces f_l, f_r (n, 2) in N that the feedback answers to the states, (4), (5)."""
+        return np.stack(command(self.scene, self.state.T), axis=-1)
+
+    @property
+    def events(self) -> list[SwitchEvent]:
+        """The switches as records."""
+        return to_events(self.switches)
+
     def times(self, kind: Event, side: int) -> Array:
         """Times in s of one side's events of a kind."""
-        return np.array([event.time for event in self.events if event.kind == kind and event.side == side])
+        return self.switches[(self.switches[:, 1] == side) & (self.switches[:, 2] == kind), 0]
 
     def save(self, path: Path) -> None:
         """Write everything to a .npz file.
@@ -67,7 +74,7 @@ class Trajectory:
                 file, t=self.t, state=self.state, command=self.command, V=level.V, V_c=level.V_c, V_rate=level.V_rate,
                 mode=level.mode, touch_left=self.times(Event.TOUCH, LEFT), touch_right=self.times(Event.TOUCH, RIGHT),
                 release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
-                events=np.array(self.events, dtype=float).reshape(-1, 5), work=self.work,
+                events=self.switches, work=self.work,
                 work_names=np.array([entry.name.lower() for entry in Work]), status=self.status.name,
                 sampled=self.sampled, scene_name=self.scene.name, scene=self.scene.to_yaml(),
             )
@@ -84,12 +91,8 @@ def load(path: Path) -> Trajectory:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
-            events = tuple(
-                SwitchEvent(time, int(side), Event(int(kind)), u, u_rate)
-                for time, side, kind, u, u_rate in data["events"].tolist()
-            )
             return Trajectory(
-                scene, bool(data["sampled"]), data["t"], data["state"], data["command"], events, data["work"],
+                scene, bool(data["sampled"]), data["t"], data["state"], data["events"], data["work"],
                 Status[str(data["status"])],
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
@@ -143,8 +146,7 @@ def simulate(
     )
     grid = grid[: len(states)]
     return Trajectory(
-        scene, sampled, grid, states, commands(scene, states), tuple(integrator.events), integrator.work.copy(),
-        integrator.status,
+        scene, sampled, grid, states, integrator.switches, integrator.work.copy(), integrator.status
     )
 
 
@@ -157,11 +159,6 @@ def command(scene: Scene, state: Array) -> tuple[float, float]:
     """Input forces f_l, f_r in N that the controllers answer to a state (6,)."""
     grasp = scene.grasp
     return feedback(grasp.left, state[0], state[1]), feedback(grasp.right, state[4], state[5])
-
-
-def commands(scene: Scene, states: Array) -> Array:
-    """Input forces (n, 2) in N that the feedback answers to states (n, 6)."""
-    return np.stack(command(scene, states.T), axis=-1)
 
 
 def _sampled(scene: Scene, integrator: Integrator, grid: Array, progress: Progress) -> Array:

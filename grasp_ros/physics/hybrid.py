@@ -80,6 +80,13 @@ def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: An
 
 
 @kernel
+def deliver(y: Any, out: Any, row: int) -> None:
+    """Copy positions and velocities to a row of the output."""
+    for column in range(6):
+        out[row, column] = y[column]
+
+
+@kernel
 def fly_all(flights: Any, t: float, y: Any) -> None:
     """Write positions, velocities and penetrations after the time t of flight."""
     y[X_L], y[V_L] = fly(flights[LEFT], t)
@@ -109,7 +116,7 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
     row = filled[GRID]
     while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
         fly_all(flights, (grid[row] - clock[0]) - clock[1], y)
-        out[row, :] = y[:6]
+        deliver(y, out, row)
         row += 1
     filled[GRID] = row
     fly_all(flights, t, y)
@@ -209,7 +216,7 @@ def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clo
     while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
         low = invert_time(c[TIME], n, (grid[row] - clock[0]) - clock[1], low, s)
         state_at(c, n, low, left, right, y)
-        out[row, :] = y[:6]
+        deliver(y, out, row)
         row += 1
     filled[GRID] = row
     state_at(c, n, s, left, right, y)
@@ -251,7 +258,7 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         limit = (span - clock[0]) - clock[1]
         row = filled[GRID]
         while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] <= 0.0:
-            out[row, :] = y[:6]
+            deliver(y, out, row)
             row += 1
         filled[GRID] = row
         if not limit > 0.0:

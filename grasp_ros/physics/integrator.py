@@ -50,6 +50,11 @@ class SwitchEvent(NamedTuple):
     u_rate: float  # m/s
 
 
+def to_events(switches: Array) -> list[SwitchEvent]:
+    """Records of rows (m, 5)."""
+    return [SwitchEvent(t, int(side), Event(int(kind)), u, u_rate) for t, side, kind, u, u_rate in switches.tolist()]
+
+
 _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
@@ -87,7 +92,6 @@ class Integrator:
         if state.shape != (6,) or not np.isfinite(state).all():
             raise ValueError(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
-        self.events: list[SwitchEvent] = []
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._accuracy = accuracy
         self._max_events = max_events
@@ -103,6 +107,8 @@ class Integrator:
         self._mode = np.zeros(2, dtype=np.int64)
         self._tables = new_tables(series_order(accuracy))
         self._event_rows = np.zeros((EVENT_ROWS, 5))
+        self._switches: list[Array] = []
+        self._switch_count = 0
         switching.classify(self._bodies, self._pairs, self._y, self._mode)
 
     @property
@@ -114,6 +120,16 @@ class Integrator:
     def penetration(self) -> Array:
         """Copy of (u_l, u_r) in m, exact where the difference of the positions is not."""
         return self._y[[U_L, U_R]]
+
+    @property
+    def switches(self) -> Array:
+        """All switches so far, shape (m, 5): time, side, kind, u, u'."""
+        return np.concatenate(self._switches) if self._switches else np.empty((0, 5))
+
+    @property
+    def events(self) -> list[SwitchEvent]:
+        """The rows of `switches` as records."""
+        return to_events(self.switches)
 
     def hold(self, force_left: float, force_right: float) -> None:
         """Set the constant input forces of the arms in N, for feedback that is sampled."""
@@ -148,18 +164,21 @@ class Integrator:
         clock = np.zeros(2)
         filled = np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
-            allowed = self._event_rows[: self._max_events - len(self.events) + 2]
+            allowed = self._event_rows[: self._max_events - self._switch_count + 2]
             outcome = hybrid.advance(
                 self._tables, self._bodies, self._pairs, self._y, self._mode, clock, duration, self._accuracy,
                 times, out, allowed, filled, self.work,
             )
-            for time, side, kind, u, u_rate in self._event_rows[: filled[1]].tolist():
-                self.events.append(SwitchEvent(start + time, int(side), Event(int(kind)), u, u_rate))
-            filled[1] = 0
+            if filled[1]:
+                rows = self._event_rows[: filled[1]].copy()
+                rows[:, 0] += start
+                self._switches.append(rows)
+                self._switch_count += len(rows)
+                filled[1] = 0
             if outcome != Outcome.EVENTS_FULL:
                 self.status = _STATUS[Outcome(outcome)]
                 break
-            if len(self.events) > self._max_events:
+            if self._switch_count > self._max_events:
                 self.status = Status.EVENT_BUDGET
         return out[: filled[0]]
 

@@ -78,19 +78,28 @@ def first_rise(row: Any, scale: float, offset: float, n: int, h: float, work: An
 
 @kernel
 def invert_time(time: Any, n: int, tau: float, low: float, high: float) -> float:
-    """The s in [low, high] at which the polynomial `time`, increasing there, is tau (Newton with bisection)."""
-    s = high
+    """The s in [low, high] at which the polynomial `time`, increasing there, is tau (Newton with bisection).
+
+    Newton's error is squared by each iteration, so a correction of 1e-9 is the last one needed.
+    """
+    s = 0.5 * (low + high)
     for _ in range(200):
-        rest = evaluate(time, n, s) - tau
+        value = time[n]
+        rate = 0.0
+        for k in range(n - 1, -1, -1):
+            rate = rate * s + value
+            value = value * s + time[k]
+        rest = value - tau
         if rest > 0.0:
             high = s
         else:
             low = s
-        rate = evaluate_rate(time, n, s)
         following = s - rest / rate if rate > 0.0 else low
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        if abs(following - s) <= 2.0 * EPS * high:
+        elif abs(following - s) <= 1e-9 * high:
+            return following
+        if high - low <= 2.0 * EPS * high:
             return following
         s = following
     return s

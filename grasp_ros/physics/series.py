@@ -42,6 +42,7 @@ from grasp_ros.physics.polynomial import evaluate
 # Rows of the coefficient table. x_o, v_l, ..., u_r stand in their places of the state y (x_l and x_r follow from
 # them); then time, w, G, u' and 1 + p u'.
 TIME, W_L, W_R, G, D_L, D_R, E_L, E_R, ROWS = range(8, 17)
+CACHE_LINE = 64  # bytes
 LANES = 16  # products of series in one step, see `convolve`
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
@@ -53,7 +54,7 @@ def series_order(tolerance: float) -> int:
     Jorba and Zou derive -ln(tolerance) / 2 + 1 from a work that grows with the square of the order. Here the work
     per order is nearly constant, because a product is one short loop over vectors: the measured optimum is higher.
     """
-    return math.ceil(-0.8 * math.log(tolerance)) + 4
+    return math.ceil(-0.65 * math.log(tolerance)) + 4
 
 
 @kernel
@@ -249,5 +250,9 @@ class Tables(NamedTuple):
 
 
 def new_tables(order: int) -> Tables:
-    """Workspace for steps of one order."""
-    return Tables(np.zeros((ROWS, order + 1)), np.zeros((order + 1, 2, LANES)))
+    """Workspace for steps of one order; the factors begin at a cache line, which vector loads want."""
+    size = (order + 1) * 2 * LANES
+    line = CACHE_LINE // 8
+    room = np.zeros(size + line)
+    begin = -(room.ctypes.data // 8) % line
+    return Tables(np.zeros((ROWS, order + 1)), room[begin : begin + size].reshape(order + 1, 2, LANES))
