@@ -58,7 +58,8 @@ class Trajectory:
 
     def times(self, kind: Event, side: int) -> Array:
         """Times in s of one side's events of a kind."""
-        return self.switches[(self.switches[:, 1] == side) & (self.switches[:, 2] == kind), 0]
+        chosen: Array = self.switches[(self.switches[:, 1] == side) & (self.switches[:, 2] == kind), 0]
+        return chosen
 
     def save(self, path: Path) -> None:
         """Write everything to a .npz file.
