@@ -170,9 +170,9 @@ def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
     expand_one(single.c, single.f, BODIES, PAIRS, LEFT if other == "left" else RIGHT, 1.0, n)
     one = single.c
     end = np.zeros((2, 8))
-    s = invert_time(both[TIME], n, tau, 0.0, 1.0)
+    s = invert_time(both[TIME], n, tau, 1.0)
     state_at(both, n, s, True, True, end[0])
-    s = invert_time(one[TIME], n, tau, 0.0, 0.15)
+    s = invert_time(one[TIME], n, tau, 0.15)
     state_at(one, n, s, other == "left", other == "right", end[1])
     assert end[0] == pytest.approx(end[1], rel=1e-12, abs=1e-14)
     assert abs(end[0, 1] - START["both"][1]) > 1e-3
@@ -301,7 +301,7 @@ def test_time_is_inverted_to_rounding() -> None:
     c, n = expand("both", 30).c, 30
     for s in (0.0, 1e-9, 0.03, 0.2):
         tau = evaluate(c[TIME], n, s)
-        assert evaluate(c[TIME], n, invert_time(c[TIME], n, tau, 0.0, 0.3)) == pytest.approx(tau, rel=4e-16, abs=1e-17)
+        assert evaluate(c[TIME], n, invert_time(c[TIME], n, tau, 0.3)) == pytest.approx(tau, rel=4e-16, abs=1e-17)
 
 
 def test_depth_is_never_negative() -> None:

@@ -43,7 +43,7 @@ def test_continuous_is_the_integrator() -> None:
     integrator = Integrator(scene.grasp, scene.initial_state, continuous=True)
     states = integrator.advance(5.0, np.linspace(0.0, 5.0, GRID_POINTS))
     assert np.array_equal(result.state, states)
-    assert result.events == tuple(integrator.events)
+    assert result.events == integrator.events
     assert result.status is Status.DONE
     assert not result.sampled
     assert np.array_equal(result.state[0], scene.initial_state)
@@ -162,7 +162,7 @@ def test_file_of_a_run_without_events(tmp_path: Path) -> None:
     result = simulate(scene_of(duration=0.1), grid=np.zeros(0))
     result.save(tmp_path / "none.npz")
     assert_same(load(tmp_path / "none.npz"), result)
-    assert result.events == ()
+    assert result.events == []
 
 
 @pytest.mark.parametrize("content", [b"", b"not a file", b"PK\x03\x04broken"])

@@ -209,13 +209,11 @@ def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clo
     s = min(h, s_l, s_r)
     t = evaluate(c[TIME], n, s)
     if t > span:
-        s = invert_time(c[TIME], n, span, 0.0, s)
+        s = invert_time(c[TIME], n, span, s)
         t = span
-    low = 0.0
     row = filled[GRID]
     while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
-        low = invert_time(c[TIME], n, (grid[row] - clock[0]) - clock[1], low, s)
-        state_at(c, n, low, left, right, y)
+        state_at(c, n, invert_time(c[TIME], n, (grid[row] - clock[0]) - clock[1], s), left, right, y)
         deliver(y, out, row)
         row += 1
     filled[GRID] = row

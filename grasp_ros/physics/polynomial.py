@@ -77,12 +77,13 @@ def first_rise(row: Any, scale: float, offset: float, n: int, h: float, work: An
 
 
 @kernel
-def invert_time(time: Any, n: int, tau: float, low: float, high: float) -> float:
-    """The s in [low, high] at which the polynomial `time`, increasing there, is tau (Newton with bisection).
+def invert_time(time: Any, n: int, tau: float, high: float) -> float:
+    """The s in [0, high] at which the polynomial `time`, increasing there, is tau (Newton with bisection).
 
     Newton's error is squared by each iteration, so a correction of 1e-9 is the last one needed.
     """
-    s = 0.5 * (low + high)
+    low = 0.0
+    s = 0.5 * high
     for _ in range(200):
         value = time[n]
         rate = 0.0

@@ -54,7 +54,7 @@ def series_order(tolerance: float) -> int:
     Jorba and Zou derive -ln(tolerance) / 2 + 1 from a work that grows with the square of the order. Here the work
     per order is nearly constant, because a product is one short loop over vectors: the measured optimum is higher.
     """
-    return math.ceil(-0.65 * math.log(tolerance)) + 4
+    return math.ceil(-0.8 * math.log(tolerance)) + 4
 
 
 @kernel
