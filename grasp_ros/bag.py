@@ -149,8 +149,9 @@ class Recording:
 
     @property
     def missing(self) -> dict[str, int]:
-        """Ticks of the scene's horizon without a message, by topic."""
-        return {topic.name: self.scene.ticks + 1 - self.counts[topic.name] for topic in PER_TICK}
+        """Ticks up to the last one recorded that have no message, by topic."""
+        ticks = int(self.tick.max(initial=-1)) + 1
+        return {topic.name: ticks - self.counts[topic.name] for topic in PER_TICK}
 
 
 def read(path: Path) -> Recording:
@@ -167,8 +168,9 @@ def read(path: Path) -> Recording:
         with Reader(path) as reader:
             scene = scenes.parse(custom["scene"], path.name, str(path))
             columns = {topic.name: _column(reader, topic, scene) for topic in PER_TICK}
-    except (ReaderError, KeyError, TypeError, OSError, scenes.SceneError) as error:
-        raise BagError(f"{path}: not a bag of this package: {error}") from None
+    except (ReaderError, KeyError, TypeError, OSError, ValueError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise BagError(f"{path}: not a bag of this package: {reason}") from None
     ticks, joints = columns[JOINT_STATES.name]
 
     def aligned(topic: Topic) -> Array:

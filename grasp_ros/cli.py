@@ -15,7 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Status, compile_kernels
+from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Integrator, Status, compile_kernels
 from grasp_ros.physics.jit import COMPILING, kernels_on_disk
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
 
@@ -31,11 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of our output, `head` say, has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, MemoryError) as error:
         print(f"grasp: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        return 0
+        print("grasp: interrupted", file=sys.stderr)
+        return 130
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -129,6 +130,7 @@ def _run(options: argparse.Namespace) -> int:
 
     scene = scenes.load(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
+    Integrator(scene.grasp, scene.initial_state, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
     _prepare()
     graph = Graph(scene, directory, options.accuracy, progress=True)
     received: list[int] = []
@@ -151,12 +153,15 @@ def _run(options: argparse.Namespace) -> int:
         return 0
     recording = bag.read(graph.bag)
     rows = report.describe_recording(recording)
+    whole = True
     if not received:
+        comparison = report.compare_recording(recording, options.accuracy)
+        whole = comparison.equal and not any(recording.missing.values())
         figure = directory / "figure.png"
         plots.draw(recording, figure, scene.feedback_in_words(sampled=True))
-        rows += [*report.compare_recording(recording, options.accuracy), ("figure", str(figure))]
+        rows += [*comparison.rows, ("figure", str(figure))]
     print(report.table([*rows, ("wall time", f"{seconds:.1f} s with start and stop")]))
-    return 0
+    return 0 if whole else 1
 
 
 def _inspect(options: argparse.Namespace) -> int:
@@ -176,7 +181,8 @@ def _plot(options: argparse.Namespace) -> int:
     else:
         motion = load(source) if source.suffix == ".npz" else _simulated(options.source)
         sampled = motion.sampled
-    output = options.output or (source.with_suffix(".png") if source.exists() else Path(f"{motion.scene.name}.png"))
+    beside = Path(f"{source.resolve()}.png") if source.is_dir() else source.with_suffix(".png")
+    output = options.output or (beside if source.exists() else Path(f"{motion.scene.name}.png"))
     plots.draw(motion, output, motion.scene.feedback_in_words(sampled))
     print(f"written to {output}")
     return 0

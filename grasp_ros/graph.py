@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import signal
 import subprocess
@@ -14,6 +16,7 @@ from pathlib import Path
 from grasp_ros.scene import Scene
 
 STOP_SECONDS = 10.0
+TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -66,11 +69,11 @@ class Graph:
             **os.environ,
         }
         settings = {
-            "monitor": {"bag": str(self.bag)},
+            "monitor": {"bag": json.dumps(str(self.bag))},
             "left_controller": {"wait_for_monitor": "true"},
             "right_controller": {"wait_for_monitor": "true"},
             "plant": {
-                "scene": str(scene_file),
+                "scene": json.dumps(str(scene_file)),
                 "accuracy": repr(float(self.accuracy)),
                 "wait_for_monitor": "true",
                 "progress": str(self.progress).lower(),
@@ -78,13 +81,15 @@ class Graph:
         }
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
-        for name, parameters in settings.items():
-            words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
-            command = [sys.executable, "-m", "grasp_ros.nodes.start", name, "--ros-args", *words]
-            self.processes[name] = subprocess.Popen(
-                command, env=environment, start_new_session=True, stderr=self.errors
-            )
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        try:
+            for name, parameters in settings.items():
+                words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+                command = [sys.executable, "-m", "grasp_ros.nodes.start", name, "--ros-args", *words]
+                self.processes[name] = subprocess.Popen(
+                    command, env=environment, start_new_session=True, stderr=self.errors
+                )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.
@@ -92,9 +97,15 @@ class Graph:
         Raises
         ------
         GraphError
-            If a process ends with another status than 0, or a controller ends early.
+            If a process ends with another status than 0, a controller ends early, or plant and monitor do not end
+            together.
         """
-        while not received and any(self.processes[name].poll() is None for name in ("plant", "monitor")):
+        deadline = math.inf
+        while not received and (running := [n for n in ("plant", "monitor") if self.processes[n].poll() is None]):
+            if len(running) == 1:
+                deadline = min(deadline, time.monotonic() + TOGETHER_SECONDS)
+            if time.monotonic() > deadline:
+                raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
             for name, process in self.processes.items():
                 if process.poll() or (process.poll() == 0 and name.endswith("controller")):
                     raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")

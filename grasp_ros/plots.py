@@ -53,10 +53,12 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
     Raises
     ------
     ValueError
-        If matplotlib does not know the format.
+        If matplotlib does not know the format, or the motion is empty.
     OSError
         If the file cannot be written.
     """
+    if not len(motion.t):
+        raise ValueError("nothing to draw: the motion has no output times")
     figure, (top, middle, bottom) = plt.subplots(
         3, 1, sharex=True, figsize=(9.0, 9.0), height_ratios=(3, 2, 3), layout="constrained"
     )

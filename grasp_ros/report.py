@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,17 +63,28 @@ def describe_recording(recording: Recording) -> list[Row]:
     return rows
 
 
-def compare_recording(recording: Recording, accuracy: float) -> list[Row]:
-    """How far a recorded motion lies from the same scene without ROS, and from the paper's continuous feedback."""
+class Comparison(NamedTuple):
+    """A recorded motion beside the same scene without ROS."""
+
+    equal: bool  # to the sampled simulation, bit for bit
+    offset: Array  # (6,), largest distance from continuous feedback, m and m/s
+
+    @property
+    def rows(self) -> list[Row]:
+        """For `table`."""
+        return [
+            ("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL"),
+            ("from continuous feedback", "at most x_l {:.3g}, x_o {:.3g}, x_r {:.3g} m".format(*self.offset[0::2])),
+        ]
+
+
+def compare_recording(recording: Recording, accuracy: float) -> Comparison:
+    """Simulate a recorded scene without ROS, with commands that are held and with the paper's continuous feedback."""
     times = recording.t
     same = simulate(recording.scene, sampled=True, grid=times, accuracy=accuracy)
     ideal = simulate(recording.scene, grid=times, accuracy=accuracy)
     equal = np.array_equal(same.state, recording.state) and np.array_equal(same.command, recording.command)
-    offset = np.abs(ideal.state - recording.state).max(axis=0)
-    return [
-        ("same without ROS", "equal, bit for bit" if equal else "NOT EQUAL"),
-        ("from continuous feedback", "at most x_l {:.3g}, x_o {:.3g}, x_r {:.3g} m".format(*offset[0::2])),
-    ]
+    return Comparison(equal, np.abs(ideal.state - recording.state).max(axis=0))
 
 
 def _ends(values: Array) -> str:

@@ -153,7 +153,7 @@ def simulate(
 
 def tick_times(scene: Scene) -> Array:
     """Times in s of all control periods of a scene, shape (ticks + 1,)."""
-    return np.array([scene.time_of(tick) for tick in range(scene.ticks + 1)])
+    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
 
 
 def command(scene: Scene, state: Array) -> tuple[float, float]:

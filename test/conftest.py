@@ -29,8 +29,8 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     directories = []
     for name in ("first", "second"):
         cwd = tmp_path_factory.mktemp(name)
-        result = grasp("run", "case_01", "--set", "time.duration_s=3", "-o", "run", cwd=cwd)
+        result = grasp("run", "case_01", "--set", "time.duration_s=3", "-o", "run #1", cwd=cwd)
         assert result.returncode == 0, result.stderr
         (cwd / "stdout").write_text(result.stdout)
-        directories.append(cwd / "run")
+        directories.append(cwd / "run #1")
     return directories[0], directories[1]

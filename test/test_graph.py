@@ -106,7 +106,7 @@ def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
 @pytest.mark.parametrize("moment", ["recording", "starting"])
 def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, moment: str) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"], cwd=tmp_path, text=True,
+        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run")], text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
     recorded = tmp_path / "run" / "bag" / "bag.mcap"
@@ -155,6 +155,8 @@ def test_lonely_node_ends_cleanly_on_a_signal(tmp_path: Path, name: str, number:
         ("plant", "scene:=case_99", "case_99: no such scene"),
         ("plant", "scene:=missing.yaml", "missing.yaml: no such file"),
         ("plant", "accuracy:=1.0", "accuracy: 1.0 is outside"),
+        ("plant", "accuracy:=1", "accuracy: 1.0 is outside"),
+        ("plant", "scene:=1", "scene"),
         ("monitor", "bag:=.", "bag: '.' exists"),
     ],
 )
@@ -164,6 +166,32 @@ def test_bad_parameters_are_refused(tmp_path: Path, name: str, parameter: str, c
     assert result.returncode == 2
     assert complaint in result.stderr
     assert "Traceback" not in result.stderr
+
+
+def test_a_second_plant_on_the_same_topics_is_refused() -> None:
+    plants = [subprocess.Popen([*START, "plant"], stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    wait_for(lambda: any(plant.poll() is not None for plant in plants), "a plant that gives way")
+    for plant in plants:
+        plant.terminate()
+    errors = [plant.communicate(timeout=DEADLINE)[1] for plant in plants]
+    statuses = [plant.returncode for plant in plants]
+    assert 1 in statuses
+    assert "another plant publishes here" in errors[statuses.index(1)]
+    assert "Traceback" not in "".join(errors)
+
+
+def test_run_notices_a_plant_that_was_stopped(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run")], text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    recorded = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 1_000_000, "a bag that grows")
+    subprocess.run(["pkill", "-TERM", "-f", f"start plant .*{tmp_path}"], check=True)
+    _, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 1
+    assert "monitor: still runs although its counterpart has ended" in err
+    assert bag.read(recorded.parent).counts[JOINT_STATES.name] > 100
 
 
 @pytest.fixture

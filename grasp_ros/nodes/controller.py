@@ -31,6 +31,8 @@ class Controller(GraspNode):
         self.when(self._ready, self._start)
 
     def _on_scene(self, message: Any) -> None:
+        if self._arm is not None:  # one run, one scene
+            return
         grasp = scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}").grasp
         self._arm = grasp.left if self._side == "left" else grasp.right
 

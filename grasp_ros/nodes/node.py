@@ -9,6 +9,7 @@ from typing import Any
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
+from rclpy.exceptions import ParameterException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -39,7 +40,10 @@ class GraspNode(Node):
 
     def read_only(self, name: str, default: Any, text: str) -> Any:
         """Declare a parameter that is set at start only, and return its value."""
-        return self.declare_parameter(name, default, ParameterDescriptor(description=text, read_only=True)).value
+        number = isinstance(default, float)  # for which an integer will do as well
+        descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=number)
+        value = self.declare_parameter(name, default, descriptor).value
+        return float(value) if number else value
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the graph."""
@@ -107,7 +111,7 @@ def run(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
         while not (node.finished or received):
             executor.spin_once(timeout_sec=POLL_SECONDS)
         executor.shutdown()
-    except ValueError as error:
+    except (ValueError, ParameterException) as error:
         print(error, file=sys.stderr)
         return 2
     finally:

@@ -73,11 +73,18 @@ class Plant(GraspNode):
             self.wall_timer(0.1, self._show)
         self.when(self._ready, self._start)
 
+    def report(self) -> None:
+        """Publish the counters, and see to it that nobody else plays the plant."""
+        super().report()
+        self._insist()
+
+    def _insist(self) -> None:
+        if self.count_publishers(self._states.topic_name) > 1:
+            topic = self._states.topic_name
+            self._fail(f"{topic}: another plant publishes here; use another ROS_DOMAIN_ID or namespace")
+
     def _ready(self) -> bool:
-        if self.count_publishers(JOINT_STATES.name) > 1:
-            raise ValueError(
-                f"{self._states.topic_name}: another plant publishes here; use another ROS_DOMAIN_ID or namespace"
-            )
+        self._insist()
         monitor = [LYAPUNOV] if self._monitored else []
         return self.linked(self._states, [LEFT_COMMAND, RIGHT_COMMAND, *monitor]) and all(
             self.linked(publisher, monitor) for publisher in self._contacts
@@ -109,7 +116,7 @@ class Plant(GraspNode):
             self._advance()
 
     def _on_lyapunov(self, cdr: bytes) -> None:
-        self._recorded = messages.raw_stamp_ns(cdr) // self._scene.period_ns
+        self._recorded = max(self._recorded, messages.raw_stamp_ns(cdr) // self._scene.period_ns)
         self._advance()
 
     def _advance(self) -> None:
@@ -124,7 +131,8 @@ class Plant(GraspNode):
         self._integrator.hold(left, right)
         self._integrator.advance(self._scene.period_ns / scenes.NANOSECONDS, start=self._scene.time_of(self._tick))
         if self._integrator.status is not Status.DONE:
-            self._fail()
+            state = self._integrator.state.tolist()
+            self._fail(f"{self._integrator.status.value}, t = {self._scene.time_of(self._tick)} s, state {state}")
             return
         self._applied = (left, right)
         self._commands = [None, None]
@@ -138,11 +146,9 @@ class Plant(GraspNode):
         speed = self._scene.ticks / (time.monotonic() - self._begin)
         self.get_logger().info(f"finished {self._scene.ticks} ticks at {speed:.1f} ticks/s")
 
-    def _fail(self) -> None:
-        self.state = self._integrator.status.value
-        self.get_logger().fatal(
-            f"{self.state}, t = {self._scene.time_of(self._tick)} s, state {self._integrator.state.tolist()}"
-        )
+    def _fail(self, reason: str) -> None:
+        self.state = reason
+        self.get_logger().fatal(reason)
         self.exit_code = 1
         self.finished = True
 
