@@ -50,7 +50,7 @@ class Controller(GraspNode):
         index = message.name.index(self._side)
         force = feedback(self._arm, message.position[index], message.velocity[index])
         self._commands.publish(messages.wrench(messages.to_ns(message.header.stamp), force))
-        self.counters["answered states"] = int(self.counters["answered states"]) + 1
+        self.count("answered states")
 
 
 def main(name: str, received: Sequence[int]) -> int:

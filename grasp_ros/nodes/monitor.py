@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from rclpy.duration import Duration
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
@@ -21,7 +20,6 @@ from grasp_ros.physics.model import energy
 from grasp_ros.topics import JOINT_STATES, LYAPUNOV, PER_TICK, SCENE
 from grasp_ros.versions import versions
 
-ACKNOWLEDGE_SECONDS = 5.0
 INPUTS = tuple(topic for topic in PER_TICK if topic != LYAPUNOV)
 
 
@@ -60,7 +58,7 @@ class Monitor(GraspNode):
             behind = [pending for pending in self._pending.values() if pending[0][0] < newest]
             for pending in behind:
                 pending.popleft()
-                self.counters["lost messages"] = int(self.counters["lost messages"]) + 1
+                self.count("lost messages")
             if not behind:
                 self._complete(newest, {name: pending.popleft()[1] for name, pending in self._pending.items()})
 
@@ -73,7 +71,7 @@ class Monitor(GraspNode):
             self._recorder.write(topic, time_ns, tick[topic.name])
         self._recorder.write_lyapunov(time_ns, values)
         self._values.publish(messages.lyapunov(time_ns, values))
-        self.counters["ticks"] = int(self.counters["ticks"]) + 1
+        self.count("ticks")
         self.finished = time_ns == self._scene.ticks * self._scene.period_ns
 
     def close(self) -> None:
@@ -81,7 +79,7 @@ class Monitor(GraspNode):
         if self._recorder is not None:
             self._recorder.close()
         if self.finished:
-            self._values.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
+            self.flush(self._values)
 
 
 def main(_: str, received: Sequence[int]) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 import rclpy
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
@@ -22,6 +23,7 @@ POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
 PEER_SECONDS = 0.02
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
+ACKNOWLEDGE_SECONDS = 5.0
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 
 
@@ -82,6 +84,15 @@ class GraspNode(Node):
             if not writers or any((writer.node_namespace, writer.node_name) not in listening for writer in writers):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
+
+    def count(self, counter: str) -> None:
+        """Add one to a counter."""
+        self.counters[counter] = int(self.counters[counter]) + 1
+
+    def flush(self, *publishers: Publisher) -> None:
+        """Let every reader have the last messages before the process ends."""
+        for publisher in publishers:
+            publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
 
     def report(self) -> None:
         """Publish the counters."""

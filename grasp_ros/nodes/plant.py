@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from rclpy.duration import Duration
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
@@ -33,8 +32,6 @@ from grasp_ros.topics import (
     SCENE,
     WINDOW,
 )
-
-ACKNOWLEDGE_SECONDS = 5.0
 
 
 class Plant(GraspNode):
@@ -106,11 +103,11 @@ class Plant(GraspNode):
     def _on_command(self, side: int, message: Any) -> None:
         force = message.wrench.force.x
         if messages.to_ns(message.header.stamp) != self._tick * self._scene.period_ns:
-            self._count("stale commands")
+            self.count("stale commands")
         elif not math.isfinite(force):
-            self._count("refused commands")
+            self.count("refused commands")
         elif self._commands[side] is not None:
-            self._count("repeated commands")
+            self.count("repeated commands")
         else:
             self._commands[side] = force
             self._advance()
@@ -152,19 +149,15 @@ class Plant(GraspNode):
         self.exit_code = 1
         self.finished = True
 
-    def _count(self, counter: str) -> None:
-        self.counters[counter] = int(self.counters[counter]) + 1
-
     def _show(self) -> None:
         self._bar.update(self._tick - self._bar.n)
 
     def close(self) -> None:
-        """Let every reader have the last messages before the process ends."""
+        """End the progress bar, and deliver what a finished run has published."""
         self._show()
         self._bar.close()
         if self.finished:
-            for publisher in (self._states, *self._contacts):
-                publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
+            self.flush(self._states, *self._contacts)
 
 
 def main(_: str, received: Sequence[int]) -> int:
