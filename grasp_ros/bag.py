@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -21,20 +22,12 @@ from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterEr
 from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
+from grasp_ros.effects.base import NANOSECONDS
+from grasp_ros.physics.certificate import Energy, energy
+from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.model import Array
-from grasp_ros.topics import (
-    DEPTH,
-    JOINT_STATES,
-    LEFT_COMMAND,
-    LEFT_CONTACT,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    PER_TICK,
-    RIGHT_COMMAND,
-    RIGHT_CONTACT,
-    SCENE,
-    Topic,
-)
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic
 
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
@@ -46,7 +39,7 @@ class BagError(ValueError):
 
 def _qos(topic: Topic) -> Qos:
     return Qos(
-        QosHistory.KEEP_LAST, 1 if topic.latched else DEPTH, QosReliability.RELIABLE,
+        QosHistory.KEEP_LAST, topic.depth, QosReliability.RELIABLE,
         QosDurability.TRANSIENT_LOCAL if topic.latched else QosDurability.VOLATILE, _NO_LIMIT, _NO_LIMIT,
         QosLiveliness.AUTOMATIC, _NO_LIMIT, False,
     )
@@ -59,8 +52,8 @@ class Recorder:
     ----------
     path : Path
         Directory that does not exist yet.
-    scene_yaml : str
-        The resolved scene.
+    scene : Scene
+        Its topics get a connection each.
     versions : mapping of str to str
         Stored in the bag's metadata.
 
@@ -70,12 +63,13 @@ class Recorder:
         If the directory exists or cannot be written.
     """
 
-    def __init__(self, path: Path, scene_yaml: str, versions: dict[str, str]) -> None:
+    def __init__(self, path: Path, scene: scenes.Scene, versions: dict[str, str]) -> None:
         self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
         try:
             self._writer.open()
         except (WriterError, OSError) as error:
             raise BagError(f"{path}: cannot be written: {error}") from None
+        scene_yaml = scene.to_yaml()
         self._writer.set_custom_data("scene", scene_yaml)
         for name, version in sorted(versions.items()):
             self._writer.set_custom_data(f"version {name}", version)
@@ -83,7 +77,7 @@ class Recorder:
             topic.name: self._writer.add_connection(
                 f"/{topic.name}", topic.type, typestore=_TYPES, offered_qos_profiles=[_qos(topic)]
             )
-            for topic in (SCENE, *PER_TICK)
+            for topic in (SCENE, *scene.topics, *CHANGES.values())
         }
         string = _TYPES.types[SCENE.type](data=scene_yaml)
         self.write(SCENE, 0, bytes(_TYPES.serialize_cdr(string, SCENE.type)))
@@ -95,7 +89,7 @@ class Recorder:
     def write_lyapunov(self, time_ns: int, values: Sequence[float]) -> None:
         """Append the monitor's own values; serialized here, because rclpy pads this type with stray bytes."""
         types = _TYPES.types
-        seconds, nanoseconds = divmod(time_ns, scenes.NANOSECONDS)
+        seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
         stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
         header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
         nothing = np.zeros(0)
@@ -109,7 +103,6 @@ class Recorder:
         self._writer.close()
 
 
-
 @dataclass(frozen=True)
 class Recording:
     """What is in a bag.
@@ -121,14 +114,19 @@ class Recording:
     versions : dict of str to str
         What the recording process ran with.
     counts : dict of str to int
-        Messages by topic.
+        Messages by topic, of those that have one per tick.
     tick : int array (n,)
         Ticks whose state is in the bag.
     state : array (n, 6), m and m/s
-    effort, command, contact : arrays (n, 2), N
-        Input forces applied until the tick, commands answered to it, impact forces at it; NaN where missing.
-    lyapunov : array (n, 4)
-        V, V_c, V_rate and mode as the monitor computed them; NaN where missing.
+        NaN for a body that is not there.
+    effort, command : arrays (n, 2), N
+        Input forces applied until the tick, commands answered to it; 0 without a controller, NaN where missing.
+    outputs : dict of str to array (n,), N
+        Impact and external forces by topic; NaN where missing.
+    lyapunov : array (n, 6)
+        What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
+    changes : dict of int to dict of str to float
+        Numbers that were set while the graph ran, by the tick from which they act.
     """
 
     path: Path
@@ -139,8 +137,9 @@ class Recording:
     state: Array
     effort: Array
     command: Array
-    contact: Array
+    outputs: dict[str, Array]
     lyapunov: Array
+    changes: dict[int, dict[str, float]]
 
     @property
     def t(self) -> Array:
@@ -148,10 +147,15 @@ class Recording:
         return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
 
     @property
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode at the ticks, from the states; of the scene as it was at the start."""
+        return energy(self.scene.system, self.state)
+
+    @property
     def missing(self) -> dict[str, int]:
         """Ticks up to the last one recorded that have no message, by topic."""
         ticks = int(self.tick.max(initial=-1)) + 1
-        return {topic.name: ticks - self.counts[topic.name] for topic in PER_TICK}
+        return {name: ticks - count for name, count in self.counts.items()}
 
 
 def read(path: Path) -> Recording:
@@ -165,43 +169,66 @@ def read(path: Path) -> Recording:
     try:
         metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
         custom = metadata["rosbag2_bagfile_information"]["custom_data"]
+        scene = scenes.parse(custom["scene"], path.name, str(path))
         with Reader(path) as reader:
-            scene = scenes.parse(custom["scene"], path.name, str(path))
-            columns = {topic.name: _column(reader, topic, scene) for topic in PER_TICK}
+            columns = {topic: _column(reader, topic, scene) for topic in scene.topics}
+            changes = _changes(reader, scene)
     except (ReaderError, KeyError, TypeError, OSError, ValueError, yaml.YAMLError) as error:
         reason = " ".join(str(error).split())
         raise BagError(f"{path}: not a bag of this package: {reason}") from None
-    ticks, joints = columns[JOINT_STATES.name]
+    ticks, joints = columns[JOINT_STATES]
 
     def aligned(topic: Topic) -> Array:
-        found, values = columns[topic.name]
+        found, values = columns[topic]
         result = np.full((len(ticks), values.shape[1]), np.nan)
         _, here, there = np.intersect1d(ticks, found, return_indices=True)
         result[here] = values[there]
         return result
 
+    command = np.zeros((len(ticks), 2))
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        command[:, side] = aligned(topic)[:, 0]
     return Recording(
         path, scene, {k.removeprefix("version "): v for k, v in custom.items() if k.startswith("version ")},
-        {name: len(found) for name, (found, _) in columns.items()}, ticks, joints[:, :6], joints[:, [6, 8]],
-        np.hstack([aligned(LEFT_COMMAND), aligned(RIGHT_COMMAND)]),
-        np.hstack([aligned(LEFT_CONTACT), aligned(RIGHT_CONTACT)]), aligned(LYAPUNOV),
+        {topic.name: len(found) for topic, (found, _) in columns.items()}, ticks, joints[:, :6], joints[:, 6:], command,
+        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV), changes,
     )
 
 
-def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
+def _messages(reader: Reader, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:
+    """Tick and message of everything on a topic."""
     connections = [connection for connection in reader.connections if connection.topic == f"/{topic.name}"]
-    ticks, rows = [], []
     for _, time_ns, raw in reader.messages(connections) if connections else ():
-        message = _TYPES.deserialize_cdr(raw, topic.type)
-        ticks.append(time_ns // scene.period_ns)
-        rows.append(_values(topic, message))
-    return np.array(ticks, dtype=np.int64), np.array(rows).reshape(len(rows), -1)
+        yield time_ns // scene.period_ns, _TYPES.deserialize_cdr(raw, topic.type)
 
 
-def _values(topic: Topic, message: object) -> np.ndarray:
+def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
+    found = [(tick, _values(topic, message)) for tick, message in _messages(reader, topic, scene)]
+    rows = np.array([row for _, row in found], dtype=float).reshape(len(found), -1)
+    return np.array([tick for tick, _ in found], dtype=np.int64), rows
+
+
+def _values(topic: Topic, message: Any) -> Array:
     if topic == JOINT_STATES:
-        pairs = np.stack([message.position, message.velocity], axis=1)  # type: ignore[attr-defined]
-        return np.concatenate([pairs.ravel(), message.effort])  # type: ignore[attr-defined]
-    if topic == LYAPUNOV:
-        return np.asarray(message.position)  # type: ignore[attr-defined]
-    return np.array([message.wrench.force.x])  # type: ignore[attr-defined]
+        return _joints(message)
+    return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
+
+
+def _joints(message: Any) -> Array:
+    """State (6,) and the input forces of both arms of a `joint_states` message."""
+    row = np.concatenate([np.full(6, np.nan), np.zeros(2)])
+    for body, name in NAMES.items():
+        if name in message.name:
+            index = message.name.index(name)
+            row[COLUMN[body] : COLUMN[body] + 2] = message.position[index], message.velocity[index]
+            if body != OBJECT:
+                row[6 + body] = message.effort[index]
+    return row
+
+
+def _changes(reader: Reader, scene: scenes.Scene) -> dict[int, dict[str, float]]:
+    changes: dict[int, dict[str, float]] = {}
+    for topic in CHANGES.values():
+        for tick, message in _messages(reader, topic, scene):
+            changes.setdefault(tick, {}).update(zip(message.name, message.position.tolist(), strict=True))
+    return changes

@@ -112,7 +112,8 @@ def _simulate(options: argparse.Namespace) -> int:
     scene = scenes.load(options.scene, options.settings)
     _prepare()
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
-    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=not options.sampled, delay=1.0) as bar:
+    quick = not (options.sampled or scene.sampled)
+    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
         trajectory = simulate(
             scene, grid=grid, sampled=options.sampled, accuracy=options.accuracy,
             progress=lambda reached: bar.update(reached - bar.n),
@@ -130,7 +131,7 @@ def _run(options: argparse.Namespace) -> int:
 
     scene = scenes.load(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
-    Integrator(scene.grasp, scene.initial_state, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
+    Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
     _prepare()
     graph = Graph(scene, directory, options.accuracy, progress=True)
     received: list[int] = []

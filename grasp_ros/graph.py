@@ -1,4 +1,4 @@
-"""Starts the four processes of the graph together, waits for them and stops them."""
+"""Starts the processes of the graph together, waits for them and stops them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class GraphError(RuntimeError):
 
 @dataclass
 class Graph:
-    """Four processes running one scene.
+    """The processes of one scene: plant, monitor and a controller for every arm that has one.
 
     Parameters
     ----------
@@ -70,8 +70,7 @@ class Graph:
         }
         settings = {
             "monitor": {"bag": json.dumps(str(self.bag))},
-            "left_controller": {"wait_for_monitor": "true"},
-            "right_controller": {"wait_for_monitor": "true"},
+            **{name: {"wait_for_monitor": "true"} for name in self.scene.controllers},
             "plant": {
                 "scene": json.dumps(str(scene_file)),
                 "accuracy": repr(float(self.accuracy)),

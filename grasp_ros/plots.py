@@ -11,7 +11,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
 
-from grasp_ros.physics.model import Array, Mode, energy
+from grasp_ros.physics.certificate import Energy
+from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
@@ -37,6 +38,10 @@ class Motion(Protocol):
     @property
     def command(self) -> Array:
         """Input forces (n, 2) in N."""
+
+    @property
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode."""
 
 
 def draw(motion: Motion, path: Path, caption: str) -> None:
@@ -86,7 +91,7 @@ def _limits(axes: Axes, paper: tuple[float, float], values: Array, label: str) -
 
 
 def _draw_energy(axes: Axes, motion: Motion) -> None:
-    level = energy(motion.scene.grasp, motion.state)
+    level = motion.energy
     axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$")
     axes.plot(motion.t, level.V, color="#cc79a7", linewidth=1.0, linestyle="--", label="$V$ of the paper")
     if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():

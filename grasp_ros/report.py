@@ -9,7 +9,8 @@ import numpy as np
 
 from grasp_ros.bag import Recording
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
-from grasp_ros.physics.model import Array, Mode, energy
+from grasp_ros.physics.model import Array, Mode
+from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
 
 Row = tuple[str, str]
@@ -24,7 +25,7 @@ def table(rows: Iterable[Row]) -> str:
 
 def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     """What happened in a simulation."""
-    level = energy(trajectory.scene.grasp, trajectory.state)
+    level = trajectory.energy
     touches = [len(trajectory.times(Event.TOUCH, side)) for side in (LEFT, RIGHT)]
     clamps = sum(len(trajectory.times(Event.CLAMP, side)) for side in (LEFT, RIGHT))
     rows = [
@@ -37,7 +38,8 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     ]
     if len(trajectory.t):
         rows.append(("V_c at both ends", _ends(level.V_c)))
-    return rows
+    rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
+    return _with_watch(trajectory.scene, rows)
 
 
 def describe_recording(recording: Recording) -> list[Row]:
@@ -54,36 +56,54 @@ def describe_recording(recording: Recording) -> list[Row]:
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
         ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items())),
     ]
+    for tick, numbers in recording.changes.items():
+        rows.append((f"set at {scene.time_of(tick):g} s", ", ".join(f"{name} {n:g}" for name, n in numbers.items())))
     if len(recording.tick):
         mode = recording.lyapunov[:, 3]
         begun = [_beginnings(mode, flag) for flag in (Mode.LEFT, Mode.RIGHT)]
         rows.insert(5, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
         rows.insert(6, ("V at both ends", _ends(recording.lyapunov[:, 0])))
         rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
-    return rows
+        alarms = int(np.nansum(recording.lyapunov[:, 5]))
+        rows.insert(8, ("certificate", scene.certificate_in_words(sampled=True)))
+        rows.insert(9, ("energy from nowhere", f"{alarms} alarms" if alarms else "none"))
+    return _with_watch(scene, rows)
+
+
+def _with_watch(scene: Scene, rows: list[Row]) -> list[Row]:
+    return [*rows, ("watch for", scene.watch)] if scene.watch else rows
 
 
 class Comparison(NamedTuple):
     """A recorded motion beside the same scene without ROS."""
 
     equal: bool  # to the sampled simulation, bit for bit
-    offset: Array  # (6,), largest distance from continuous feedback, m and m/s
+    offset: Array | None  # (6,), largest distance from continuous feedback, m and m/s; None if it has none of its own
 
     @property
     def rows(self) -> list[Row]:
         """For `table`."""
-        return [
-            ("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL"),
-            ("from continuous feedback", "at most x_l {:.3g}, x_o {:.3g}, x_r {:.3g} m".format(*self.offset[0::2])),
-        ]
+        rows = [("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL")]
+        if self.offset is not None:
+            far = ", ".join(
+                f"{name} {distance:.3g}"
+                for name, distance in zip(("x_l", "x_o", "x_r"), self.offset[0::2], strict=True)
+                if not np.isnan(distance)
+            )
+            rows.append(("from continuous feedback", f"at most {far} m"))
+        return rows
 
 
 def compare_recording(recording: Recording, accuracy: float) -> Comparison:
     """Simulate a recorded scene without ROS, with commands that are held and with the paper's continuous feedback."""
-    times = recording.t
-    same = simulate(recording.scene, sampled=True, grid=times, accuracy=accuracy)
-    ideal = simulate(recording.scene, grid=times, accuracy=accuracy)
-    equal = np.array_equal(same.state, recording.state) and np.array_equal(same.command, recording.command)
+    times, scene = recording.t, recording.scene
+    same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
+    equal = np.array_equal(same.state, recording.state, equal_nan=True) and np.array_equal(
+        same.command, recording.command
+    )
+    if scene.sampled or recording.changes:
+        return Comparison(equal, None)
+    ideal = simulate(scene, grid=times, accuracy=accuracy)
     return Comparison(equal, np.abs(ideal.state - recording.state).max(axis=0))
 
 

@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from zipfile import BadZipFile
 
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.effects.base import NANOSECONDS
+from grasp_ros.physics.certificate import Energy, energy
+from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
-from grasp_ros.physics.model import Array, energy, feedback
-from grasp_ros.scene import NANOSECONDS, Scene
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.scene import Scene
 
 GRID_POINTS = 2001
 Progress = Callable[[float], object] | None
+Changes = Mapping[int, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -30,7 +36,10 @@ class Trajectory:
         Whether the commands were held over control periods.
     t : array (n,), s
     state : array (n, 6), m and m/s
-        x_l, v_l, x_o, v_o, x_r, v_r.
+        x_l, v_l, x_o, v_o, x_r, v_r; NaN for a body that is not there.
+    command : array (n, 2), N
+        f_l, f_r: what the feedback answers to the states, (4), (5), or what sampled controllers answered last; 0
+        without a controller.
     switches : array (m, 5)
         Time in s, side, kind, u in m and u' in m/s of every switch, in the order of time; see `events`.
     work : array of int
@@ -42,14 +51,15 @@ class Trajectory:
     sampled: bool
     t: Array
     state: Array
+    command: Array
     switches: Array
     work: np.ndarray
     status: Status
 
     @property
-    def command(self) -> Array:
-        """Input forces f_l, f_r (n, 2) in N that the feedback answers to the states, (4), (5)."""
-        return np.stack(command(self.scene, self.state.T), axis=-1)
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode at the output times."""
+        return energy(self.scene.system, self.state)
 
     @property
     def events(self) -> list[SwitchEvent]:
@@ -69,7 +79,7 @@ class Trajectory:
         OSError
             If the file cannot be written.
         """
-        level = energy(self.scene.grasp, self.state)
+        level = self.energy
         with path.open("wb") as file:
             np.savez_compressed(
                 file, t=self.t, state=self.state, command=self.command, V=level.V, V_c=level.V_c, V_rate=level.V_rate,
@@ -93,7 +103,7 @@ def load(path: Path) -> Trajectory:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
             return Trajectory(
-                scene, bool(data["sampled"]), data["t"], data["state"], data["events"], data["work"],
+                scene, bool(data["sampled"]), data["t"], data["state"], data["command"], data["events"], data["work"],
                 Status[str(data["status"])],
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
@@ -107,6 +117,7 @@ def simulate(
     sampled: bool = False,
     accuracy: float = ACCURACY,
     max_events: int = 10**7,
+    changes: Changes = MappingProxyType({}),
     progress: Progress = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
@@ -118,12 +129,15 @@ def simulate(
         Ascending output times within the horizon. Default: 2001 equidistant ones, or every control period if the
         feedback is sampled.
     sampled : bool
-        False: feedback acts continuously, as in the paper. True: as in the graph, each command is computed from
-        the state at the beginning of a control period and held over it.
+        False: feedback acts continuously, as in the paper, unless the scene itself has a `loop`. True: as in the
+        graph, each command is computed from the state at the beginning of a control period and held over it.
     accuracy : float
         See `physics.integrator.Integrator`.
     max_events : int
         Budget of contact switches.
+    changes : mapping of int to mapping of str to float
+        Numbers of the scene by "section.key" that were set while it ran, by the tick from which they act; only for
+        sampled feedback.
     progress : callable, optional
         Called with the time reached, in s.
 
@@ -132,9 +146,8 @@ def simulate(
     ValueError
         If the accuracy is outside its range or the grid is not ascending within the horizon.
     """
-    integrator = Integrator(
-        scene.grasp, scene.initial_state, continuous=not sampled, accuracy=accuracy, max_events=max_events
-    )
+    sampled = sampled or scene.sampled
+    integrator = Integrator(scene.system, continuous=not sampled, accuracy=accuracy, max_events=max_events)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = np.asarray(grid, dtype=float)
@@ -142,12 +155,15 @@ def simulate(
         raise ValueError("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
         raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
-    states = (
-        _sampled(scene, integrator, grid, progress) if sampled else integrator.advance(scene.duration, grid)
-    )
-    grid = grid[: len(states)]
+    if sampled:
+        states, command = _sampled(scene, integrator, grid, changes, progress)
+    else:
+        states = _continuous(scene, integrator, grid)
+        command = scene.system.commands(0, states.T)[:2].T
+    states[:, _absent(scene.system)] = np.nan
     return Trajectory(
-        scene, sampled, grid, states, integrator.switches, integrator.work.copy(), integrator.status
+        scene, sampled, grid[: len(states)], states, command, integrator.switches, integrator.work.copy(),
+        integrator.status,
     )
 
 
@@ -156,25 +172,62 @@ def tick_times(scene: Scene) -> Array:
     return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
 
 
-def command(scene: Scene, state: Array) -> tuple[float, float]:
-    """Input forces f_l, f_r in N that the controllers answer to a state (6,)."""
-    grasp = scene.grasp
-    return feedback(grasp.left, state[0], state[1]), feedback(grasp.right, state[4], state[5])
+def _absent(system: System) -> list[int]:
+    """Columns of the state of bodies that are not there."""
+    gone = [column for body, column in COLUMN.items() if body not in system.present]
+    return [column + part for column in gone for part in (0, 1)]
 
 
-def _sampled(scene: Scene, integrator: Integrator, grid: Array, progress: Progress) -> Array:
-    period = scene.period_ns / NANOSECONDS
-    times = tick_times(scene)
-    # Each period [t_k, t_k+1) delivers its own outputs; a state at a tick is the one that the controllers see.
+def _continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:
+    system = scene.system
+    if not system.external:
+        return integrator.advance(scene.duration, grid)
+    changes = {tick for force in system.external for tick in force.changes(scene.ticks)}
+
+    def forces(tick: int) -> Array:
+        return system.external_at(tick)
+
+    return _piecewise(scene, integrator, grid, sorted({0, *changes, scene.ticks}), forces)
+
+
+def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress) -> tuple[
+    Array, Array
+]:
+    """States (n, 6), and the commands (n, 2) that the controllers gave last."""
+    system = scene.system
+    line = DelayLine(system.delay)
+    commands = np.empty((scene.ticks + 1, 2))
+
+    def forces(tick: int) -> Array:
+        nonlocal scene, system
+        if tick in changes:
+            scene = scene.changed(changes[tick])
+            system = scene.system
+        answers = system.commands(tick, integrator.state)
+        commands[tick] = answers[LEFT], answers[RIGHT]
+        if progress is not None and tick % 100 == 0:
+            progress(scene.time_of(tick))
+        return line.pass_on(answers) + system.external_at(tick)
+
+    states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
+    forces(scene.ticks)
+    latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
+    return states, commands[latest]
+
+
+def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],
+               forces: Callable[[int], Array]) -> Array:
+    """Integrate from tick to tick under forces (3,) that are held; each piece [t, t') delivers its own outputs."""
+    times = np.array([scene.time_of(tick) for tick in ticks])
     bounds = np.searchsorted(grid, times, side="left")
     rows = [np.empty((0, 6))]
-    for tick in range(scene.ticks):
-        integrator.hold(*command(scene, integrator.state))
-        inside = grid[bounds[tick] : bounds[tick + 1]]
-        rows.append(integrator.advance(period, np.clip(inside - times[tick], 0.0, period), times[tick]))
+    for piece, tick in enumerate(ticks[:-1]):
+        integrator.hold(forces(tick))
+        begin = times[piece]
+        length = scene.time_of(ticks[piece + 1] - tick)
+        inside = grid[bounds[piece] : bounds[piece + 1]]
+        rows.append(integrator.advance(length, np.clip(inside - begin, 0.0, length), begin))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
-        if progress is not None and tick % 100 == 0:
-            progress(times[tick])
     rows.append(np.repeat(integrator.state[None], len(grid) - bounds[-1], axis=0))
     return np.concatenate(rows)

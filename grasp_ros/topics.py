@@ -13,19 +13,24 @@ class Topic(NamedTuple):
 
     name: str
     type: str
-    latched: bool = False  # transient local: who comes later gets the last message
+    latched: bool = False  # transient local: who comes later gets what was sent before
+    depth: int = DEPTH
 
 
-JOINT_STATES = Topic("joint_states", "sensor_msgs/msg/JointState")
-LEFT_COMMAND = Topic("left/effort_command", "geometry_msgs/msg/WrenchStamped")
-RIGHT_COMMAND = Topic("right/effort_command", "geometry_msgs/msg/WrenchStamped")
-LEFT_CONTACT = Topic("contact/left", "geometry_msgs/msg/WrenchStamped")
-RIGHT_CONTACT = Topic("contact/right", "geometry_msgs/msg/WrenchStamped")
-LYAPUNOV = Topic("lyapunov", "sensor_msgs/msg/JointState")
-SCENE = Topic("scene", "std_msgs/msg/String", latched=True)
+FORCE = "geometry_msgs/msg/WrenchStamped"
+NAMED_LIST = "sensor_msgs/msg/JointState"
+JOINT_STATES = Topic("joint_states", NAMED_LIST)
+LEFT_COMMAND = Topic("left/effort_command", FORCE)
+RIGHT_COMMAND = Topic("right/effort_command", FORCE)
+LEFT_CONTACT = Topic("contact/left", FORCE)
+RIGHT_CONTACT = Topic("contact/right", FORCE)
+LYAPUNOV = Topic("lyapunov", NAMED_LIST)
+SCENE = Topic("scene", "std_msgs/msg/String", latched=True, depth=1)
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock")
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 
-PER_TICK = (JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, LEFT_CONTACT, RIGHT_CONTACT, LYAPUNOV)
-BODY_NAMES = ["left", "object", "right"]
-LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode"]
+COMMANDS = {"left": LEFT_COMMAND, "right": RIGHT_COMMAND}
+CONTACTS = {"left": LEFT_CONTACT, "right": RIGHT_CONTACT}
+EXTERNAL_FORCES = {name: Topic(f"external_force/{name}", FORCE) for name in ("left_arm", "object", "right_arm")}
+CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True) for side in ("left", "right")}
+LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm"]

@@ -14,9 +14,11 @@ import numpy as np
 from mpmath import mp, mpf
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics import certificate
 from grasp_ros.physics.integrator import ACCURACY, Integrator
 from grasp_ros.physics.layout import Event
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp, energy, penetration
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp, penetration
+from grasp_ros.physics.system import System
 from grasp_ros.reference import Reference, integrate
 
 mp.dps = 40
@@ -24,6 +26,11 @@ STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 ELASTIC = Arm(1.0, 10.0, 0.0, 5.0, 0.0)
 FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
 CASES = [f"case_{number:02d}" for number in range(1, 12)]
+
+
+def energy(grasp: Grasp, state: Array) -> certificate.Energy:
+    """V, V_c, V' and mode of the paper's grasp."""
+    return certificate.energy(System.of(grasp, np.zeros(6)), state)
 
 
 def make_grasp(
@@ -140,7 +147,7 @@ class Run(NamedTuple):
 def run(grasp: Grasp, state: Any, duration: float, grid: Any = None, **options: Any) -> Run:
     """Integrate with continuous feedback (unless told otherwise) over one horizon."""
     options = {"continuous": True, "accuracy": ACCURACY, **options}
-    integrator = Integrator(grasp, np.asarray(state, dtype=float), **options)
+    integrator = Integrator(System.of(grasp, np.asarray(state, dtype=float)), **options)
     return Run(integrator, integrator.advance(duration, None if grid is None else np.asarray(grid)))
 
 

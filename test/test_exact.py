@@ -17,6 +17,7 @@ from oracles import (
     FREE,
     STANDARD,
     Run,
+    energy,
     first_touch_from_rest,
     impact,
     ledger,
@@ -29,7 +30,8 @@ from oracles import (
 from grasp_ros import scene as scenes
 from grasp_ros.physics.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp, energy
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.system import System
 from grasp_ros.reference import integrate
 
 GRID = np.linspace(0.0, 20.0, 201)
@@ -670,7 +672,7 @@ def test_extreme_ratios_against_the_reference(object_mass: float, hertz: float) 
 def test_splitting_one_horizon_changes_nothing(name: str, pieces: int) -> None:
     scene = scenes.load(name)
     whole = run(scene.grasp, scene.initial_state, 5.0)
-    parts = Integrator(scene.grasp, scene.initial_state, continuous=True)
+    parts = Integrator(scene.system, continuous=True)
     for i in range(pieces):
         parts.advance(5.0 / pieces, start=5.0 * i / pieces)
     assert parts.status is Status.DONE
@@ -699,7 +701,7 @@ def test_repeated_and_empty_output_times() -> None:
 
 def test_advance_by_nothing_changes_nothing() -> None:
     scene = scenes.load("case_01")
-    integrator = Integrator(scene.grasp, scene.initial_state, continuous=True)
+    integrator = Integrator(scene.system, continuous=True)
     assert np.array_equal(integrator.advance(0.0, np.array([0.0])), scene.initial_state[None])
     assert np.array_equal(integrator.state, scene.initial_state)
 
@@ -726,19 +728,19 @@ def test_event_budget_beyond_the_kernel_rows() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
 def test_bad_durations_are_refused(bad: float) -> None:
     with pytest.raises(ValueError, match="duration"):
-        Integrator(make_grasp(), np.array(AT_REST), continuous=True).advance(bad)
+        Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
 
 
 @pytest.mark.parametrize("state", [AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST]])
 def test_bad_states_are_refused(state: Any) -> None:
     with pytest.raises(ValueError, match="six finite"):
-        Integrator(make_grasp(), np.array(state), continuous=True)
+        Integrator(System.of(make_grasp(), np.array(state)), continuous=True)
 
 
 @pytest.mark.parametrize("accuracy", [0.0, -1.0, 9e-17, 2e-3, math.nan])
 def test_bad_accuracies_are_refused(accuracy: float) -> None:
     with pytest.raises(ValueError, match="accuracy"):
-        Integrator(make_grasp(), np.array(AT_REST), continuous=True, accuracy=accuracy)
+        Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
 
 
 def test_held_forces_obey_the_work_theorem() -> None:
@@ -747,8 +749,8 @@ def test_held_forces_obey_the_work_theorem() -> None:
         left=STANDARD._replace(position_gain=0.0, velocity_gain=0.0),
         right=STANDARD._replace(position_gain=0.0, velocity_gain=0.0),
     )
-    integrator = Integrator(grasp, np.array(AT_REST), continuous=False)
-    integrator.hold(2.0, -3.0)
+    integrator = Integrator(System.of(grasp, np.array(AT_REST)), continuous=False)
+    integrator.hold(np.array([2.0, -3.0, 0.0]))
     integrator.advance(3.0)
     # the same with the force as a shifted spring's rest point: continuous feedback of the passive arm about f / k
     times = np.linspace(0.0, 3.0, 4)
@@ -763,7 +765,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.integrator import Integrator
 for name in ("case_01", "case_05"):
     scene = scenes.load(name)
-    integrator = Integrator(scene.grasp, scene.initial_state, continuous=True)
+    integrator = Integrator(scene.system, continuous=True)
     states = integrator.advance(scene.duration if len(sys.argv) > 1 else 2.0, np.linspace(0.0, 2.0, 21))
     print(*(value.hex() for value in states.ravel().tolist()))
     print(*(event.time.hex() for event in integrator.events))

@@ -24,9 +24,9 @@ from std_msgs.msg import String
 
 from grasp_ros import bag, scene
 from grasp_ros.nodes import messages
-from grasp_ros.physics.model import energy, impact_forces
-from grasp_ros.simulation import command, simulate
-from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, PER_TICK, RIGHT_COMMAND, SCENE
+from grasp_ros.physics.model import impact_forces
+from grasp_ros.simulation import simulate
+from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
 
 DEADLINE = 60.0
 START = [sys.executable, "-m", "grasp_ros.nodes.start"]
@@ -64,18 +64,22 @@ def test_two_runs_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:
 
 def test_bag_holds_every_tick_of_every_topic(two_runs: tuple[Path, Path]) -> None:
     recording = bag.read(two_runs[0] / "bag")
-    assert recording.missing == {topic.name: 0 for topic in PER_TICK}
+    assert recording.missing == {topic.name: 0 for topic in recording.scene.topics}
     assert recording.scene.values == scene.load("case_01", ["time.duration_s=3"]).values
     assert {"python", "numpy", "grasp_ros", "rclpy"} <= set(recording.versions)
 
 
 def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Path]) -> None:
     recording = bag.read(two_runs[0] / "bag")
-    level = energy(recording.scene.grasp, recording.state)
-    assert np.array_equal(recording.lyapunov, np.stack([*level[:3], level.mode.astype(float)], axis=1))
+    level = recording.energy
+    assert np.array_equal(recording.lyapunov[:, :4], np.stack([*level[:3], level.mode.astype(float)], axis=1))
+    assert (recording.lyapunov[:, 4] <= 1e-12).all()  # no energy from nowhere
+    assert recording.lyapunov[:, 4].sum() < -1.0  # what the impacts and dampers have taken
+    assert not recording.lyapunov[:, 5].any()
     assert set(recording.lyapunov[:, 3]) == {0.0, 1.0, 2.0, 3.0}
-    assert np.array_equal(recording.contact, np.stack(impact_forces(recording.scene.grasp, recording.state), axis=1))
-    assert recording.contact.max() > 10.0
+    for side, force in zip(("left", "right"), impact_forces(recording.scene.grasp, recording.state), strict=True):
+        assert np.array_equal(recording.outputs[f"contact/{side}"], force)
+        assert force.max() > 10.0
 
 
 def test_an_independent_reader_decodes_the_bag(two_runs: tuple[Path, Path]) -> None:
@@ -122,7 +126,7 @@ def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, mo
         recording = bag.read(recorded.parent)
         ticks = len(recording.tick)
         assert 100 < ticks < 20001
-        assert recording.counts == {topic.name: ticks for topic in PER_TICK}
+        assert recording.counts == {topic.name: ticks for topic in recording.scene.topics}
         assert np.array_equal(recording.tick, np.arange(ticks))
         full = simulate(scene.load("case_01"), sampled=True)
         assert full.state[:ticks].tobytes() == recording.state.tobytes()
@@ -219,9 +223,9 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(node: tuple[Any, Singl
     scenes: list[str] = []
 
     def answer(message: JointState) -> None:
-        states.append(messages.state_of(message))
+        states.append(messages.state_of(message)[0])
         now = messages.to_ns(message.header.stamp)
-        forces = command(expected.scene, states[-1])
+        forces = expected.scene.system.commands(now // 1_000_000, states[-1])
         for publisher in publishers:
             publisher.publish(messages.wrench(now - 1_000_000, 100.0))
             publisher.publish(messages.wrench(now, math.nan))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles import STANDARD, make_grasp
+from oracles import STANDARD, energy, make_grasp
 
 from grasp_ros.physics import layout
 from grasp_ros.physics.model import (
@@ -12,7 +12,6 @@ from grasp_ros.physics.model import (
     Grasp,
     Mode,
     acceleration,
-    energy,
     feedback,
     hertz_force,
     impact_force,

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from oracles import energy
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
-from grasp_ros.physics.model import Array, energy, feedback
+from grasp_ros.physics.model import Array, feedback
+from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate, tick_times
 
@@ -25,12 +27,12 @@ def scene_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001
 def plain_loop(scene: Scene) -> tuple[Array, Array]:
     """Sampled feedback as the graph does it: states and commands at the ticks."""
     grasp = scene.grasp
-    integrator = Integrator(grasp, scene.initial_state, continuous=False)
+    integrator = Integrator(System.of(grasp, scene.initial_state), continuous=False)
     states, forces = [integrator.state], []
     for _ in range(scene.ticks):
         x_l, v_l, _, _, x_r, v_r = integrator.state
         forces.append((feedback(grasp.left, x_l, v_l), feedback(grasp.right, x_r, v_r)))
-        integrator.hold(*forces[-1])
+        integrator.hold(np.array([*forces[-1], 0.0]))
         integrator.advance(scene.period_ns / 1e9)
         assert integrator.status is Status.DONE
         states.append(integrator.state)
@@ -40,7 +42,7 @@ def plain_loop(scene: Scene) -> tuple[Array, Array]:
 def test_continuous_is_the_integrator() -> None:
     scene = scene_of(duration=5.0)
     result = simulate(scene)
-    integrator = Integrator(scene.grasp, scene.initial_state, continuous=True)
+    integrator = Integrator(scene.system, continuous=True)
     states = integrator.advance(5.0, np.linspace(0.0, 5.0, GRID_POINTS))
     assert np.array_equal(result.state, states)
     assert result.events == integrator.events
@@ -126,7 +128,7 @@ def test_file_holds_everything(tmp_path: Path, name: str, sampled: bool) -> None
     path = tmp_path / "run.npz"
     result.save(path)
     with np.load(path, allow_pickle=False) as data:
-        level = energy(result.scene.grasp, result.state)
+        level = result.energy
         assert np.array_equal(data["t"], result.t)
         assert np.array_equal(data["state"], result.state)
         assert np.array_equal(data["command"], result.command)
@@ -243,8 +245,8 @@ def test_stability_limit_of_a_sampled_free_arm(gains: tuple[float, float], limit
                     "right_arm.stiffness_N_per_m=0",
                 ],
             )
-            integrator = Integrator(scene.grasp, np.array([*state, 1e6, 0.0, 2e6, 0.0]), continuous=False)
-            integrator.hold(feedback(scene.grasp.left, *state), 0.0)
+            integrator = Integrator(System.of(scene.grasp, np.array([*state, 1e6, 0.0, 2e6, 0.0])), continuous=False)
+            integrator.hold(np.array([feedback(scene.grasp.left, *state), 0.0, 0.0]))
             integrator.advance(period)
             assert integrator.events == []
             columns.append(integrator.state[:2])

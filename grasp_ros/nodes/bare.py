@@ -16,13 +16,14 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 from grasp_ros.nodes import messages
+from grasp_ros.physics.system import BODIES
 from grasp_ros.topics import (
     CLOCK,
     JOINT_STATES,
     LEFT_COMMAND,
     LEFT_CONTACT,
     LYAPUNOV,
-    PER_TICK,
+    LYAPUNOV_NAMES,
     RIGHT_COMMAND,
     RIGHT_CONTACT,
     Topic,
@@ -30,6 +31,7 @@ from grasp_ros.topics import (
 
 SETTLE_SECONDS = 4.0  # longer than discovery was ever seen to take
 PERIOD_NS = 1_000_000
+INPUTS = (JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, LEFT_CONTACT, RIGHT_CONTACT)
 COMMANDS = {"left_controller": LEFT_COMMAND, "right_controller": RIGHT_COMMAND}
 
 
@@ -49,17 +51,17 @@ class Bare(Node):
             self._subscribe(LYAPUNOV, lambda _: None, raw=True)
         elif name == "monitor":
             self._outputs = [self._publisher(LYAPUNOV)]
-            for topic in PER_TICK[:-1]:
+            for topic in INPUTS:
                 self._subscribe(topic, self._on_anything, raw=True)
         else:
             self._outputs = [self._publisher(COMMANDS[name])]
             self._subscribe(JOINT_STATES, self._on_state)
 
     def _publisher(self, topic: Topic) -> Any:
-        return self.create_publisher(messages.TYPES[topic], topic.name, messages.qos(topic))
+        return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
 
     def _subscribe(self, topic: Topic, callback: Any, raw: bool = False) -> None:
-        self.create_subscription(messages.TYPES[topic], topic.name, callback, messages.qos(topic), raw=raw)
+        self.create_subscription(messages.TYPES[topic.type], topic.name, callback, messages.qos(topic), raw=raw)
 
     def publish_state(self) -> None:
         """What the plant sends per tick."""
@@ -67,7 +69,7 @@ class Bare(Node):
         clock.publish(messages.clock(self._now_ns))
         left.publish(messages.wrench(self._now_ns, 0.0))
         right.publish(messages.wrench(self._now_ns, 0.0))
-        states.publish(messages.joint_state(self._now_ns, np.zeros(6), (0.0, 0.0)))
+        states.publish(messages.joint_state(self._now_ns, BODIES, np.zeros(6), np.zeros(3)))
 
     def _on_command(self, name: str, _: Any) -> None:
         self._heard.add(name)
@@ -83,8 +85,8 @@ class Bare(Node):
 
     def _on_anything(self, cdr: bytes) -> None:
         self._now_ns += 1
-        if self._now_ns % (len(PER_TICK) - 1) == 0:
-            self._outputs[0].publish(messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * 4))
+        if self._now_ns % len(INPUTS) == 0:
+            self._outputs[0].publish(messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
 
 
 def main(name: str, ticks: int) -> None:

@@ -19,43 +19,27 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from grasp_ros.effects.base import NANOSECONDS
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import NANOSECONDS
-from grasp_ros.topics import (
-    BODY_NAMES,
-    CLOCK,
-    DEPTH,
-    DIAGNOSTICS,
-    JOINT_STATES,
-    LEFT_COMMAND,
-    LEFT_CONTACT,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    RIGHT_COMMAND,
-    RIGHT_CONTACT,
-    SCENE,
-    Topic,
-)
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.topics import LYAPUNOV_NAMES, Topic
 
 TYPES = {
-    JOINT_STATES: JointState,
-    LEFT_COMMAND: WrenchStamped,
-    RIGHT_COMMAND: WrenchStamped,
-    LEFT_CONTACT: WrenchStamped,
-    RIGHT_CONTACT: WrenchStamped,
-    LYAPUNOV: JointState,
-    SCENE: String,
-    CLOCK: Clock,
-    DIAGNOSTICS: DiagnosticArray,
+    "sensor_msgs/msg/JointState": JointState,
+    "geometry_msgs/msg/WrenchStamped": WrenchStamped,
+    "std_msgs/msg/String": String,
+    "rosgraph_msgs/msg/Clock": Clock,
+    "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
 }
 _STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
 _CDR_HEADER = 4
+_TEXT_LENGTH = struct.Struct("<I")  # of the frame_id behind the stamp, with the final zero
 
 
 def qos(topic: Topic) -> QoSProfile:
     """Reliable everywhere: a lost message would stop the lockstep."""
     return QoSProfile(
-        depth=1 if topic.latched else DEPTH,
+        depth=topic.depth,
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE,
     )
@@ -77,42 +61,56 @@ def raw_stamp_ns(cdr: bytes) -> int:
     return int(sec * NANOSECONDS + nanosec)
 
 
-def joint_state(time_ns: int, state: Array, efforts: Sequence[float]) -> JointState:
-    """State (6,) and the input forces of the arms in N."""
-    message = JointState(name=BODY_NAMES)
+def raw_frame_id(cdr: bytes) -> str:
+    """frame_id of a serialized stamped message, without deserializing it."""
+    begin = _CDR_HEADER + _STAMP.size
+    (length,) = _TEXT_LENGTH.unpack_from(cdr, begin)
+    begin += _TEXT_LENGTH.size
+    return cdr[begin : begin + length - 1].decode()
+
+
+def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array) -> JointState:
+    """State (6,) of some bodies, and the input forces (3,) in N by body."""
+    message = JointState(name=[NAMES[body] for body in bodies])
     message.header.stamp = to_time(time_ns)
-    message.position = array("d", state[0::2])
-    message.velocity = array("d", state[1::2])
-    message.effort = array("d", (efforts[0], 0.0, efforts[1]))
+    message.position = array("d", [state[COLUMN[body]] for body in bodies])
+    message.velocity = array("d", [state[COLUMN[body] + 1] for body in bodies])
+    message.effort = array("d", [inputs[body] for body in bodies])
     return message
 
 
-def state_of(message: JointState) -> Array:
-    """State (6,) of a `joint_state`, by the names of the bodies.
+def state_of(message: JointState) -> tuple[Array, Array]:
+    """State (6,) and input forces (3,) by body of a `joint_state`; NaN and 0 for bodies that it does not name."""
+    state, inputs = np.full(6, np.nan), np.zeros(3)
+    for body, name in NAMES.items():
+        if name in message.name:
+            row = message.name.index(name)
+            state[COLUMN[body] : COLUMN[body] + 2] = message.position[row], message.velocity[row]
+            inputs[body] = message.effort[row]
+    return state, inputs
 
-    Raises
-    ------
-    ValueError
-        If a body is missing.
-    """
-    rows = [message.name.index(name) for name in BODY_NAMES]
-    return np.array([number for row in rows for number in (message.position[row], message.velocity[row])])
 
-
-def wrench(time_ns: int, force: float) -> WrenchStamped:
+def wrench(time_ns: int, force: float, frame_id: str = "") -> WrenchStamped:
     """A force along the line in N."""
     message = WrenchStamped()
     message.header.stamp = to_time(time_ns)
+    message.header.frame_id = frame_id
     message.wrench.force.x = float(force)
     return message
 
 
-def lyapunov(time_ns: int, values: Sequence[float]) -> JointState:
-    """V, V_c, V_rate and mode as a named, stamped list that plotters show by name."""
-    message = JointState(name=LYAPUNOV_NAMES)
+def named_list(time_ns: int, names: Sequence[str], values: Sequence[float], frame_id: str = "") -> JointState:
+    """A stamped list of numbers with names, which plotters show by name."""
+    message = JointState(name=list(names))
     message.header.stamp = to_time(time_ns)
-    message.position = array("d", values)
+    message.header.frame_id = frame_id
+    message.position = array("d", [float(value) for value in values])
     return message
+
+
+def lyapunov(time_ns: int, values: Sequence[float]) -> JointState:
+    """What the monitor computes at a tick, see `topics.LYAPUNOV_NAMES`."""
+    return named_list(time_ns, LYAPUNOV_NAMES, values)
 
 
 def clock(time_ns: int) -> Clock:

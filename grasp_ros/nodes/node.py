@@ -7,16 +7,19 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.nodes import messages
+from grasp_ros.parameters import Parameter
+from grasp_ros.scene import Scene
 from grasp_ros.topics import DIAGNOSTICS, Topic
 
 POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
@@ -28,7 +31,9 @@ UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 
 
 class GraspNode(Node):
-    """A node with read-only parameters, counters on /diagnostics and an end."""
+    """A node with parameters, counters on /diagnostics and an end."""
+
+    why_read_only = "set at the start only, with -p or a parameter file"
 
     def __init__(self, name: str) -> None:
         super().__init__(name)
@@ -47,13 +52,42 @@ class GraspNode(Node):
         value = self.declare_parameter(name, default, descriptor).value
         return float(value) if number else value
 
+    def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
+        """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
+
+        The types are dynamic so that an integer will do for a floating-point number.
+        """
+        given = {}
+        for effect in scene.effects:
+            for parameter in effect.parameters if effect.node == executable else ():
+                if parameter.key not in scene.values[effect.section]:
+                    continue
+                name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
+                default = list(value) if parameter.several else value
+                found = self.declare_parameter(name, default, _descriptor(parameter)).value
+                if parameter.several:
+                    found = list(found)
+                if found != default:
+                    given[name] = found
+        return given
+
+    def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Set parameters; integers become floating-point numbers, and a refusal says why."""
+        numbers = []
+        for parameter in parameter_list:
+            if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
+                return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
+            whole = isinstance(parameter.value, int) and not isinstance(parameter.value, bool)
+            numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
+        return super().set_parameters_atomically(numbers)
+
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the graph."""
-        return self.create_publisher(messages.TYPES[topic], topic.name, messages.qos(topic))
+        return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
 
     def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> None:
         """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
-        self.create_subscription(messages.TYPES[topic], topic.name, callback, messages.qos(topic), raw=raw)
+        self.create_subscription(messages.TYPES[topic.type], topic.name, callback, messages.qos(topic), raw=raw)
 
     def wall_timer(self, seconds: float, callback: Callable[[], None]) -> Any:
         """Timer on wall time: simulated time waits for the nodes, so no node may wait for it."""
@@ -104,6 +138,17 @@ class GraspNode(Node):
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """What `ros2 param describe` shows of a number of the scene."""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.text}, in {parameter.unit}", additional_constraints=f"allowed: {parameter.allowed}",
+        read_only=not parameter.live, dynamic_typing=True,
+    )
+    if not parameter.whole and not parameter.several:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
+    return descriptor
 
 
 def run(make: Callable[[], GraspNode], received: Sequence[int]) -> int:

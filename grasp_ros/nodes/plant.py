@@ -12,58 +12,55 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
+from grasp_ros.effects.base import NANOSECONDS
 from grasp_ros.nodes import messages
 from grasp_ros.nodes.node import GraspNode, run
+from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, compile_kernels
 from grasp_ros.physics.jit import COMPILING, kernels_on_disk
-from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.model import impact_forces
-from grasp_ros.topics import (
-    CLOCK,
-    JOINT_STATES,
-    LEFT_COMMAND,
-    LEFT_CONTACT,
-    LYAPUNOV,
-    RIGHT_COMMAND,
-    RIGHT_CONTACT,
-    SCENE,
-    WINDOW,
-)
+from grasp_ros.physics.model import Array
+from grasp_ros.topics import CLOCK, JOINT_STATES, LYAPUNOV, SCENE, WINDOW
+
+UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
 
 class Plant(GraspNode):
-    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress."""
+    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, and those of the scene."""
+
+    why_read_only = "it describes what is simulated, which does not change in a run; set it in the scene or with -p"
 
     def __init__(self) -> None:
         super().__init__("plant")
-        scene = self.read_only("scene", "case_01", "name of a scene of the package, or path of a .yaml file")
+        name = self.read_only("scene", "case_01", "name of a scene of the package, or path of a .yaml file")
         accuracy = self.read_only("accuracy", ACCURACY, "relative size of the first neglected term of a contact")
         self._monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
         progress = self.read_only("progress", False, "show a progress bar on the terminal")
-        self._scene = scenes.load(scene)
+        scene = scenes.load(name)
+        self._scene = scene.changed(self.declare_scene(scene, "plant"))
+        self._system = self._scene.system
         if not kernels_on_disk():
             self.get_logger().info(COMPILING)
         compile_kernels()
-        self._integrator = Integrator(
-            self._scene.grasp, self._scene.initial_state, continuous=False, accuracy=accuracy
-        )
+        self._integrator = Integrator(self._system, continuous=False, accuracy=accuracy)
         self._tick = 0
         self._recorded = -1  # last tick that the monitor has complete
-        self._commands: list[float | None] = [None, None]
-        self._applied = (0.0, 0.0)
+        self._line = DelayLine(self._system.delay)
+        self._commands: dict[int, float] = {}
+        self._inputs = np.zeros(3)
         self._begin = math.nan
         self.counters.update(tick=0, **{"stale commands": 0, "repeated commands": 0, "refused commands": 0})
         self._bar = tqdm(total=self._scene.ticks, unit="tick", desc=self._scene.name, disable=not progress)
         self._states = self.publisher(JOINT_STATES)
-        self._contacts = (self.publisher(LEFT_CONTACT), self.publisher(RIGHT_CONTACT))
+        self._forces = [(self.publisher(output.topic), output.value) for output in self._scene.outputs]
         self._simulated = self.publisher(CLOCK)
         self._description = self.publisher(SCENE)
         self._description.publish(messages.text(self._scene.to_yaml()))
-        self.subscribe(LEFT_COMMAND, partial(self._on_command, LEFT))
-        self.subscribe(RIGHT_COMMAND, partial(self._on_command, RIGHT))
+        for side, topic in zip(self._system.laws, self._scene.controllers.values(), strict=True):
+            self.subscribe(topic, partial(self._on_command, side))
         if self._monitored:
             self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         if progress:
@@ -83,22 +80,24 @@ class Plant(GraspNode):
     def _ready(self) -> bool:
         self._insist()
         monitor = [LYAPUNOV] if self._monitored else []
-        return self.linked(self._states, [LEFT_COMMAND, RIGHT_COMMAND, *monitor]) and all(
-            self.linked(publisher, monitor) for publisher in self._contacts
+        return self.linked(self._states, [*self._scene.controllers.values(), *monitor]) and all(
+            self.linked(publisher, monitor) for publisher, _ in self._forces
         )
 
     def _start(self) -> None:
         self.state = "running"
         self._begin = time.monotonic()
         self._publish()
+        if not self._system.laws:  # no command will ever come
+            self.wall_timer(UNCONTROLLED_SECONDS, self._advance)
 
     def _publish(self) -> None:
         time_ns = self._tick * self._scene.period_ns
         state = self._integrator.state
         self._simulated.publish(messages.clock(time_ns))
-        for publisher, force in zip(self._contacts, impact_forces(self._scene.grasp, state), strict=True):
-            publisher.publish(messages.wrench(time_ns, float(force)))
-        self._states.publish(messages.joint_state(time_ns, state, self._applied))
+        for publisher, value in self._forces:
+            publisher.publish(messages.wrench(time_ns, value(self._system, self._tick, state)))
+        self._states.publish(messages.joint_state(time_ns, self._system.present, state, self._inputs))
 
     def _on_command(self, side: int, message: Any) -> None:
         force = message.wrench.force.x
@@ -106,7 +105,7 @@ class Plant(GraspNode):
             self.count("stale commands")
         elif not math.isfinite(force):
             self.count("refused commands")
-        elif self._commands[side] is not None:
+        elif side in self._commands:
             self.count("repeated commands")
         else:
             self._commands[side] = force
@@ -117,25 +116,31 @@ class Plant(GraspNode):
         self._advance()
 
     def _advance(self) -> None:
-        left, right = self._commands
         last = self._tick == self._scene.ticks
         lead = 0 if last else WINDOW
-        if left is None or right is None or (self._monitored and self._tick - self._recorded > lead):
+        complete = len(self._commands) == len(self._system.laws)
+        if self.finished or not complete or (self._monitored and self._tick - self._recorded > lead):
             return
         if last:
             self._finish()
             return
-        self._integrator.hold(left, right)
-        self._integrator.advance(self._scene.period_ns / scenes.NANOSECONDS, start=self._scene.time_of(self._tick))
+        self._inputs = self._line.pass_on(self._take_commands())
+        self._integrator.hold(self._inputs + self._system.external_at(self._tick))
+        self._integrator.advance(self._scene.period_ns / NANOSECONDS, start=self._scene.time_of(self._tick))
         if self._integrator.status is not Status.DONE:
             state = self._integrator.state.tolist()
             self._fail(f"{self._integrator.status.value}, t = {self._scene.time_of(self._tick)} s, state {state}")
             return
-        self._applied = (left, right)
-        self._commands = [None, None]
         self._tick += 1
         self.counters["tick"] = self._tick
         self._publish()
+
+    def _take_commands(self) -> Array:
+        forces = np.zeros(3)
+        for side, force in self._commands.items():
+            forces[side] = force
+        self._commands.clear()
+        return forces
 
     def _finish(self) -> None:
         self.state = "finished"
@@ -157,7 +162,7 @@ class Plant(GraspNode):
         self._show()
         self._bar.close()
         if self.finished:
-            self.flush(self._states, *self._contacts)
+            self.flush(self._states, *(publisher for publisher, _ in self._forces))
 
 
 def main(_: str, received: Sequence[int]) -> int:

@@ -26,6 +26,7 @@ from grasp_ros.physics.layout import (
 from grasp_ros.physics.polynomial import evaluate, first_rise, invert_time
 from grasp_ros.physics.series import D_L, E_L, TIME, W_L, W_R, expand_both, expand_one, state_at, step_size
 from grasp_ros.physics.switching import (
+    ABSENT,
     CLAMP,
     CLAMPED,
     CONTACT,
@@ -66,7 +67,7 @@ def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: An
     sign = 1.0 if side == LEFT else -1.0
     d, _ = relative_motion(bodies, y, side)
     start = (y[U_L + side], d)
-    if mode[side] == HELD:
+    if mode[side] == HELD or mode[side] == ABSENT:
         return math.inf, TOUCH
     if mode[side] == OPEN:
         return flight_root(TOUCH_ROOT, bodies[side], bodies[OBJECT], arm, body, start, sign, 0.0, span, work), TOUCH
@@ -138,7 +139,7 @@ def contact_switch(c: Any, pairs: Any, mode: Any, side: int, n: int, h: float, w
     loss = pairs[side, DISSIPATION]
     if mode[side] == OPEN:
         return first_rise(c[U_L + side], 1.0, 0.0, n, h, work), TOUCH
-    if mode[side] == HELD:
+    if mode[side] == HELD or mode[side] == ABSENT:
         return math.inf, TOUCH
     depth = c[W_L + side] if mode[side] == CONTACT else c[U_L + side]
     released = first_rise(depth, -1.0, 0.0, n, h, work)

@@ -10,13 +10,8 @@ import numpy as np
 
 from grasp_ros.physics import hybrid, switching
 from grasp_ros.physics.layout import (
-    DAMPING,
     FORCE,
-    LEFT,
     MASS,
-    OBJECT,
-    RIGHT,
-    STIFFNESS,
     U_L,
     U_R,
     Event,
@@ -25,6 +20,7 @@ from grasp_ros.physics.layout import (
 )
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.series import new_tables, series_order
+from grasp_ros.physics.system import System
 
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
@@ -63,15 +59,13 @@ _STATUS = {
 
 
 class Integrator:
-    """Integrates one grasp from its initial state, in pieces of any length.
+    """Integrates one system from its initial state, in pieces of any length.
 
     Parameters
     ----------
-    grasp : Grasp
-    state : array (6,), m and m/s
-        x_l, v_l, x_o, v_o, x_r, v_r.
+    system : System
     continuous : bool
-        True: the paper's feedback acts all the time, (4), (5). False: the arms get the forces of `hold`.
+        True: the feedback acts all the time, (4), (5). False: the arms get the forces of `hold` only.
     accuracy : float
         Size of the first neglected Taylor term of a contact relative to the impact, in [1e-16, 1e-3].
     max_events : int
@@ -84,25 +78,21 @@ class Integrator:
     """
 
     def __init__(
-        self, grasp: Grasp, state: Array, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = 10**7
+        self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = 10**7
     ) -> None:
         if not FINEST <= accuracy <= COARSEST:
             raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
-        state = np.asarray(state, dtype=float)
+        state = system.state
         if state.shape != (6,) or not np.isfinite(state).all():
             raise ValueError(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._accuracy = accuracy
         self._max_events = max_events
-        self._bodies = np.zeros((3, 4))
-        for row, arm in ((LEFT, grasp.left), (RIGHT, grasp.right)):
-            gains = (arm.position_gain, arm.velocity_gain) if continuous else (0.0, 0.0)
-            self._bodies[row, MASS] = arm.mass
-            self._bodies[row, STIFFNESS] = arm.stiffness + gains[0]
-            self._bodies[row, DAMPING] = arm.damping + gains[1]
-        self._bodies[OBJECT, MASS] = grasp.object_mass
-        self._pairs = np.array([grasp.left_contact, grasp.right_contact])
+        self._bodies = system.closed_loop if continuous else system.bodies.copy()
+        self._bodies[self._bodies[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
+        self._own_forces = self._bodies[:, FORCE].copy()
+        self._pairs = system.pairs.copy()
         self._y = np.concatenate([state, [state[0] - state[2], state[2] - state[4]]])
         self._mode = np.zeros(2, dtype=np.int64)
         self._tables = new_tables(series_order(accuracy))
@@ -131,10 +121,9 @@ class Integrator:
         """The rows of `switches` as records."""
         return to_events(self.switches)
 
-    def hold(self, force_left: float, force_right: float) -> None:
-        """Set the constant input forces of the arms in N, for feedback that is sampled."""
-        self._bodies[LEFT, FORCE] = force_left
-        self._bodies[RIGHT, FORCE] = force_right
+    def hold(self, forces: Array) -> None:
+        """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
+        self._bodies[:, FORCE] = self._own_forces + forces
 
     def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
         """Integrate for `duration` seconds.
@@ -187,4 +176,4 @@ def compile_kernels() -> None:
     """Compile the kernels, or load them from disk, by integrating over no time at all."""
     arm = Arm(1.0, 1.0, 0.0, 0.0, 0.0)
     contact = Contact(1.0, 0.0)
-    Integrator(Grasp(arm, arm, contact, contact, 1.0), np.zeros(6), continuous=False).advance(0.0)
+    Integrator(System.of(Grasp(arm, arm, contact, contact, 1.0), np.zeros(6)), continuous=False).advance(0.0)

@@ -27,6 +27,7 @@ class Pair(IntEnum):
     CLAMPED = 2  # u > 0 and u' < -1/p: no force, may re-enter
     LEAVING = 3  # u > 0, separating, the rest of its impulse is below the tolerance
     HELD = 4  # u = 0 with no direction yet, the first of its impulse is below the tolerance
+    ABSENT = 5  # a body is missing, or its contact: never any force
 
 
 class Event(IntEnum):

@@ -56,15 +56,6 @@ class Mode(IntFlag):
     BOTH = 3
 
 
-class Energy(NamedTuple):
-    """The paper's V (16), its continuous repair V_c, the rate V' (18) and the contact mode."""
-
-    V: Array  # twice the energy without the clamped pairs, J
-    V_c: Array  # twice the energy, J
-    V_rate: Array  # W
-    mode: NDArray[np.int64]  # Mode
-
-
 def feedback(arm: Arm, x: float, v: float) -> float:
     """Input force of the linear state feedback in N, (4), (5)."""
     return -arm.position_gain * x - arm.velocity_gain * v
@@ -115,40 +106,3 @@ def acceleration(grasp: Grasp, state: Array) -> tuple[Array, Array, Array]:
     f_l = -left.stiffness * x_l - left.damping * v_l + feedback(left, x_l, v_l)
     f_r = -right.stiffness * x_r - right.damping * v_r + feedback(right, x_r, v_r)
     return (f_l - fw_l) / left.mass, (fw_l - fw_r) / grasp.object_mass, (f_r + fw_r) / right.mass
-
-
-def energy(grasp: Grasp, state: Array) -> Energy:
-    """V, V_c, V' and the contact mode of states (..., 6).
-
-    V drops the elastic term of a pair that separates faster than 1/p while u > 0 and takes it up again
-    later, so it can jump; V_c keeps the term whenever u >= 0 and never increases under continuous feedback.
-    In such a pair V' has the term 2 H u^(3/2) u', which is the rate of V_c.
-
-    Parameters
-    ----------
-    grasp : Grasp
-    state : array (..., 6), m and m/s
-        x_l, v_l, x_o, v_o, x_r, v_r.
-    """
-    x_l, v_l, _, v_o, x_r, v_r = np.moveaxis(np.asarray(state, dtype=float), -1, 0)
-    left, right = grasp.left, grasp.right
-    kinetic = left.mass * v_l * v_l + grasp.object_mass * v_o * v_o + right.mass * v_r * v_r
-    springs = (left.stiffness + left.position_gain) * x_l * x_l + (right.stiffness + right.position_gain) * x_r * x_r
-    V = kinetic + springs
-    V_c = V
-    damping = (left.damping + left.velocity_gain) * v_l * v_l + (right.damping + right.velocity_gain) * v_r * v_r
-    V_rate = -2.0 * damping
-    mode = np.zeros(np.shape(V), dtype=np.int64)
-    u_l, d_l, u_r, d_r = penetration(state)
-    for flag, contact, u, d in (
-        (Mode.LEFT, grasp.left_contact, u_l, d_l),
-        (Mode.RIGHT, grasp.right_contact, u_r, d_r),
-    ):
-        force = hertz_force(contact, u)
-        touching = in_contact(contact, u, d)
-        stored = 0.8 * force * u  # a = b = 4/5, (19)
-        V_c = V_c + stored
-        V = V + np.where(touching, stored, 0.0)
-        V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
-        mode = mode | np.where(touching, int(flag), 0)
-    return Energy(V, V_c, V_rate, mode)

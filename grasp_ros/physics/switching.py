@@ -25,7 +25,7 @@ from grasp_ros.physics.layout import (
     Pair,
 )
 
-OPEN, CONTACT, CLAMPED, LEAVING, HELD = (int(p) for p in Pair)
+OPEN, CONTACT, CLAMPED, LEAVING, HELD, ABSENT = (int(p) for p in Pair)
 TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in Event)
 GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
 
@@ -43,6 +43,8 @@ def relative_motion(bodies: Any, y: Any, side: int) -> Any:
 @kernel
 def judge(bodies: Any, pairs: Any, y: Any, side: int, other_in_contact: bool) -> int:
     """Mode of a pair from its state alone: condition (10), and at u = 0 the direction of the motion."""
+    if pairs[side, HERTZ] == 0.0:
+        return ABSENT
     u = y[U_L + side]
     d, a = relative_motion(bodies, y, side)
     if u < 0.0:

@@ -1,0 +1,27 @@
+"""The effects that a scene can name: one file each, and one line each here.
+
+The order is that of the topics in a bag and that in which effects build the system.
+"""
+
+from grasp_ros.effects import (
+    bodies,
+    contact,
+    feedback,
+    force,
+    loop,
+    saturation,
+    sensing,
+    time,
+)
+
+EFFECTS = (
+    *time.EFFECTS,
+    *bodies.EFFECTS,
+    *feedback.EFFECTS,
+    *contact.EFFECTS,
+    *loop.EFFECTS,
+    *sensing.EFFECTS,
+    *saturation.EFFECTS,
+    *force.EFFECTS,
+)
+BY_SECTION = {effect.section: effect for effect in EFFECTS}

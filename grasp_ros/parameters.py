@@ -1,0 +1,55 @@
+"""What one number of a scene is: its key with the unit, its range and its text."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+UNITS = {  # endings of keys; the longest that fits counts
+    "_kg": "kg", "_m": "m", "_s": "s", "_N": "N", "_Hz": "Hz", "_rad": "rad", "_m_per_s": "m/s", "_m_per_s2": "m/s^2",
+    "_N_per_m": "N/m", "_Ns_per_m": "N s/m", "_N_per_m1_5": "N/m^1.5", "_s_per_m": "s/m", "_ticks": "control periods",
+    "_seed": "1",
+}
+
+
+class Parameter(NamedTuple):
+    """One number of a scene, or one list of numbers."""
+
+    key: str  # ends with its unit
+    low: float
+    high: float
+    text: str
+    open_low: bool = False  # whether low itself is excluded
+    optional: bool = False  # without it, what it describes is not there
+    live: bool = False  # whether it may be set while the graph runs
+    whole: bool = False
+    several: bool = False
+
+    @property
+    def unit(self) -> str:
+        """The unit of the key's ending."""
+        return UNITS[max((ending for ending in UNITS if self.key.endswith(ending)), key=len)]
+
+    @property
+    def allowed(self) -> str:
+        """The range in words."""
+        kind = "a whole number" if self.whole else "a number"
+        span = f"{kind} {'>' if self.open_low else '>='} {self.low:g} and <= {self.high:g}"
+        return f"a list, each {span}" if self.several else span
+
+    def accepts(self, value: Any) -> bool:
+        """Whether a value from a file is of the right kind and in the range; NaN is in no range."""
+        if self.several:
+            return isinstance(value, (list, tuple)) and bool(value) and all(self._accepts_one(v) for v in value)
+        return self._accepts_one(value)
+
+    def read(self, value: Any) -> Any:
+        """An accepted value as float, int or tuple of floats."""
+        if self.several:
+            return tuple(float(entry) for entry in value)
+        return int(value) if self.whole else float(value)
+
+    def _accepts_one(self, value: Any) -> bool:
+        kinds = (int,) if self.whole else (int, float)
+        if not isinstance(value, kinds) or isinstance(value, bool):
+            return False
+        return bool((self.low < value if self.open_low else self.low <= value) and value <= self.high)

@@ -1,0 +1,147 @@
+"""The energy of a system: the paper's V, its continuous repair V_c, V', and the ledger of held commands.
+
+A linear term of a body brings its energy by itself: stiffness k and constant force f, of the arm or of the feedback,
+are the potential k (x - f/k)^2. V_c is known up to a constant where a body has a force but no spring.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.model import Array, Contact, Mode, hertz_force, in_contact, penetration
+from grasp_ros.physics.system import COLUMN, System
+
+FLAGS = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
+EPS = 2.220446049250313e-16
+ROUNDING = 1e-12  # part of the energy that rounding may add in one control period
+
+
+class Energy(NamedTuple):
+    """The paper's V (16), its continuous repair V_c, the rate V' (18) and the contact mode."""
+
+    V: Array  # twice the energy without the clamped pairs, J
+    V_c: Array  # twice the energy, J
+    V_rate: Array  # W
+    mode: NDArray[np.int64]  # Mode
+
+
+def energy(system: System, state: Array, external: Array | None = None) -> Energy:
+    """V, V_c, V' and the contact mode of states (..., 6) under continuous feedback.
+
+    V drops the elastic term of a pair that separates faster than 1/p while u > 0 and takes it up again later, so it
+    can jump; V_c keeps the term whenever u >= 0 and never increases but by the work of external forces. In such a
+    pair V' has the term 2 H u^(3/2) u', which is the rate of V_c.
+
+    Parameters
+    ----------
+    system : System
+    state : array (..., 6), m and m/s
+        x_l, v_l, x_o, v_o, x_r, v_r; columns of bodies that are not there are not read.
+    external : array (3,), N, optional
+        External forces by body; only V' depends on them.
+    """
+    state = np.asarray(state, dtype=float)
+    bodies = system.closed_loop
+    V = _mechanical(system, bodies, state)
+    V_c = V
+    V_rate = _power(system, bodies, state, external)
+    mode = np.zeros(np.shape(V), dtype=np.int64)
+    for side, u, d in _pairs(system, state):
+        contact = Contact(*system.pairs[side])
+        force = hertz_force(contact, u)
+        touching = in_contact(contact, u, d)
+        stored = 0.8 * force * u  # a = b = 4/5, (19)
+        V_c = V_c + stored
+        V = V + np.where(touching, stored, 0.0)
+        V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
+        mode = mode | np.where(touching, int(FLAGS[side]), 0)
+    return Energy(V, V_c, V_rate, mode)
+
+
+class Ledger(NamedTuple):
+    """What became of the energy over one control period, in J of V."""
+
+    rise: float  # of twice the energy of the plant by itself
+    work: float  # twice the work of the forces that were held
+    rounding: float  # what rounding may add
+
+    @property
+    def unexplained(self) -> float:
+        """Rise that no work explains; dissipation makes it negative."""
+        return self.rise - self.work
+
+    @property
+    def alarm(self) -> bool:
+        """Whether energy came from nowhere; also if it is not a number."""
+        return not self.unexplained <= self.rounding
+
+
+def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger:
+    """Balance of the energy between two states (6,) under held forces (3,) in N, by body.
+
+    Along any motion E(after) - E(before) = sum f (x_after - x_before) - dissipation, with E from the plant's own k,
+    its constant forces and the contacts. It holds for any delay, saturation or jitter of the commands, because the
+    work of a held force needs no more than both ends.
+    """
+    levels = []
+    rounding = 0.0
+    for state in (before, after):
+        level = float(_mechanical(system, system.bodies, state))
+        for side, u, _ in _pairs(system, state):
+            force = float(hertz_force(Contact(*system.pairs[side]), u))
+            level += 0.8 * force * float(u)
+            rounding += 8.0 * EPS * force * (abs(state[COLUMN[side]]) + abs(state[COLUMN[OBJECT]]))
+        levels.append(level)
+        rounding += ROUNDING * _size(system, state)
+    moved = {body: float(after[COLUMN[body]] - before[COLUMN[body]]) for body in system.present}
+    work = sum(2.0 * float(forces[body]) * distance for body, distance in moved.items())
+    rounding += sum(8.0 * EPS * abs(float(forces[body])) * abs(float(after[COLUMN[body]])) for body in moved)
+    return Ledger(levels[1] - levels[0], work, rounding)
+
+
+def _mechanical(system: System, bodies: Array, state: Array) -> Array:
+    """Kinetic energy and potential of the linear terms, twice."""
+    kinetic: Array = np.zeros(np.shape(state)[:-1])
+    potential: Array = np.zeros(np.shape(state)[:-1])
+    for body in system.present:
+        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
+        stiffness, force = bodies[body, STIFFNESS], bodies[body, FORCE]
+        kinetic = kinetic + bodies[body, MASS] * v * v
+        if stiffness > 0.0:
+            potential = potential + stiffness * (x - force / stiffness) * (x - force / stiffness)
+        elif force != 0.0:
+            potential = potential - 2.0 * force * x
+    return kinetic + potential
+
+
+def _size(system: System, state: Array) -> float:
+    """Sum of the sizes of the terms of `_mechanical`."""
+    total = 0.0
+    for body in system.present:
+        x, v = float(state[COLUMN[body]]), float(state[COLUMN[body] + 1])
+        mass, stiffness, _, force = system.bodies[body]
+        total += mass * v * v + stiffness * x * x + 2.0 * abs(force * x)
+    return total
+
+
+def _power(system: System, bodies: Array, state: Array, external: Array | None) -> Array:
+    """V' without the contacts."""
+    loss: Array = np.zeros(np.shape(state)[:-1])
+    for body in system.present:
+        v = state[..., COLUMN[body] + 1]
+        loss = loss + bodies[body, DAMPING] * v * v
+        if body == OBJECT and system.coulomb > 0.0:
+            loss = loss + system.coulomb * np.abs(v)
+        if external is not None and external[body] != 0.0:
+            loss = loss - external[body] * v
+    return -2.0 * loss
+
+
+def _pairs(system: System, state: Array) -> list[tuple[int, Array, Array]]:
+    u_l, d_l, u_r, d_r = penetration(state)
+    found = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
+    return [(side, *found[side]) for side in system.contacts]

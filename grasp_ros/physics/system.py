@@ -1,0 +1,120 @@
+"""What a scene simulates, as arrays: bodies, pairs, friction, controllers and external forces.
+
+The effects of a scene put it together, see `grasp_ros.effects`. What no effect has named has no mass, no stiffness of
+contact, no controller and no force here, and is not simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.layout import DAMPING, FORCE, HERTZ, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.model import Array, Grasp
+
+BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
+NAMES = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
+COLUMN = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of a body's position in a state (6,); its velocity is the next one
+
+
+class ExternalForce(NamedTuple):
+    """A force on one body, constant over each control period."""
+
+    body: int
+    at: Callable[[int], float]  # tick to N
+    changes: Callable[[int], Iterable[int]]  # ticks of the run, in (0, n), at which it may change, from the number n
+
+
+@dataclass
+class System:
+    """A scene as arrays.
+
+    Attributes
+    ----------
+    bodies : array (3, 4)
+        Mass, stiffness, damping and constant force of every body by itself, see `layout`; mass 0: no such body.
+    pairs : array (2, 2)
+        H and p of every pair; H = 0: no such pair.
+    state : array (6,), m and m/s
+        At t = 0; 0 for what is not there.
+    coulomb : float, N
+        Dry friction of the object.
+    laws : dict of int to ControlLaw
+        Controllers by side.
+    external : list of ExternalForce
+    delay : int
+        Control periods from a state to the command that answers it.
+    sampled : bool
+        Whether commands are held over control periods; otherwise the feedback acts continuously.
+    doubts : list of str
+        Why V_c may rise in this scene.
+    """
+
+    bodies: Array = field(default_factory=lambda: np.zeros((3, 4)))
+    pairs: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    state: Array = field(default_factory=lambda: np.zeros(6))
+    coulomb: float = 0.0
+    laws: dict[int, ControlLaw] = field(default_factory=dict)
+    external: list[ExternalForce] = field(default_factory=list)
+    delay: int = 0
+    sampled: bool = False
+    doubts: list[str] = field(default_factory=list)
+
+    @staticmethod
+    def of(grasp: Grasp, state: Array) -> System:
+        """The paper's grasp."""
+        system = System(state=np.asarray(state, dtype=float))
+        for side, arm in ((LEFT, grasp.left), (RIGHT, grasp.right)):
+            system.bodies[side, : FORCE] = arm.mass, arm.stiffness, arm.damping
+            system.laws[side] = ControlLaw(arm.position_gain, arm.velocity_gain)
+        system.bodies[OBJECT, MASS] = grasp.object_mass
+        system.pairs[:] = grasp.left_contact, grasp.right_contact
+        return system
+
+    @property
+    def present(self) -> list[int]:
+        """Bodies that are there, in the order of the state."""
+        return [body for body in BODIES if self.bodies[body, MASS] > 0.0]
+
+    @property
+    def contacts(self) -> list[int]:
+        """Sides whose pair can push."""
+        return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZ] > 0.0]
+
+    @property
+    def closed_loop(self) -> Array:
+        """`bodies` with the continuous feedback of the controllers, (4), (5), in them."""
+        bodies = self.bodies.copy()
+        for side, law in self.laws.items():
+            bodies[side, STIFFNESS] += law.position_gain
+            bodies[side, DAMPING] += law.velocity_gain
+            bodies[side, FORCE] += law.position_gain * law.set_point + law.feed_forward
+        return bodies
+
+    def external_at(self, tick: int) -> Array:
+        """External forces (3,) in N from a tick to the next, by body."""
+        forces = np.zeros(3)
+        for force in self.external:
+            forces[force.body] += force.at(tick)
+        return forces
+
+    def commands(self, tick: int, state: Array) -> Array:
+        """What the controllers answer to the state of a tick, in N by body; 0 without a controller.
+
+        Parameters
+        ----------
+        tick : int
+        state : array (6,) or (6, n)
+
+        Returns
+        -------
+        array (3,) or (3, n)
+        """
+        forces = np.zeros((3, *np.shape(state)[1:]))
+        for side, law in self.laws.items():
+            forces[side] = law.command(tick, state[COLUMN[side]], state[COLUMN[side] + 1])
+        return forces
