@@ -70,6 +70,10 @@ def _parser() -> argparse.ArgumentParser:
     _add_scene(sub)
     sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write the records")
+    sub = studies.add_parser("effects", help="what each effect costs: time and size of the bag")
+    sub.set_defaults(command=_study_effects)
+    _add_scene(sub)
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
     sub = studies.add_parser("graph", help="lockstep ticks per second, beside a bare rclpy graph")
     sub.set_defaults(command=_study_graph)
     _add_scene(sub)
@@ -194,6 +198,14 @@ def _study_speed(options: argparse.Namespace) -> int:
 
     _prepare()
     speed.run(scenes.load(options.scene, options.settings), options.error, options.output)
+    return 0
+
+
+def _study_effects(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import effects
+
+    _prepare()
+    effects.run(scenes.load(options.scene, options.settings), options.output)
     return 0
 
 

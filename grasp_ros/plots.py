@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
@@ -108,3 +109,20 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
             motion.t, low, low + 0.04, where=touching, step="post", color=color, alpha=0.8, linewidth=0,
             transform=axes.get_xaxis_transform(), label=label,
         )
+
+
+def draw_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
+    """Draw what variants of a scene cost: name, us per control period, kB per simulated second."""
+    names = [name for name, _, _ in rows]
+    figure, panels = plt.subplots(1, 2, sharey=True, figsize=(9.0, 0.3 * len(rows) + 1.2), layout="constrained")
+    for axes, column, label in zip(panels, (1, 2), ("us per control period, no ROS", "bag, kB per s"), strict=True):
+        values = [float(row[column]) for row in rows]
+        bars = axes.barh(names, values, color=[OBJECT_COLOR if name == names[0] else LEFT_COLOR for name in names])
+        axes.bar_label(bars, [f"{value / values[0]:.2f}" for value in values], padding=3, fontsize="small")
+        axes.axvline(values[0], color=OBJECT_COLOR, linewidth=0.8, linestyle="--")
+        axes.set_xlim(0.0, 1.15 * max(values))
+        axes.set_xlabel(label)
+    panels[0].invert_yaxis()
+    figure.suptitle("cost of each effect; beside the bars: ratio to the bare scene", fontsize="medium")
+    figure.savefig(path, dpi=150)
+    plt.close(figure)

@@ -19,12 +19,17 @@ from geometry_msgs.msg import WrenchStamped
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from grasp_ros import bag, scene
+from grasp_ros.graph import Graph
 from grasp_ros.nodes import messages
+from grasp_ros.physics.integrator import ACCURACY
 from grasp_ros.physics.model import impact_forces
+from grasp_ros.report import compare_recording
 from grasp_ros.simulation import simulate
 from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
 
@@ -37,6 +42,19 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
     while not condition():
         assert time.monotonic() < deadline, f"waited in vain for {what}"
         time.sleep(0.01)
+
+
+@pytest.fixture
+def node() -> Iterator[tuple[Any, SingleThreadedExecutor]]:
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    peer = rclpy.create_node("peer", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(peer)
+    yield peer, executor
+    executor.shutdown()
+    peer.destroy_node()
+    context.shutdown()
 
 
 def content(directory: Path) -> list[tuple[str, int, bytes]]:
@@ -104,6 +122,68 @@ def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
     assert "equal, bit for bit" in printed
     assert "lost                      nothing" in printed
     assert (two_runs[0] / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["noise", "pulse", "hammer", "no_contact"])
+def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) -> None:
+    """Simulation, graph and bag; and nothing is there that the scene does not name."""
+    settings = ["time.duration_s=1.0", *(["object_pulse.start_s=0.3"] if name == "pulse" else [])]
+    graph = Graph(scene.load(name, settings), tmp_path / "run", ACCURACY)
+    graph.start()
+    try:
+        graph.wait([])
+    finally:
+        statuses = graph.stop()
+    assert set(statuses.values()) == {0}
+    recording = bag.read(graph.bag)
+    comparison = compare_recording(recording, ACCURACY)
+    assert comparison.equal
+    assert not any(recording.missing.values())
+    assert not recording.lyapunov[:, 5].any()
+    assert {topic for topic, _, _ in content(tmp_path / "run")} == {
+        "/scene", *(f"/{topic.name}" for topic in recording.scene.topics)
+    }
+    assert set(statuses) == {"plant", "monitor", *recording.scene.controllers}
+
+
+def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
+    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    clients = {name: AsyncParameterClient(peer, name) for name in ("left_controller", "plant")}
+    graph = Graph(scene.load("case_01", ["time.duration_s=6"]), tmp_path / "run", ACCURACY)
+
+    def answer(name: str, number: Parameter) -> Any:
+        future = clients[name].set_parameters([number])
+        deadline = time.monotonic() + DEADLINE
+        while not future.done():
+            assert time.monotonic() < deadline, f"{name} does not answer"
+            executor.spin_once(timeout_sec=0.01)
+        return future.result().results[0]
+
+    graph.start()
+    try:
+        wait_for(clients["left_controller"].services_are_ready, "the controller")
+        wait_for(clients["plant"].services_are_ready, "the plant")
+        wait_for(lambda: graph.bag.exists(), "the bag")  # the controller has the scene when the monitor has it
+        gain = "left_feedback.position_gain_N_per_m"
+        wait_for(lambda: answer("left_controller", Parameter(gain, value=9)).successful, "the new gain")
+        refused = answer("left_controller", Parameter(gain, value=-100.0))
+        assert not refused.successful
+        assert "a sum >= 0" in refused.reason
+        fixed = answer("plant", Parameter("object.mass_kg", value=4.0))
+        assert not fixed.successful
+        assert "does not change in a run" in fixed.reason
+        graph.wait([])
+    finally:
+        graph.stop()
+    recording = bag.read(graph.bag)
+    assert list(recording.changes.values()) == [{gain: 9.0}]
+    assert compare_recording(recording, ACCURACY).equal
+    tick = next(iter(recording.changes))
+    x, v = recording.state[tick, :2]
+    assert recording.command[tick, 0] == -9.0 * x - 0.5 * v
+    assert not recording.lyapunov[:, 5].any()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -196,19 +276,6 @@ def test_run_notices_a_plant_that_was_stopped(tmp_path: Path) -> None:
     assert process.returncode == 1
     assert "monitor: still runs although its counterpart has ended" in err
     assert bag.read(recorded.parent).counts[JOINT_STATES.name] > 100
-
-
-@pytest.fixture
-def node() -> Iterator[tuple[Any, SingleThreadedExecutor]]:
-    context = rclpy.Context()
-    rclpy.init(context=context)
-    peer = rclpy.create_node("peer", context=context)
-    executor = SingleThreadedExecutor(context=context)
-    executor.add_node(peer)
-    yield peer, executor
-    executor.shutdown()
-    peer.destroy_node()
-    context.shutdown()
 
 
 def test_plant_drops_what_is_stale_repeated_or_not_finite(node: tuple[Any, SingleThreadedExecutor]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from grasp_ros.parameters import Parameter
@@ -63,6 +63,8 @@ class Effect:
         What the plant publishes about it.
     problems : callable
         Finds what is wrong beyond ranges.
+    example : mapping of str to numbers
+        What to add to a scene to see it; `grasp study effects` does. Empty for what every grasp has.
     """
 
     section: str
@@ -75,6 +77,7 @@ class Effect:
     commands: Topic | None = None
     outputs: tuple[Output, ...] = ()
     problems: Callable[[Sections], Iterable[Problem]] = no_problem
+    example: Numbers = field(default_factory=dict)
 
 
 def period_ns(sections: Sections) -> int:

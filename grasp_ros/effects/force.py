@@ -35,6 +35,10 @@ TABLE = (
     Parameter("force_N", -1e12, 1e12, "forces, each until the next time, the last one for good", several=True),
 )
 
+A_PULSE = {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}
+A_SINE = {"amplitude_N": 1.0, "frequency_Hz": 2.0}
+A_TABLE = {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}
+
 
 def _pulse(section: str, sections: Sections) -> tuple[Callable[[int], float], list[int]]:
     numbers, period = sections[section], period_ns(sections)
@@ -104,15 +108,16 @@ def _total(body: int, system: System, tick: int, _: Array) -> float:
 def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
     work = "the force does work: V_c rises by 2 f times the way at most"
-    for kind, parameters, build, problems in (
-        ("pulse", PULSE, partial(_build_steps, _pulse), _pulse_problems),
-        ("sine", SINE, _build_sine, lambda _, sections: no_problem(sections)),
-        ("table", TABLE, partial(_build_steps, _table), _table_problems),
+    for kind, parameters, build, problems, example in (
+        ("pulse", PULSE, partial(_build_steps, _pulse), _pulse_problems, A_PULSE),
+        ("sine", SINE, _build_sine, lambda _, sections: no_problem(sections), A_SINE),
+        ("table", TABLE, partial(_build_steps, _table), _table_problems, A_TABLE),
     ):
         section = f"{name}_{kind}"
         yield Effect(
             section, f"external force on the {name.replace('_', ' ')}: a {kind}", parameters,
             partial(build, section, body), work, needs=(name,), outputs=outputs, problems=partial(problems, section),
+            example=example,
         )
 
 

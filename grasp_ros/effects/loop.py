@@ -25,5 +25,6 @@ EFFECTS = (
                       optional=True, whole=True),
         ),
         _build, "V_c may rise by the work of the held commands; the ledger of that work is exact",
+        example={"delay_ticks": 2},
     ),
 )

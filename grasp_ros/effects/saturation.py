@@ -24,7 +24,7 @@ EFFECTS = tuple(
     Effect(
         f"{side}_actuator", f"the force of the {side} actuator is limited", PARAMETERS, partial(_build, side),
         "V_c keeps the energy of the unlimited feedback and may rise while the limit acts",
-        needs=(f"{side}_feedback", "loop"), node=f"{side}_controller",
+        needs=(f"{side}_feedback", "loop"), node=f"{side}_controller", example={"limit_N": 1.0},
     )
     for side in SIDES
 )

@@ -61,6 +61,10 @@ EFFECTS = tuple(
         f"{side}_sensor", f"the {side} controller measures its arm with noise and in steps", PARAMETERS,
         partial(_build, side), "no certificate: wrong measurements do work through the feedback",
         needs=(f"{side}_feedback", "loop"), node=f"{side}_controller",
+        example={
+            "noise_seed": 1, "position_noise_m": 1e-4, "velocity_noise_m_per_s": 1e-3, "position_step_m": 1e-4,
+            "velocity_step_m_per_s": 1e-3,
+        },
     )
     for side in SIDES
 )

@@ -1,0 +1,179 @@
+"""What each effect costs: the paper's standard case alone, with each effect alone, and with all together.
+
+The runs of all variants are interleaved, so that their ratios hold on a machine that is shared.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros import plots, strict_yaml
+from grasp_ros import scene as scenes
+from grasp_ros.effects import BY_SECTION, EFFECTS
+from grasp_ros.graph import Graph
+from grasp_ros.physics.layout import Event
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import simulate
+from grasp_ros.versions import versions
+
+BARE = "bare"
+REPEATS, SAMPLED_REPEATS = 31, 5
+RECORDED_S = 1.0
+REGISTRY, COSTS = "the registry", "what `grasp study effects` measured"  # marked parts of the documentation
+
+
+class Cost(NamedTuple):
+    """Cost of one variant of the scene."""
+
+    name: str
+    continuous: float | None  # s per simulated second; None: the scene is sampled
+    contact: float | None  # s per touch, of the same run
+    tick: float  # s per control period without ROS
+    bag: float  # bytes per simulated second
+
+
+def run(scene: Scene, document: Path | None) -> None:
+    """Print the costs; with a document, put table and figure into it.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the effects are added to.
+    document : Path, optional
+        Text file with marked parts; the figure is written beside it.
+
+    Raises
+    ------
+    ValueError
+        If the document has no marks.
+    """
+    text = None if document is None else document.read_text(encoding="utf-8")
+    if text is not None:
+        text = _put(text, REGISTRY, registry_table())
+        _put(text, COSTS, "")  # refuses a text without marks before the work begins
+    costs = measure(variants(scene), REPEATS, SAMPLED_REPEATS)
+    table = _cost_table(scene, costs)
+    print(table)
+    if text is not None and document is not None:
+        figure = document.with_suffix(".png")
+        plots.draw_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
+        block = f"{table}\n\n![costs of the effects]({figure.name})"
+        document.write_text(_put(text, COSTS, block), encoding="utf-8")
+
+
+def registry_table() -> str:
+    """Markdown table of the effects; those of the right side and of other bodies stand for their twins."""
+    rows = ["| section | what it simulates | what it does to V_c |", "|---|---|---|"]
+    for effect in EFFECTS:
+        if not effect.section.startswith(("right_", "object_pulse", "object_sine", "object_table")):
+            rows.append(f"| `{effect.section}` | {effect.text} | {effect.certificate} |")
+    return "\n".join(rows)
+
+
+def _put(text: str, part: str, block: str) -> str:
+    """The text with a marked part replaced."""
+    begin, end = f"<!-- begin of {part} -->", f"<!-- end of {part} -->"
+    if not (begin in text and end in text.split(begin)[1]):
+        raise ValueError(f"the document has no marks; allowed: a text with {begin} and {end}")
+    before, rest = text.split(begin)
+    return f"{before}{begin}\n\n{block}\n\n{end}{rest.split(end)[1]}"
+
+
+def variants(scene: Scene) -> dict[str, Scene]:
+    """The scene alone, with each effect that has an example, and with all of them, by name."""
+    own = {key: dict(numbers) for key, numbers in scene.values.items()}
+    found = {BARE: scene}
+    everything: dict[str, Mapping[str, Any]] = {}
+    for effect in EFFECTS:
+        if effect.example and effect.section not in own:
+            added: dict[str, Mapping[str, Any]] = {key: {} for key in effect.needs if key not in own}
+            added[effect.section] = effect.example
+            everything.update(added)
+            found[effect.section] = _composed(scene, {**own, **added})
+    examples = {key: BY_SECTION[key].example for key in everything}
+    return {**found, "all together": _composed(scene, {**own, **examples})}
+
+
+def measure(found: Mapping[str, Scene], repeats: int, sampled_repeats: int) -> list[Cost]:
+    """Time all variants in turn, and record a second of each over topics."""
+    smooth = {name: partial(_final_state, scene) for name, scene in found.items() if not scene.sampled}
+    continuous = _interleaved(smooth, repeats, "continuous")
+    sampled = _interleaved(
+        {name: partial(simulate, scene, sampled=True) for name, scene in found.items()}, sampled_repeats, "sampled"
+    )
+    costs = []
+    for name, scene in tqdm(found.items(), desc="recorded", file=sys.stderr):
+        seconds = continuous.get(name)
+        touches = sum(event.kind == Event.TOUCH for event in simulate(scene).events)
+        costs.append(Cost(
+            name, None if seconds is None else seconds / scene.duration,
+            None if seconds is None or not touches else seconds / touches,
+            sampled[name] / scene.ticks, _bag_size(scene),
+        ))
+    return costs
+
+
+def _final_state(scene: Scene) -> None:
+    simulate(scene, grid=np.array([scene.duration]))
+
+
+def _composed(scene: Scene, values: Mapping[str, Mapping[str, Any]]) -> Scene:
+    document = strict_yaml.dump({
+        "title": scene.title, "readings": list(scene.readings),
+        **{section: dict(numbers) for section, numbers in values.items()},
+    })
+    return scenes.parse(document, scene.name, scene.name)
+
+
+def _interleaved(runs: Mapping[str, Callable[[], object]], repeats: int, what: str) -> dict[str, float]:
+    """Median time of each run in s; the first round does not count."""
+    times: dict[str, list[float]] = {name: [] for name in runs}
+    for turn in tqdm(range(repeats + 1), desc=what, file=sys.stderr):
+        for name, call in runs.items():
+            begin = time.perf_counter()
+            call()
+            if turn:
+                times[name].append(time.perf_counter() - begin)
+    return {name: statistics.median(values) for name, values in times.items()}
+
+
+def _bag_size(scene: Scene) -> float:
+    short = scene.changed({"time.duration_s": RECORDED_S})
+    with tempfile.TemporaryDirectory() as directory:
+        graph = Graph(short, Path(directory) / "run", 1e-12, errors=subprocess.DEVNULL)
+        graph.start()
+        try:
+            graph.wait([])
+        finally:
+            graph.stop()
+        return sum(file.stat().st_size for file in graph.bag.iterdir()) / RECORDED_S
+
+
+def _cost_table(scene: Scene, costs: list[Cost]) -> str:
+    bare = costs[0]
+    lines = [
+        f"{scene.title}, {scene.duration:g} s, control period {scene.period_ns / 1e6:g} ms."
+        f" {', '.join(f'{name} {version}' for name, version in versions().items())}.", "",
+        "| scene | continuous, us per s | ratio | us per contact | sampled, us per tick | ratio | bag, kB per s |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for cost in costs:
+        smooth = ["-", "-"] if cost.continuous is None or bare.continuous is None else [
+            f"{cost.continuous * 1e6:.1f}", f"{cost.continuous / bare.continuous:.2f}"
+        ]
+        contact = "-" if cost.contact is None else f"{cost.contact * 1e6:.1f}"
+        cells = [cost.name, *smooth, contact, f"{cost.tick * 1e6:.2f}", f"{cost.tick / bare.tick:.2f}",
+                 f"{cost.bag / 1e3:.0f}"]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
