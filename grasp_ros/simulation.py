@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import BadZipFile
@@ -218,16 +219,18 @@ def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes
 def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],
                forces: Callable[[int], Array]) -> Array:
     """Integrate from tick to tick under forces (3,) that are held; each piece [t, t') delivers its own outputs."""
-    times = np.array([scene.time_of(tick) for tick in ticks])
-    bounds = np.searchsorted(grid, times, side="left")
+    ends = np.asarray(ticks) * scene.period_ns / NANOSECONDS
+    lengths = np.diff(ticks) * scene.period_ns / NANOSECONDS
+    bounds = np.searchsorted(grid, ends, side="left")
+    last = bounds[-1]
+    piece_of = np.searchsorted(ends, grid[:last], side="right") - 1
+    offsets = np.clip(grid[:last] - ends[piece_of], 0.0, lengths[piece_of])
     rows = [np.empty((0, 6))]
-    for piece, tick in enumerate(ticks[:-1]):
+    pieces = zip(ticks, ends.tolist(), lengths.tolist(), pairwise(bounds.tolist()), strict=False)
+    for tick, begin, length, (first, end) in pieces:
         integrator.hold(forces(tick))
-        begin = times[piece]
-        length = scene.time_of(ticks[piece + 1] - tick)
-        inside = grid[bounds[piece] : bounds[piece + 1]]
-        rows.append(integrator.advance(length, np.clip(inside - begin, 0.0, length), begin))
+        rows.append(integrator.advance(length, offsets[first:end], begin))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
-    rows.append(np.repeat(integrator.state[None], len(grid) - bounds[-1], axis=0))
+    rows.append(np.repeat(integrator.state[None], len(grid) - last, axis=0))
     return np.concatenate(rows)
