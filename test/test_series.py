@@ -253,7 +253,7 @@ def rise(coefficients: Any, h: float) -> float:
     """The kernel's answer for coefficients in ascending order."""
     work = np.zeros(len(Work), dtype=np.int64)
     f = np.array(coefficients, dtype=float)
-    result = first_rise(f, len(f) - 1, h, work)
+    result = first_rise(f, len(f) - 1, h, 0.0, work)
     assert work[Work.ROOT_ITERATIONS] < 5000
     return result
 

@@ -170,7 +170,8 @@ def rise_of_lanes(tables: Any, n: int, h: float, factor: float, front: int, back
         i = LANES * k
         row[k] = factor * (c[i + front] - c[i + back] if back >= 0 else c[i + front])
     row[0] += offset
-    return first_rise(row, n, h, work)
+    noise = abs(c[front]) + abs(c[back]) if back >= 0 else abs(c[front])
+    return first_rise(row, n, h, EPS * (abs(offset) + abs(factor) * noise), work)
 
 
 @kernel

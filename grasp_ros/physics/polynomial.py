@@ -48,12 +48,15 @@ def horner(total: Any, s: float, x: Any) -> Any:
 
 @kernel
 def values(c: Any, n: int, s: float, at: Any) -> None:
-    """Write the lanes' values at s, of the even degree n, to `at`."""
+    """Write the lanes' values at s, of the even degree n, to `at`.
+
+    The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
+    """
     square = s * s
     even, odd = lanes(c, n), lanes(c, n - 1)
     for k in range(n - 2, 0, -2):
         even, odd = horner(even, square, lanes(c, k)), horner(odd, square, lanes(c, k - 1))
-    total = horner(odd, s, horner(even, square, lanes(c, 0)))
+    total = horner(horner(even, s, odd), s, lanes(c, 0))
     for lane in range(LANES):
         at[lane] = total[lane]
 
@@ -131,16 +134,16 @@ def root_of_rise(f: Any, n: int, low: float, high: float, noise: float, work: An
 
 
 @kernel
-def first_rise(f: Any, n: int, h: float, work: Any) -> float:
+def first_rise(f: Any, n: int, h: float, noise: float, work: Any) -> float:
     """First s in (0, h] at which a polynomial f, with f(0) <= 0, rises through zero; inf if there is none.
 
     The second derivative is bounded by sums of |f_k|, so the steps of `safe_step` cannot jump over a root, until f
-    is known to increase all the way to h. Within the rounding noise of its terms f counts as negative.
+    is known to increase all the way to h. Within the rounding noise of its terms, or within `noise`, f counts as negative.
     """
     size = 0.0
     for k in range(n, -1, -1):
         size = size * h + abs(f[k])
-    noise = EPS * size
+    noise = max(noise, EPS * size)
     curvature = curvature_bound(f, n, h)
     s = 0.0
     value, rate = f[0], f[1]

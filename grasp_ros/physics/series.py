@@ -121,7 +121,7 @@ def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: flo
 def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
 
-    Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, u' (p H g). Their terms with coefficients
+    Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, H g (1 + p u'). Their terms with coefficients
     0 and 1 are added here: a term of two such coefficients occurs once, so a constant that multiplies the newest
     coefficient is set after its own order.
     """
@@ -131,34 +131,35 @@ def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, 
     push_l, push_r, push_o = (left[0], 0.0, middle[0]) if on_left else (0.0, right[0], -middle[0])
     x_o, v_l, v_o, v_r = c[X_O], c[V_L], c[V_O], c[V_R]
     w, gap = (c[Z_L], c[Z_R]) if on_left else (c[Z_R], c[Z_L])
-    w_0, p_0, w_end, u_end = w, loss * hertz * (w * w) * (w * w), w, w * w  # w_end, u_end multiply the newest w, u
-    w_1 = p_1 = w_next = u_next = w_before = u_before = p_before = 0.0
+    w_0, g_0, w_end, u_end = w, hertz * ((w * w) * (w * w)), w, w * w  # w_end, u_end multiply the newest w, u
+    w_1 = g_1 = w_next = u_next = w_before = u_before = g_before = 0.0
     first = second = before = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
         gv, gd, gl, gr, go, u, q, z = convolve(f, k, 0, 2)
         u = (u + w_next * w_before) + w_end * w
         q = (q + u_next * u_before) + u_end * u
         g = hertz * q
-        p = loss * g
         u_l, u_r = (u, gap) if on_left else (gap, u)
-        a_l, a_r, a_o = accelerations(left, right, middle, 1.0 if k == 0 else 0.0, x_o, u_l, u_r, v_l, v_o, v_r)
+        one = 1.0 if k == 0 else 0.0
+        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d, d_open = (v_l - v_o, v_o - v_r) if on_left else (v_o - v_r, v_l - v_o)
-        now = (v_o, d_open, a_l, a_r, a_o, d)
-        z = with_ends(z + g, d, p, first[5], p_0, second[5], p_1, before[5], p_before)
+        e = one + loss * d
+        now = (v_o, d_open, a_l, a_r, a_o, e)
+        z = with_ends(z, e, g, first[5], g_0, second[5], g_1, before[5], g_before)
         gv = with_ends(gv, v_o, w, first[0], w_0, second[0], w_1, before[0], w_before)
         gd = with_ends(gd, d_open, w, first[1], w_0, second[1], w_1, before[1], w_before)
         gl = with_ends(gl, a_l, w, first[2], w_0, second[2], w_1, before[2], w_before)
         gr = with_ends(gr, a_r, w, first[3], w_0, second[3], w_1, before[3], w_before)
         go = with_ends(go, a_o, w, first[4], w_0, second[4], w_1, before[4], w_before)
-        put(f, FACTORS * k, v_o, d_open, a_l, a_r, a_o, w, u, d)
-        put(f, FACTORS * k + SECOND, w, w, w, w, w, w, u, p)
+        put(f, FACTORS * k, v_o, d_open, a_l, a_r, a_o, w, u, e)
+        put(f, FACTORS * k + SECOND, w, w, w, w, w, w, u, g)
         if k == 0:
             first, w_end, u_end = now, 2.0 * w, 2.0 * u
         elif k == 1:
-            w_1, p_1, w_next, u_next = w, p, w, u
+            w_1, g_1, w_next, u_next = w, g, w, u
         elif k == 2:
             second, w_next, u_next = before, 2.0 * w_next, 2.0 * u_next
-        before, w_before, u_before, p_before = now, w, u, p
+        before, w_before, u_before, g_before = now, w, u, g
         step = unit / (k + 1)
         c[LANES * k + CHECK] = u
         time, w = 2.0 * step * w, step * d
@@ -174,38 +175,39 @@ def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) ->
     """Fill the Taylor table c from its order 0, with both sides in contact: G = w_l w_r. The series are in s / unit.
 
     Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
-    w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, u' (p H g).
+    w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, H g (1 + p u').
     """
     hertz_l, loss_l = pairs[LEFT, HERTZ], pairs[LEFT, DISSIPATION]
     hertz_r, loss_r = pairs[RIGHT, HERTZ], pairs[RIGHT, DISSIPATION]
     left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
     x_o, v_l, v_o, v_r, w_l, w_r = c[X_O], c[V_L], c[V_O], c[V_R], c[Z_L], c[Z_R]
-    b = (w_l * w_r, w_l, w_r, loss_l * hertz_l * ((w_l * w_l) * (w_l * w_l) * w_r),
-         loss_r * hertz_r * ((w_r * w_r) * (w_r * w_r) * w_l))
+    b = (w_l * w_r, w_l, w_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * w_r),
+         hertz_r * ((w_r * w_r) * (w_r * w_r) * w_l))
     w_end_l, w_end_r, u_end_l, u_end_r = w_l, w_r, w_l * w_l, w_r * w_r
-    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
         gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, 0, 1)
         u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, 8, 1)
         u_l, u_r = u_l + w_end_l * w_l, u_r + w_end_r * w_r
         q_l, q_r = q_l + u_end_l * u_l, q_r + u_end_r * u_r
         g_l, g_r = hertz_l * ((g_l + a[8] * w_r) + q_l * b[2]), hertz_r * ((g_r + a[9] * w_l) + q_r * b[1])
-        p_l, p_r = loss_l * g_l, loss_r * g_r
         g = 0.5 * (((ww + a[4] * w_r) + w_l * b[2]) + ((ww_mirrored + a[5] * w_l) + w_r * b[1]))
-        a_l, a_r, a_o = accelerations(left, right, middle, 1.0 if k == 0 else 0.0, x_o, u_l, u_r, v_l, v_o, v_r)
+        one = 1.0 if k == 0 else 0.0
+        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d_l, d_r = v_l - v_o, v_o - v_r
-        z_l, z_r = ((z_l + g_l) + a[6] * p_l) + d_l * b[3], ((z_r + g_r) + a[7] * p_r) + d_r * b[4]
+        e_l, e_r = one + loss_l * d_l, one + loss_r * d_r
+        z_l, z_r = (z_l + a[10] * g_l) + e_l * b[3], (z_r + a[11] * g_r) + e_r * b[4]
         wd_l, wd_r = (wd_l + a[6] * w_r) + d_l * b[2], (wd_r + a[7] * w_l) + d_r * b[1]
         gv, gl, gr, go = (
             (gv + a[0] * g) + v_o * b[0], (gl + a[1] * g) + a_l * b[0], (gr + a[2] * g) + a_r * b[0],
             (go + a[3] * g) + a_o * b[0],
         )
         put(f, FACTORS * k, v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r)
-        put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, d_l, d_r)
+        put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r)
         put(f, FACTORS * k + SECOND, g, g, g, g, w_r, w_l, w_r, w_l)
-        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, w_r, w_l, p_l, p_r)
+        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, w_r, w_l, g_l, g_r)
         if k == 0:
-            a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r)
+            a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
             w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
         step = unit / (k + 1)
         twice = 2.0 * step

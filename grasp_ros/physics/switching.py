@@ -73,15 +73,13 @@ def root_of_two(x: float, degree: int) -> float:
 def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
     """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
 
-    The energy is that of the present motion and penetration, or that of the motion that an acceleration a > 0 from
-    outside will bring, whichever is larger: it presses the pair to the depth (mu a / H)^(2/3).
+    The energy is that of the present motion and penetration, and of the motion that an acceleration a > 0 from
+    outside will bring: it presses the pair to the depth (mu a / H)^(2/3).
     """
     energy = 0.5 * mu * d * d + 0.4 * hertz * u * u * math.sqrt(u)
-    w, v = root_of_two(2.5 * energy / hertz, 5), root_of_two(2.0 * energy / mu, 2)
     if a > 0.0:
-        pressed = root_of_two(mu * a / hertz, 3)
-        w, v = max(w, pressed), max(v, pressed * root_of_two(a, 2))
-    return w, v
+        energy += mu * a * (mu * a / hertz) ** (2.0 / 3.0)
+    return root_of_two(2.5 * energy / hertz, 5), root_of_two(2.0 * energy / mu, 2)
 
 
 @kernel
