@@ -8,9 +8,11 @@ from grasp_ros.effects import (
     contact,
     feedback,
     force,
+    friction,
     loop,
     saturation,
     sensing,
+    tilt,
     time,
 )
 
@@ -22,6 +24,8 @@ EFFECTS = (
     *loop.EFFECTS,
     *sensing.EFFECTS,
     *saturation.EFFECTS,
+    *friction.EFFECTS,
+    *tilt.EFFECTS,
     *force.EFFECTS,
 )
 BY_SECTION = {effect.section: effect for effect in EFFECTS}

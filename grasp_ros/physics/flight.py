@@ -14,11 +14,12 @@ import math
 from typing import Any
 
 from grasp_ros.physics.jit import kernel
-from grasp_ros.physics.layout import DAMPING, FORCE, MASS, STIFFNESS
+from grasp_ros.physics.layout import DAMPING, FORCE, LANES, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, X_L, X_O, X_R
 
 EPS = 2.220446049250313e-16
 DRIFT, UNDER, NEAR, OVER = 0.0, 1.0, 2.0, 3.0  # regimes of the closed form
 MAX_ITERATIONS = 10_000_000
+FLIGHT_ORDER = 16  # (1/2)^16 / 16! is below rounding, see `expand_flight`
 TOUCH_ROOT, RELEASE_ROOT, REENTRY_ROOT = 0, 1, 2
 
 
@@ -98,6 +99,27 @@ def short_flight(x: float, v: float, push: float, sigma: float, omega0_2: float,
 
 
 @kernel
+def expand_flight(bodies: Any, flights: Any, t: float, c: Any) -> None:
+    """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
+
+    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form.
+    """
+    for i in range(LANES):
+        c[i] = 0.0
+    for body, lane in ((LEFT, X_L), (OBJECT, X_O), (RIGHT, X_R)):
+        inverse_mass = 1.0 / bodies[body, MASS]
+        force, k, d = bodies[body, FORCE] * inverse_mass, bodies[body, STIFFNESS] * inverse_mass, bodies[body, DAMPING] * inverse_mass
+        x, v = fly(flights[body], t)
+        c[lane], c[lane + 1] = x, v
+        for n in range(FLIGHT_ORDER):
+            share = 1.0 / (n + 1)
+            x, v = share * v, share * ((force - k * x) - d * v)
+            force = 0.0
+            i = LANES * (n + 1) + lane
+            c[i], c[i + 1] = x, v
+
+
+@kernel
 def bound(body: Any, q: float, q_rate: float, span: float) -> float:
     """Bound on |q| for the next `span` seconds, for q with m q'' + c q' + k q = 0.
 
@@ -129,9 +151,10 @@ def safe_step(g: float, g_rate: float, curvature: float) -> float:
 
 @kernel
 def envelope_step(arm: Any, body: Any, x: float, v: float, x_o: float, v_o: float, sign: float) -> float:
-    """Time for which the arm's swing cannot reach a freely moving object: 0 if it can now, inf if never.
+    """Time for which the arm's swing cannot reach the object: 0 if it can now, inf if never.
 
-    sign is +1 for the left side and -1 for the right one: u = sign (x - x_o).
+    sign is +1 for the left side and -1 for the right one: u = sign (x - x_o). Drag can only delay an object that
+    approaches, but it also brakes one that moves away.
     """
     if arm[STIFFNESS] <= 0.0:
         return 0.0
@@ -140,7 +163,9 @@ def envelope_step(arm: Any, body: Any, x: float, v: float, x_o: float, v_o: floa
     if room <= 4.0 * EPS * (abs(x_o) + abs(x_e)):
         return 0.0
     approach = -sign * v_o
-    return math.inf if approach <= 0.0 else room / approach
+    if body[DAMPING] > 0.0:
+        approach = max(approach, 0.0)
+    return safe_step(-room, approach, max(-sign * body[FORCE] / body[MASS], 0.0))
 
 
 @kernel

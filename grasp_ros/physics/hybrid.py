@@ -7,13 +7,26 @@ the span, or after one Taylor step; events closer to each other than a few round
 import math
 from typing import Any
 
-from grasp_ros.physics.flight import EPS, REENTRY_ROOT, RELEASE_ROOT, TOUCH_ROOT, flight_root, fly, launch
+from grasp_ros.physics.flight import (
+    EPS,
+    FLIGHT_ORDER,
+    REENTRY_ROOT,
+    RELEASE_ROOT,
+    TOUCH_ROOT,
+    expand_flight,
+    flight_root,
+    fly,
+    launch,
+)
 from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.layout import (
+    CHECK,
     DISSIPATION,
+    LANES,
     LEFT,
     OBJECT,
     RIGHT,
+    TIME,
     U_L,
     V_L,
     V_O,
@@ -21,10 +34,12 @@ from grasp_ros.physics.layout import (
     X_L,
     X_O,
     X_R,
+    Z_L,
+    Z_R,
     Outcome,
 )
-from grasp_ros.physics.polynomial import evaluate, first_rise, invert_time
-from grasp_ros.physics.series import D_L, E_L, TIME, W_L, W_R, expand_both, expand_one, state_at, step_size
+from grasp_ros.physics.polynomial import NOISE, curvatures, first_rise, invert_time, lane_range, values
+from grasp_ros.physics.series import expand_both, expand_one, step_size
 from grasp_ros.physics.switching import (
     ABSENT,
     CLAMP,
@@ -81,13 +96,6 @@ def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: An
 
 
 @kernel
-def deliver(y: Any, out: Any, row: int) -> None:
-    """Copy positions and velocities to a row of the output."""
-    for column in range(6):
-        out[row, column] = y[column]
-
-
-@kernel
 def fly_all(flights: Any, t: float, y: Any) -> None:
     """Write positions, velocities and penetrations after the time t of flight."""
     y[X_L], y[V_L] = fly(flights[LEFT], t)
@@ -98,8 +106,34 @@ def fly_all(flights: Any, t: float, y: Any) -> None:
 
 
 @kernel
-def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, grid: Any, out: Any,
-                   events: Any, filled: Any, work: Any) -> float:
+def deliver_flight(tables: Any, bodies: Any, flights: Any, pace: float, t: float, clock: Any, grid: Any, out: Any,
+                   filled: Any) -> None:
+    """Write the states at the output times before the end t of a flight.
+
+    The tables belong to fixed pieces of the flight, so that no state depends on the other output times.
+    """
+    row = filled[GRID]
+    piece = -1.0
+    begin = 0.0
+    while row < grid.shape[0]:
+        tau = (grid[row] - clock[0]) - clock[1]
+        if not tau < t:
+            break
+        own = math.floor(tau * 2.0 * pace)
+        if own != piece:
+            piece = own
+            begin = piece / (2.0 * pace) if piece > 0.0 else 0.0
+            expand_flight(bodies, flights, begin, tables.c)
+        values(tables.c, FLIGHT_ORDER, tau - begin, tables.at)
+        for column in range(6):
+            out[row, column] = tables.at[column]
+        row += 1
+    filled[GRID] = row
+
+
+@kernel
+def flight_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, clock: Any, span: float,
+                   grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
     """Fly to the first event or to the end of the span; returns the flight time, or nan if a search does not end."""
     work[0] += 1
     flights = (
@@ -112,14 +146,9 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
     if math.isnan(t_l) or math.isnan(t_r):
         return math.nan
     t = min(span, t_l, t_r)
+    deliver_flight(tables, bodies, flights, pace, t, clock, grid, out, filled)
     first_l, first_r = relative_motion(bodies, y, LEFT), relative_motion(bodies, y, RIGHT)
     depth_l, depth_r = y[U_L], y[U_L + 1]
-    row = filled[GRID]
-    while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
-        fly_all(flights, (grid[row] - clock[0]) - clock[1], y)
-        deliver(y, out, row)
-        row += 1
-    filled[GRID] = row
     fly_all(flights, t, y)
     if mode[LEFT] == HELD:
         y[U_L] = depth_l + t * (first_l[0] + 0.5 * t * first_l[1])
@@ -134,91 +163,140 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
 
 
 @kernel
-def contact_switch(c: Any, pairs: Any, mode: Any, side: int, n: int, h: float, work: Any) -> Any:
-    """s and kind of one pair's first event within a Taylor step of length h."""
+def rise_of_lanes(tables: Any, n: int, h: float, factor: float, front: int, back: int, offset: float,
+                  work: Any) -> float:
+    """First s in (0, h] at which offset + factor (c_front - c_back) rises through zero; back < 0: without it."""
+    c, row = tables.c, tables.row
+    for k in range(n + 1):
+        i = LANES * k
+        row[k] = factor * (c[i + front] - c[i + back] if back >= 0 else c[i + front])
+    row[0] += offset
+    noise = abs(c[front]) + abs(c[back]) if back >= 0 else abs(c[front])
+    return first_rise(row, n, h, EPS * (abs(offset) + abs(factor) * noise), work)
+
+
+@kernel
+def contact_switch(tables: Any, pairs: Any, mode: Any, side: int, n: int, h: float, work: Any) -> Any:
+    """s and kind of one pair's first event within a Taylor step of length h.
+
+    Most steps have none, and the ranges of the lanes prove it.
+    """
+    c, at, size = tables.c, tables.at, tables.size
     loss = pairs[side, DISSIPATION]
-    if mode[side] == OPEN:
-        return first_rise(c[U_L + side], 1.0, 0.0, n, h, work), TOUCH
     if mode[side] == HELD or mode[side] == ABSENT:
         return math.inf, TOUCH
-    depth = c[W_L + side] if mode[side] == CONTACT else c[U_L + side]
-    released = first_rise(depth, -1.0, 0.0, n, h, work)
+    z = Z_L + side
+    low, high = lane_range(c, z, h, at, size)
+    if mode[side] == OPEN:
+        if c[z] <= 0.0 and high < 0.0:
+            return math.inf, TOUCH
+        return rise_of_lanes(tables, n, h, 1.0, z, -1, 0.0, work), TOUCH
+    released = math.inf
+    if not (c[z] >= 0.0 and low > 0.0):
+        released = rise_of_lanes(tables, n, h, -1.0, z, -1, 0.0, work)
+    front, back = (V_L, V_O) if side == LEFT else (V_O, V_R)
     if loss > 0.0 and mode[side] == CONTACT:
-        clamped = first_rise(c[E_L + side], -1.0, 0.0, n - 1, min(h, released), work)
+        slowest = lane_range(c, front, h, at, size)[0] - lane_range(c, back, h, at, size)[1]
+        if 1.0 + loss * (c[front] - c[back]) >= 0.0 and 1.0 + loss * slowest > NOISE:
+            return released, RELEASE
+        clamped = rise_of_lanes(tables, n, min(h, released), -loss, front, back, -1.0, work)
         if not clamped >= released:
             return clamped, CLAMP
     if mode[side] == CLAMPED:
-        back = first_rise(c[D_L + side], loss, 1.0, n - 1, min(h, released), work)
-        if not back >= released:
-            return back, REENTRY
+        again = rise_of_lanes(tables, n, min(h, released), loss, front, back, 1.0, work)
+        if not again >= released:
+            return again, REENTRY
     return released, RELEASE
 
 
 @kernel
-def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, span: float, tolerance: float, n: int,
-                 work: Any) -> float:
-    """Expand the series at y and return an accepted step in s.
+def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, span: float, tolerance: float,
+                 n: int, work: Any) -> Any:
+    """Expand the series at y; returns an accepted step in s / unit, and the unit. tables.at has the values at its end.
 
-    u is expanded beside w although u = w^2: the mismatch at the end of the step consists of neglected terms only
-    and decides whether the step is accepted. Shortening it costs no new expansion.
+    G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: the mismatch at the end of the step
+    consists of neglected terms only and decides whether the step is accepted. Shortening it costs no new expansion.
     """
-    c = tables.c
+    c, at = tables.c, tables.at
     left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
-    c[X_O : U_L + 2, 0] = y[X_O : U_L + 2]
-    c[V_L, 0] = y[V_L]
-    c[TIME, 0] = 0.0
-    c[W_L, 0] = math.sqrt(y[U_L]) if left else 0.0
-    c[W_R, 0] = math.sqrt(y[U_L + 1]) if right else 0.0
-    w_l, v_l = scales(bodies, pairs, y, mode, LEFT) if left else (1.0, 0.0)
-    w_r, v_r = scales(bodies, pairs, y, mode, RIGHT) if right else (1.0, 0.0)
+    for lane in range(LANES):
+        c[lane] = y[lane]
+    c[TIME] = 0.0
+    w_l, v_l, w_r, v_r = 1.0, 0.0, 1.0, 0.0
+    if left:
+        c[Z_L] = math.sqrt(y[U_L])
+        w_l, v_l = scales(bodies, pairs, y, mode, LEFT)
+    if right:
+        c[Z_R] = math.sqrt(y[U_L + 1])
+        w_r, v_r = scales(bodies, pairs, y, mode, RIGHT)
     # The unit of s makes the radius of convergence about 1: coefficients must not leave the range of numbers.
-    unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * fastest_rate(bodies))
+    unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * pace)
     if left and right:
         expand_both(c, tables.f, bodies, pairs, unit, n)
     else:
         expand_one(c, tables.f, bodies, pairs, LEFT if left else RIGHT, unit, n)
     h = step_size(c, left, right, w_l, w_r, max(v_l, v_r), n, tolerance)
     if h == math.inf:
-        weight = (c[W_L, 0] if left else 1.0) * (c[W_R, 0] if right else 1.0)
-        return span / (weight * unit)
-    allowed = 100.0 * tolerance + 100.0 * EPS
+        h = span / ((c[Z_L] if left else 1.0) * (c[Z_R] if right else 1.0) * unit)
+        values(c, n, h, at)
+        return h, unit
+    allowed = (100.0 * tolerance + 100.0 * EPS) * (w_l * w_r if left and right else (w_l * w_r) ** 2)
     for _ in range(60):
-        bad_l = left and abs(evaluate(c[U_L], n, h) - evaluate(c[W_L], n, h) ** 2) > allowed * w_l * w_l
-        bad_r = right and abs(evaluate(c[U_L + 1], n, h) - evaluate(c[W_R], n, h) ** 2) > allowed * w_r * w_r
-        if not (bad_l or bad_r):
-            return h
+        values(c, n, h, at)
+        if abs(at[CHECK] - (at[Z_L] if left else at[Z_R]) * (at[Z_R] if right else at[Z_L])) <= allowed:
+            return h, unit
         work[2] += 1
         h *= 0.7
-    return math.nan
+    return math.nan, unit
 
 
 @kernel
-def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, tolerance: float,
-                    n: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
+def deliver_contact(tables: Any, left: bool, right: bool, unit: float, s: float, t: float, n: int, clock: Any, grid: Any, out: Any,
+                    filled: Any) -> None:
+    """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
+    at = tables.at
+    row = filled[GRID]
+    while row < grid.shape[0]:
+        tau = (grid[row] - clock[0]) - clock[1]
+        if not tau < t:
+            break
+        values(tables.c, n, invert_time(tables.c, n, unit, tau, s, t, left, right, at), at)
+        u_l, u_r = at[Z_L] * at[Z_L] if left else at[Z_L], at[Z_R] * at[Z_R] if right else at[Z_R]
+        out[row, X_L], out[row, V_L] = at[X_O] + u_l, at[V_L]
+        out[row, X_O], out[row, V_O] = at[X_O], at[V_O]
+        out[row, X_R], out[row, V_R] = at[X_O] - u_r, at[V_R]
+        row += 1
+    filled[GRID] = row
+
+
+@kernel
+def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, clock: Any, span: float,
+                    tolerance: float, n: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
     """One Taylor step, cut at its first event or at the end of the span.
 
     Returns its time, or nan if a search does not end.
     """
     work[1] += 1
     left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
-    c = tables.c
-    h = contact_step(tables, bodies, pairs, y, mode, span, tolerance, n, work)
-    s_l, kind_l = contact_switch(c, pairs, mode, LEFT, n, h, work)
-    s_r, kind_r = contact_switch(c, pairs, mode, RIGHT, n, h, work)
+    c, at = tables.c, tables.at
+    h, unit = contact_step(tables, bodies, pairs, y, mode, pace, span, tolerance, n, work)
+    curvatures(c, n, h, tables.size)
+    s_l, kind_l = contact_switch(tables, pairs, mode, LEFT, n, h, work)
+    s_r, kind_r = contact_switch(tables, pairs, mode, RIGHT, n, h, work)
     if math.isnan(h) or math.isnan(s_l) or math.isnan(s_r):
         return math.nan
     s = min(h, s_l, s_r)
-    t = evaluate(c[TIME], n, s)
+    if s < h:
+        values(c, n, s, at)
+    t = at[TIME]
     if t > span:
-        s = invert_time(c[TIME], n, span, s)
+        s = invert_time(c, n, unit, span, s, t, left, right, at)
         t = span
-    row = filled[GRID]
-    while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
-        state_at(c, n, invert_time(c[TIME], n, (grid[row] - clock[0]) - clock[1], s), left, right, y)
-        deliver(y, out, row)
-        row += 1
-    filled[GRID] = row
-    state_at(c, n, s, left, right, y)
+        values(c, n, s, at)
+    u_l, u_r = at[Z_L] * at[Z_L] if left else at[Z_L], at[Z_R] * at[Z_R] if right else at[Z_R]
+    y[X_L], y[V_L], y[X_O], y[V_O], y[X_R], y[V_R] = at[X_O] + u_l, at[V_L], at[X_O], at[V_O], at[X_O] - u_r, at[V_R]
+    y[U_L], y[U_L + 1] = u_l, u_r
+    deliver_contact(tables, left, right, unit, s, t, n, clock, grid, out, filled)
     tick(clock, t)
     if s_l <= s * TOGETHER:
         fire(y, mode, LEFT, kind_l, clock[0], events, filled)
@@ -251,13 +329,15 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
     work : int array (4,)
         Counters, see `layout.Work`.
     """
-    n = tables.c.shape[1] - 1
+    n = tables.row.shape[0] - 1
+    pace = fastest_rate(bodies)
     idle = 0
     while True:
         limit = (span - clock[0]) - clock[1]
         row = filled[GRID]
         while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] <= 0.0:
-            deliver(y, out, row)
+            for column in range(6):
+                out[row, column] = y[column]
             row += 1
         filled[GRID] = row
         if not limit > 0.0:
@@ -271,10 +351,10 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         if held_r:
             limit = min(limit, hold_time(bodies, pairs, y, mode, RIGHT, tolerance))
         if mode[LEFT] == CONTACT or mode[RIGHT] == CONTACT:
-            t = contact_segment(tables, bodies, pairs, y, mode, clock, limit, tolerance, n, grid, out, events,
-                                filled, work)
+            t = contact_segment(tables, bodies, pairs, y, mode, pace, clock, limit, tolerance, n, grid, out,
+                                events, filled, work)
         else:
-            t = flight_segment(bodies, pairs, y, mode, clock, limit, grid, out, events, filled, work)
+            t = flight_segment(tables, bodies, pairs, y, mode, pace, clock, limit, grid, out, events, filled, work)
         if held_l:
             resume(bodies, pairs, y, mode, LEFT, tolerance)
         if held_r:

@@ -66,9 +66,9 @@ def classify(bodies: Any, pairs: Any, y: Any, mode: Any) -> None:
 
 
 @kernel
-def power_of_two(x: float) -> float:
-    """The power of two above x >= 0: a scale that costs no rounding."""
-    return math.ldexp(1.0, math.frexp(x)[1]) if x > 0.0 else 0.0
+def root_of_two(x: float, degree: int) -> float:
+    """The power of two above the root of x >= 0; comparing exponents is cheaper than taking the root."""
+    return math.ldexp(1.0, (math.frexp(x)[1] - 1) // degree + 1) if x > 0.0 else 0.0
 
 
 @kernel
@@ -81,7 +81,7 @@ def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
     energy = 0.5 * mu * d * d + 0.4 * hertz * u * u * math.sqrt(u)
     if a > 0.0:
         energy += mu * a * (mu * a / hertz) ** (2.0 / 3.0)
-    return power_of_two((2.5 * energy / hertz) ** 0.2), power_of_two(math.sqrt(2.0 * energy / mu))
+    return root_of_two(2.5 * energy / hertz, 5), root_of_two(2.0 * energy / mu, 2)
 
 
 @kernel
@@ -105,12 +105,12 @@ def own_scales(bodies: Any, pairs: Any, y: Any, side: int, a: float) -> Any:
 
 @kernel
 def fastest_rate(bodies: Any) -> float:
-    """Power of two above the rates, in 1/s, at which the arms move by themselves."""
+    """Power of two above the rates, in 1/s, at which the bodies move by themselves."""
     rate = 0.0
-    for side in (LEFT, RIGHT):
-        arm = bodies[side]
-        rate = max(rate, arm[DAMPING] / arm[MASS], math.sqrt(arm[STIFFNESS] / arm[MASS]))
-    return power_of_two(rate)
+    for i in range(3):
+        body = bodies[i]
+        rate = max(rate, body[DAMPING] / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
+    return root_of_two(rate, 1)
 
 
 @kernel
