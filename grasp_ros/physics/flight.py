@@ -14,11 +14,12 @@ import math
 from typing import Any
 
 from grasp_ros.physics.jit import kernel
-from grasp_ros.physics.layout import DAMPING, FORCE, MASS, STIFFNESS
+from grasp_ros.physics.layout import DAMPING, FORCE, LANES, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, X_L, X_O, X_R
 
 EPS = 2.220446049250313e-16
 DRIFT, UNDER, NEAR, OVER = 0.0, 1.0, 2.0, 3.0  # regimes of the closed form
 MAX_ITERATIONS = 10_000_000
+FLIGHT_ORDER = 16  # (1/2)^16 / 16! is below rounding, see `expand_flight`
 TOUCH_ROOT, RELEASE_ROOT, REENTRY_ROOT = 0, 1, 2
 
 
@@ -95,6 +96,27 @@ def short_flight(x: float, v: float, push: float, sigma: float, omega0_2: float,
         if abs(term) <= 1e-18 * abs(velocity) and abs(before) <= 1e-18 * abs(velocity):
             break
     return x + position, velocity
+
+
+@kernel
+def expand_flight(bodies: Any, flights: Any, t: float, c: Any) -> None:
+    """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
+
+    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form.
+    """
+    for i in range(LANES):
+        c[i] = 0.0
+    for body, lane in ((LEFT, X_L), (OBJECT, X_O), (RIGHT, X_R)):
+        m = bodies[body, MASS]
+        force, k, d = bodies[body, FORCE] / m, bodies[body, STIFFNESS] / m, bodies[body, DAMPING] / m
+        x, v = fly(flights[body], t)
+        c[lane], c[lane + 1] = x, v
+        for n in range(FLIGHT_ORDER):
+            share = 1.0 / (n + 1)
+            x, v = share * v, share * ((force - k * x) - d * v)
+            force = 0.0
+            i = LANES * (n + 1) + lane
+            c[i], c[i + 1] = x, v
 
 
 @kernel

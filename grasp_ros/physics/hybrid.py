@@ -7,8 +7,18 @@ the span, or after one Taylor step; events closer to each other than a few round
 import math
 from typing import Any
 
-from grasp_ros.physics.flight import EPS, REENTRY_ROOT, RELEASE_ROOT, TOUCH_ROOT, flight_root, fly, launch
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.contact import contact_segment
+from grasp_ros.physics.flight import (
+    FLIGHT_ORDER,
+    REENTRY_ROOT,
+    RELEASE_ROOT,
+    TOUCH_ROOT,
+    expand_flight,
+    flight_root,
+    fly,
+    launch,
+)
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     DISSIPATION,
     LEFT,
@@ -23,10 +33,8 @@ from grasp_ros.physics.layout import (
     X_R,
     Outcome,
 )
-from grasp_ros.physics.polynomial import evaluate, first_rise, invert_time
-from grasp_ros.physics.series import D_L, E_L, TIME, W_L, W_R, expand_both, expand_one, state_at, step_size
+from grasp_ros.physics.polynomial import values
 from grasp_ros.physics.switching import (
-    CLAMP,
     CLAMPED,
     CONTACT,
     EVENTS,
@@ -35,28 +43,19 @@ from grasp_ros.physics.switching import (
     OPEN,
     REENTRY,
     RELEASE,
+    TOGETHER,
     TOUCH,
     fastest_rate,
     fire,
     hold_time,
     relative_motion,
     resume,
-    scales,
     settle,
+    tick,
 )
 
 DONE, EVENTS_FULL, NOT_FINITE, STALLED = (int(o) for o in Outcome)
-TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
 MAX_IDLE = 1000  # segments without progress in time
-
-
-@kernel
-def tick(clock: Any, step: float) -> None:
-    """Add to the compensated clock (two-sum), so that long runs do not drift."""
-    total = clock[0] + step
-    back = total - clock[0]
-    clock[1] += (clock[0] - (total - back)) + (step - back)
-    clock[0] = total
 
 
 @kernel
@@ -80,13 +79,6 @@ def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: An
 
 
 @kernel
-def deliver(y: Any, out: Any, row: int) -> None:
-    """Copy positions and velocities to a row of the output."""
-    for column in range(6):
-        out[row, column] = y[column]
-
-
-@kernel
 def fly_all(flights: Any, t: float, y: Any) -> None:
     """Write positions, velocities and penetrations after the time t of flight."""
     y[X_L], y[V_L] = fly(flights[LEFT], t)
@@ -96,9 +88,35 @@ def fly_all(flights: Any, t: float, y: Any) -> None:
     y[U_L + 1] = y[X_O] - y[X_R]
 
 
-@kernel
-def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, grid: Any, out: Any,
-                   events: Any, filled: Any, work: Any) -> float:
+@inlined
+def deliver_flight(tables: Any, bodies: Any, flights: Any, pace: float, t: float, clock: Any, grid: Any, out: Any,
+                   filled: Any) -> None:
+    """Write the states at the output times before the end t of a flight.
+
+    The tables belong to fixed pieces of the flight, so that no state depends on the other output times.
+    """
+    row = filled[GRID]
+    piece = -1.0
+    begin = 0.0
+    while row < grid.shape[0]:
+        tau = (grid[row] - clock[0]) - clock[1]
+        if not tau < t:
+            break
+        own = math.floor(tau * 2.0 * pace)
+        if own != piece:
+            piece = own
+            begin = piece / (2.0 * pace) if piece > 0.0 else 0.0
+            expand_flight(bodies, flights, begin, tables.c)
+        values(tables.c, FLIGHT_ORDER, tau - begin, tables.at)
+        for column in range(6):
+            out[row, column] = tables.at[column]
+        row += 1
+    filled[GRID] = row
+
+
+@inlined
+def flight_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, clock: Any, span: float,
+                   grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
     """Fly to the first event or to the end of the span; returns the flight time, or nan if a search does not end."""
     work[0] += 1
     flights = (
@@ -111,14 +129,9 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
     if math.isnan(t_l) or math.isnan(t_r):
         return math.nan
     t = min(span, t_l, t_r)
+    deliver_flight(tables, bodies, flights, pace, t, clock, grid, out, filled)
     first_l, first_r = relative_motion(bodies, y, LEFT), relative_motion(bodies, y, RIGHT)
     depth_l, depth_r = y[U_L], y[U_L + 1]
-    row = filled[GRID]
-    while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
-        fly_all(flights, (grid[row] - clock[0]) - clock[1], y)
-        deliver(y, out, row)
-        row += 1
-    filled[GRID] = row
     fly_all(flights, t, y)
     if mode[LEFT] == HELD:
         y[U_L] = depth_l + t * (first_l[0] + 0.5 * t * first_l[1])
@@ -128,100 +141,6 @@ def flight_segment(bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span:
     if t_l <= t * TOGETHER:
         fire(y, mode, LEFT, kind_l, clock[0], events, filled)
     if t_r <= t * TOGETHER:
-        fire(y, mode, RIGHT, kind_r, clock[0], events, filled)
-    return t
-
-
-@kernel
-def contact_switch(c: Any, pairs: Any, mode: Any, side: int, n: int, h: float, work: Any) -> Any:
-    """s and kind of one pair's first event within a Taylor step of length h."""
-    loss = pairs[side, DISSIPATION]
-    if mode[side] == OPEN:
-        return first_rise(c[U_L + side], 1.0, 0.0, n, h, work), TOUCH
-    if mode[side] == HELD:
-        return math.inf, TOUCH
-    depth = c[W_L + side] if mode[side] == CONTACT else c[U_L + side]
-    released = first_rise(depth, -1.0, 0.0, n, h, work)
-    if loss > 0.0 and mode[side] == CONTACT:
-        clamped = first_rise(c[E_L + side], -1.0, 0.0, n - 1, min(h, released), work)
-        if not clamped >= released:
-            return clamped, CLAMP
-    if mode[side] == CLAMPED:
-        back = first_rise(c[D_L + side], loss, 1.0, n - 1, min(h, released), work)
-        if not back >= released:
-            return back, REENTRY
-    return released, RELEASE
-
-
-@kernel
-def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, span: float, tolerance: float, n: int,
-                 work: Any) -> float:
-    """Expand the series at y and return an accepted step in s.
-
-    u is expanded beside w although u = w^2: the mismatch at the end of the step consists of neglected terms only
-    and decides whether the step is accepted. Shortening it costs no new expansion.
-    """
-    c = tables.c
-    left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
-    c[X_O : U_L + 2, 0] = y[X_O : U_L + 2]
-    c[V_L, 0] = y[V_L]
-    c[TIME, 0] = 0.0
-    c[W_L, 0] = math.sqrt(y[U_L]) if left else 0.0
-    c[W_R, 0] = math.sqrt(y[U_L + 1]) if right else 0.0
-    w_l, v_l = scales(bodies, pairs, y, mode, LEFT) if left else (1.0, 0.0)
-    w_r, v_r = scales(bodies, pairs, y, mode, RIGHT) if right else (1.0, 0.0)
-    # The unit of s makes the radius of convergence about 1: coefficients must not leave the range of numbers.
-    unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * fastest_rate(bodies))
-    if left and right:
-        expand_both(c, tables.f, bodies, pairs, unit, n)
-    else:
-        expand_one(c, tables.f, bodies, pairs, LEFT if left else RIGHT, unit, n)
-    h = step_size(c, left, right, w_l, w_r, max(v_l, v_r), n, tolerance)
-    if h == math.inf:
-        weight = (c[W_L, 0] if left else 1.0) * (c[W_R, 0] if right else 1.0)
-        return span / (weight * unit)
-    allowed = 100.0 * tolerance + 100.0 * EPS
-    for _ in range(60):
-        bad_l = left and abs(evaluate(c[U_L], n, h) - evaluate(c[W_L], n, h) ** 2) > allowed * w_l * w_l
-        bad_r = right and abs(evaluate(c[U_L + 1], n, h) - evaluate(c[W_R], n, h) ** 2) > allowed * w_r * w_r
-        if not (bad_l or bad_r):
-            return h
-        work[2] += 1
-        h *= 0.7
-    return math.nan
-
-
-@kernel
-def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, tolerance: float,
-                    n: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
-    """One Taylor step, cut at its first event or at the end of the span.
-
-    Returns its time, or nan if a search does not end.
-    """
-    work[1] += 1
-    left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
-    c = tables.c
-    h = contact_step(tables, bodies, pairs, y, mode, span, tolerance, n, work)
-    s_l, kind_l = contact_switch(c, pairs, mode, LEFT, n, h, work)
-    s_r, kind_r = contact_switch(c, pairs, mode, RIGHT, n, h, work)
-    if math.isnan(h) or math.isnan(s_l) or math.isnan(s_r):
-        return math.nan
-    s = min(h, s_l, s_r)
-    t = evaluate(c[TIME], n, s)
-    if t > span:
-        s = invert_time(c[TIME], n, span, s)
-        t = span
-    row = filled[GRID]
-    while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] < t:
-        state_at(c, n, invert_time(c[TIME], n, (grid[row] - clock[0]) - clock[1], s), left, right, y)
-        deliver(y, out, row)
-        row += 1
-    filled[GRID] = row
-    state_at(c, n, s, left, right, y)
-    tick(clock, t)
-    if s_l <= s * TOGETHER:
-        fire(y, mode, LEFT, kind_l, clock[0], events, filled)
-    if s_r <= s * TOGETHER:
         fire(y, mode, RIGHT, kind_r, clock[0], events, filled)
     return t
 
@@ -250,13 +169,15 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
     work : int array (4,)
         Counters, see `layout.Work`.
     """
-    n = tables.c.shape[1] - 1
+    n = tables.row.shape[0] - 1
+    pace = fastest_rate(bodies)
     idle = 0
     while True:
         limit = (span - clock[0]) - clock[1]
         row = filled[GRID]
         while row < grid.shape[0] and (grid[row] - clock[0]) - clock[1] <= 0.0:
-            deliver(y, out, row)
+            for column in range(6):
+                out[row, column] = y[column]
             row += 1
         filled[GRID] = row
         if not limit > 0.0:
@@ -270,10 +191,10 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         if held_r:
             limit = min(limit, hold_time(bodies, pairs, y, mode, RIGHT, tolerance))
         if mode[LEFT] == CONTACT or mode[RIGHT] == CONTACT:
-            t = contact_segment(tables, bodies, pairs, y, mode, clock, limit, tolerance, n, grid, out, events,
-                                filled, work)
+            t = contact_segment(tables, bodies, pairs, y, mode, pace, clock, limit, tolerance, n, grid, out,
+                                events, filled, work)
         else:
-            t = flight_segment(bodies, pairs, y, mode, clock, limit, grid, out, events, filled, work)
+            t = flight_segment(tables, bodies, pairs, y, mode, pace, clock, limit, grid, out, events, filled, work)
         if held_l:
             resume(bodies, pairs, y, mode, LEFT, tolerance)
         if held_r:

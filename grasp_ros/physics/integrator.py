@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from enum import Enum
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -24,7 +25,7 @@ from grasp_ros.physics.layout import (
     Work,
 )
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
-from grasp_ros.physics.series import new_tables, series_order
+from grasp_ros.physics.series import Tables, new_tables, series_order
 
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
@@ -52,14 +53,25 @@ class SwitchEvent(NamedTuple):
 
 def to_events(switches: Array) -> list[SwitchEvent]:
     """Records of rows (m, 5)."""
-    return [SwitchEvent(t, int(side), Event(int(kind)), u, u_rate) for t, side, kind, u, u_rate in switches.tolist()]
+    time, side, kind, u, u_rate = switches.T.tolist()
+    return list(map(SwitchEvent, time, map(int, side), map(_KINDS.__getitem__, map(int, kind)), u, u_rate))
 
 
+_KINDS = tuple(Event)
 _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
     Outcome.STALLED: Status.STALLED,
 }
+
+
+@cache
+def _workspace(accuracy: float) -> tuple[Tables, Array]:
+    """Tables and rows for events that the kernels write to before they read; no call leaves anything there.
+
+    The kernels hold the interpreter's lock, so that integrators may share them.
+    """
+    return new_tables(series_order(accuracy)), np.empty((EVENT_ROWS, 5))
 
 
 class Integrator:
@@ -105,8 +117,7 @@ class Integrator:
         self._pairs = np.array([grasp.left_contact, grasp.right_contact])
         self._y = np.concatenate([state, [state[0] - state[2], state[2] - state[4]]])
         self._mode = np.zeros(2, dtype=np.int64)
-        self._tables = new_tables(series_order(accuracy))
-        self._event_rows = np.zeros((EVENT_ROWS, 5))
+        self._tables, self._event_rows = _workspace(accuracy)
         self._switches: list[Array] = []
         self._switch_count = 0
         switching.classify(self._bodies, self._pairs, self._y, self._mode)

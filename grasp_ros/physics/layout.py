@@ -17,6 +17,9 @@ OBJECT: Any = np.int64(2)
 MASS, STIFFNESS, DAMPING, FORCE = 0, 1, 2, 3  # columns of bodies: kg, N/m, N s/m, N
 HERTZ, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
 X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)
+LANES = 8  # of a table of polynomials: order k holds the coefficients k at LANES k
+TIME, CHECK = X_L, X_R  # in contact x_l and x_r follow from the others
+Z_L, Z_R = U_L, U_R  # w = sqrt(u) of a pair in contact, u of an open one
 
 
 class Pair(IntEnum):

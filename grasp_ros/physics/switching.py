@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.flight import EPS
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -28,8 +29,10 @@ from grasp_ros.physics.layout import (
 OPEN, CONTACT, CLAMPED, LEAVING, HELD = (int(p) for p in Pair)
 TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in Event)
 GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
+TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
 
-@kernel
+
+@inlined
 def relative_motion(bodies: Any, y: Any, side: int) -> Any:
     """u' and the u'' that both bodies would have without impact forces."""
     x, v = (y[X_L], y[V_L]) if side == LEFT else (y[X_R], y[V_R])
@@ -64,12 +67,12 @@ def classify(bodies: Any, pairs: Any, y: Any, mode: Any) -> None:
 
 
 @kernel
-def power_of_two(x: float) -> float:
-    """The power of two above x >= 0: a scale that costs no rounding."""
-    return math.ldexp(1.0, math.frexp(x)[1]) if x > 0.0 else 0.0
+def root_of_two(x: float, degree: int) -> float:
+    """The power of two above the root of x >= 0; comparing exponents is cheaper than taking the root."""
+    return math.ldexp(1.0, (math.frexp(x)[1] - 1) // degree + 1) if x > 0.0 else 0.0
 
 
-@kernel
+@inlined
 def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
     """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
 
@@ -79,36 +82,37 @@ def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
     energy = 0.5 * mu * d * d + 0.4 * hertz * u * u * math.sqrt(u)
     if a > 0.0:
         energy += mu * a * (mu * a / hertz) ** (2.0 / 3.0)
-    return power_of_two((2.5 * energy / hertz) ** 0.2), power_of_two(math.sqrt(2.0 * energy / mu))
+    return root_of_two(2.5 * energy / hertz, 5), root_of_two(2.0 * energy / mu, 2)
 
 
-@kernel
+@inlined
 def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int) -> Any:
     """Scales of w and u' of one pair's impact; the other pair's impact may push it."""
-    _, a = relative_motion(bodies, y, side)
-    if mode[1 - side] in (CONTACT, HELD):
-        w, v = own_scales(bodies, pairs, y, 1 - side, 0.0)
+    d, a = relative_motion(bodies, y, side)
+    other = 1 - side
+    if mode[other] in (CONTACT, HELD):
+        w, v = impact_scales(pairs[other, HERTZ], reduced_mass(bodies, other), y[U_L + other],
+                             relative_motion(bodies, y, other)[0], 0.0)
         if w > 0.0:
             a = max(a, 0.0) + v * v / (w * w)
-    return own_scales(bodies, pairs, y, side, a)
+    return impact_scales(pairs[side, HERTZ], reduced_mass(bodies, side), y[U_L + side], d, a)
 
 
 @kernel
-def own_scales(bodies: Any, pairs: Any, y: Any, side: int, a: float) -> Any:
-    """`impact_scales` of one pair with the acceleration a from outside."""
+def reduced_mass(bodies: Any, side: int) -> float:
+    """mu of one pair."""
     m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
-    d, _ = relative_motion(bodies, y, side)
-    return impact_scales(pairs[side, HERTZ], m * m_o / (m + m_o), y[U_L + side], d, a)
+    return m * m_o / (m + m_o)
 
 
 @kernel
 def fastest_rate(bodies: Any) -> float:
-    """Power of two above the rates, in 1/s, at which the arms move by themselves."""
+    """Power of two above the rates, in 1/s, at which the bodies move by themselves."""
     rate = 0.0
-    for side in (LEFT, RIGHT):
-        arm = bodies[side]
-        rate = max(rate, arm[DAMPING] / arm[MASS], math.sqrt(arm[STIFFNESS] / arm[MASS]))
-    return power_of_two(rate)
+    for i in range(3):
+        body = bodies[i]
+        rate = max(rate, body[DAMPING] / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
+    return root_of_two(rate, 1)
 
 
 @kernel
@@ -138,7 +142,7 @@ def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: flo
         mode[side] = judge(bodies, pairs, y, side, mode[1 - side] == CONTACT)
 
 
-@kernel
+@inlined
 def settle(bodies: Any, pairs: Any, y: Any, mode: Any, tolerance: float) -> None:
     """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time.
 
@@ -187,3 +191,12 @@ def fire(y: Any, mode: Any, side: int, kind: int, now: float, events: Any, fille
     events[n, 2] = kind
     events[n, 3] = y[U_L + side]
     events[n, 4] = d
+
+
+@kernel
+def tick(clock: Any, step: float) -> None:
+    """Add to the compensated clock (two-sum), so that long runs do not drift."""
+    total = clock[0] + step
+    back = total - clock[0]
+    clock[1] += (clock[0] - (total - back)) + (step - back)
+    clock[0] = total
