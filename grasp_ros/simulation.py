@@ -152,7 +152,7 @@ def simulate(
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = np.asarray(grid, dtype=float)
-    if not (np.isfinite(grid).all() and (np.diff(grid) >= 0.0).all()):
+    if not ((grid[1:] >= grid[:-1]).all() and np.isfinite(grid[[0, -1]] if len(grid) else grid).all()):
         raise ValueError("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
         raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")

@@ -126,7 +126,9 @@ def picard(name: str, n: int) -> dict[int, list[Any]]:
             Z_L: d_l,
             Z_R: d_r,
             V_L: linear(f_l / m_l, (-k_l / m_l, x_l), (-c_l / m_l, z[V_L]), (-1 / m_l, force[0])),
-            V_O: linear(f_o / m_o, (-k_o / m_o, z[X_O]), (-c_o / m_o, z[V_O]), (1 / m_o, force[0]), (-1 / m_o, force[1])),
+            V_O: linear(
+                f_o / m_o, (-k_o / m_o, z[X_O]), (-c_o / m_o, z[V_O]), (1 / m_o, force[0]), (-1 / m_o, force[1])
+            ),
             V_R: linear(f_r / m_r, (-k_r / m_r, x_r), (-c_r / m_r, z[V_R]), (1 / m_r, force[1])),
         }
         rates = {row: [2 * value for value in times(clock, rate)] for row, rate in rates.items()}

@@ -107,8 +107,8 @@ def expand_flight(bodies: Any, flights: Any, t: float, c: Any) -> None:
     for i in range(LANES):
         c[i] = 0.0
     for body, lane in ((LEFT, X_L), (OBJECT, X_O), (RIGHT, X_R)):
-        inverse_mass = 1.0 / bodies[body, MASS]
-        force, k, d = bodies[body, FORCE] * inverse_mass, bodies[body, STIFFNESS] * inverse_mass, bodies[body, DAMPING] * inverse_mass
+        m = bodies[body, MASS]
+        force, k, d = bodies[body, FORCE] / m, bodies[body, STIFFNESS] / m, bodies[body, DAMPING] / m
         x, v = fly(flights[body], t)
         c[lane], c[lane + 1] = x, v
         for n in range(FLIGHT_ORDER):

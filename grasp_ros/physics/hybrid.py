@@ -7,8 +7,8 @@ the span, or after one Taylor step; events closer to each other than a few round
 import math
 from typing import Any
 
+from grasp_ros.physics.contact import contact_segment
 from grasp_ros.physics.flight import (
-    EPS,
     FLIGHT_ORDER,
     REENTRY_ROOT,
     RELEASE_ROOT,
@@ -18,15 +18,14 @@ from grasp_ros.physics.flight import (
     fly,
     launch,
 )
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.friction import FREE, STUCK, TRUE_MASS, fire_slide, flight_stop, judge_slide
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
-    CHECK,
     DISSIPATION,
-    LANES,
     LEFT,
+    MASS,
     OBJECT,
     RIGHT,
-    TIME,
     U_L,
     V_L,
     V_O,
@@ -34,15 +33,11 @@ from grasp_ros.physics.layout import (
     X_L,
     X_O,
     X_R,
-    Z_L,
-    Z_R,
     Outcome,
 )
-from grasp_ros.physics.polynomial import NOISE, curvatures, first_rise, invert_time, lane_range, values
-from grasp_ros.physics.series import expand_both, expand_one, step_size
+from grasp_ros.physics.polynomial import values
 from grasp_ros.physics.switching import (
     ABSENT,
-    CLAMP,
     CLAMPED,
     CONTACT,
     EVENTS,
@@ -51,28 +46,24 @@ from grasp_ros.physics.switching import (
     OPEN,
     REENTRY,
     RELEASE,
+    SLIP,
+    SPARE,
+    TOGETHER,
     TOUCH,
+    UNKNOWN,
+    classify,
     fastest_rate,
     fire,
     hold_time,
+    record,
     relative_motion,
     resume,
-    scales,
     settle,
+    tick,
 )
 
 DONE, EVENTS_FULL, NOT_FINITE, STALLED = (int(o) for o in Outcome)
-TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
 MAX_IDLE = 1000  # segments without progress in time
-
-
-@kernel
-def tick(clock: Any, step: float) -> None:
-    """Add to the compensated clock (two-sum), so that long runs do not drift."""
-    total = clock[0] + step
-    back = total - clock[0]
-    clock[1] += (clock[0] - (total - back)) + (step - back)
-    clock[0] = total
 
 
 @kernel
@@ -105,7 +96,7 @@ def fly_all(flights: Any, t: float, y: Any) -> None:
     y[U_L + 1] = y[X_O] - y[X_R]
 
 
-@kernel
+@inlined
 def deliver_flight(tables: Any, bodies: Any, flights: Any, pace: float, t: float, clock: Any, grid: Any, out: Any,
                    filled: Any) -> None:
     """Write the states at the output times before the end t of a flight.
@@ -131,9 +122,9 @@ def deliver_flight(tables: Any, bodies: Any, flights: Any, pace: float, t: float
     filled[GRID] = row
 
 
-@kernel
-def flight_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, clock: Any, span: float,
-                   grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
+@inlined
+def flight_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, pace: float, clock: Any,
+                   span: float, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
     """Fly to the first event or to the end of the span; returns the flight time, or nan if a search does not end."""
     work[0] += 1
     flights = (
@@ -145,7 +136,8 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace
     t_r, kind_r = flight_switch(bodies, pairs, y, mode, RIGHT, flights[RIGHT], flights[OBJECT], span, work)
     if math.isnan(t_l) or math.isnan(t_r):
         return math.nan
-    t = min(span, t_l, t_r)
+    t_o = flight_stop(bodies, y, mode)
+    t = min(span, t_l, t_r, t_o)
     deliver_flight(tables, bodies, flights, pace, t, clock, grid, out, filled)
     first_l, first_r = relative_motion(bodies, y, LEFT), relative_motion(bodies, y, RIGHT)
     depth_l, depth_r = y[U_L], y[U_L + 1]
@@ -159,165 +151,26 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace
         fire(y, mode, LEFT, kind_l, clock[0], events, filled)
     if t_r <= t * TOGETHER:
         fire(y, mode, RIGHT, kind_r, clock[0], events, filled)
+    if t_o <= t * TOGETHER:
+        fire_slide(bodies, pairs, friction, y, mode, STUCK, clock[0], events, filled)
     return t
 
 
 @kernel
-def rise_of_lanes(tables: Any, n: int, h: float, factor: float, front: int, back: int, offset: float,
-                  work: Any) -> float:
-    """First s in (0, h] at which offset + factor (c_front - c_back) rises through zero; back < 0: without it."""
-    c, row = tables.c, tables.row
-    for k in range(n + 1):
-        i = LANES * k
-        row[k] = factor * (c[i + front] - c[i + back] if back >= 0 else c[i + front])
-    row[0] += offset
-    noise = abs(c[front]) + abs(c[back]) if back >= 0 else abs(c[front])
-    return first_rise(row, n, h, EPS * (abs(offset) + abs(factor) * noise), work)
-
-
-@kernel
-def contact_switch(tables: Any, pairs: Any, mode: Any, side: int, n: int, h: float, work: Any) -> Any:
-    """s and kind of one pair's first event within a Taylor step of length h.
-
-    Most steps have none, and the ranges of the lanes prove it.
-    """
-    c, at, size = tables.c, tables.at, tables.size
-    loss = pairs[side, DISSIPATION]
-    if mode[side] == HELD or mode[side] == ABSENT:
-        return math.inf, TOUCH
-    z = Z_L + side
-    low, high = lane_range(c, z, h, at, size)
-    if mode[side] == OPEN:
-        if c[z] <= 0.0 and high < 0.0:
-            return math.inf, TOUCH
-        return rise_of_lanes(tables, n, h, 1.0, z, -1, 0.0, work), TOUCH
-    released = math.inf
-    if not (c[z] >= 0.0 and low > 0.0):
-        released = rise_of_lanes(tables, n, h, -1.0, z, -1, 0.0, work)
-    front, back = (V_L, V_O) if side == LEFT else (V_O, V_R)
-    if loss > 0.0 and mode[side] == CONTACT:
-        slowest = lane_range(c, front, h, at, size)[0] - lane_range(c, back, h, at, size)[1]
-        if 1.0 + loss * (c[front] - c[back]) >= 0.0 and 1.0 + loss * slowest > NOISE:
-            return released, RELEASE
-        clamped = rise_of_lanes(tables, n, min(h, released), -loss, front, back, -1.0, work)
-        if not clamped >= released:
-            return clamped, CLAMP
-    if mode[side] == CLAMPED:
-        again = rise_of_lanes(tables, n, min(h, released), loss, front, back, 1.0, work)
-        if not again >= released:
-            return again, REENTRY
-    return released, RELEASE
-
-
-@kernel
-def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, span: float, tolerance: float,
-                 n: int, work: Any) -> Any:
-    """Expand the series at y; returns an accepted step in s / unit, and the unit. tables.at has the values at its end.
-
-    G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: the mismatch at the end of the step
-    consists of neglected terms only and decides whether the step is accepted. Shortening it costs no new expansion.
-    """
-    c, at = tables.c, tables.at
-    left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
-    for lane in range(LANES):
-        c[lane] = y[lane]
-    c[TIME] = 0.0
-    w_l, v_l, w_r, v_r = 1.0, 0.0, 1.0, 0.0
-    if left:
-        c[Z_L] = math.sqrt(y[U_L])
-        w_l, v_l = scales(bodies, pairs, y, mode, LEFT)
-    if right:
-        c[Z_R] = math.sqrt(y[U_L + 1])
-        w_r, v_r = scales(bodies, pairs, y, mode, RIGHT)
-    # The unit of s makes the radius of convergence about 1: coefficients must not leave the range of numbers.
-    unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * pace)
-    if left and right:
-        expand_both(c, tables.f, bodies, pairs, unit, n)
-    else:
-        expand_one(c, tables.f, bodies, pairs, LEFT if left else RIGHT, unit, n)
-    h = step_size(c, left, right, w_l, w_r, max(v_l, v_r), n, tolerance)
-    if h == math.inf:
-        h = span / ((c[Z_L] if left else 1.0) * (c[Z_R] if right else 1.0) * unit)
-        values(c, n, h, at)
-        return h, unit
-    allowed = (100.0 * tolerance + 100.0 * EPS) * (w_l * w_r if left and right else (w_l * w_r) ** 2)
-    for _ in range(60):
-        values(c, n, h, at)
-        if abs(at[CHECK] - (at[Z_L] if left else at[Z_R]) * (at[Z_R] if right else at[Z_L])) <= allowed:
-            return h, unit
-        work[2] += 1
-        h *= 0.7
-    return math.nan, unit
-
-
-@kernel
-def deliver_contact(tables: Any, left: bool, right: bool, unit: float, s: float, t: float, n: int, clock: Any, grid: Any, out: Any,
-                    filled: Any) -> None:
-    """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
-    at = tables.at
-    row = filled[GRID]
-    while row < grid.shape[0]:
-        tau = (grid[row] - clock[0]) - clock[1]
-        if not tau < t:
-            break
-        values(tables.c, n, invert_time(tables.c, n, unit, tau, s, t, left, right, at), at)
-        u_l, u_r = at[Z_L] * at[Z_L] if left else at[Z_L], at[Z_R] * at[Z_R] if right else at[Z_R]
-        out[row, X_L], out[row, V_L] = at[X_O] + u_l, at[V_L]
-        out[row, X_O], out[row, V_O] = at[X_O], at[V_O]
-        out[row, X_R], out[row, V_R] = at[X_O] - u_r, at[V_R]
-        row += 1
-    filled[GRID] = row
-
-
-@kernel
-def contact_segment(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, clock: Any, span: float,
-                    tolerance: float, n: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> float:
-    """One Taylor step, cut at its first event or at the end of the span.
-
-    Returns its time, or nan if a search does not end.
-    """
-    work[1] += 1
-    left, right = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
-    c, at = tables.c, tables.at
-    h, unit = contact_step(tables, bodies, pairs, y, mode, pace, span, tolerance, n, work)
-    curvatures(c, n, h, tables.size)
-    s_l, kind_l = contact_switch(tables, pairs, mode, LEFT, n, h, work)
-    s_r, kind_r = contact_switch(tables, pairs, mode, RIGHT, n, h, work)
-    if math.isnan(h) or math.isnan(s_l) or math.isnan(s_r):
-        return math.nan
-    s = min(h, s_l, s_r)
-    if s < h:
-        values(c, n, s, at)
-    t = at[TIME]
-    if t > span:
-        s = invert_time(c, n, unit, span, s, t, left, right, at)
-        t = span
-        values(c, n, s, at)
-    u_l, u_r = at[Z_L] * at[Z_L] if left else at[Z_L], at[Z_R] * at[Z_R] if right else at[Z_R]
-    y[X_L], y[V_L], y[X_O], y[V_O], y[X_R], y[V_R] = at[X_O] + u_l, at[V_L], at[X_O], at[V_O], at[X_O] - u_r, at[V_R]
-    y[U_L], y[U_L + 1] = u_l, u_r
-    deliver_contact(tables, left, right, unit, s, t, n, clock, grid, out, filled)
-    tick(clock, t)
-    if s_l <= s * TOGETHER:
-        fire(y, mode, LEFT, kind_l, clock[0], events, filled)
-    if s_r <= s * TOGETHER:
-        fire(y, mode, RIGHT, kind_r, clock[0], events, filled)
-    return t
-
-
-@kernel
-def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any, span: float, tolerance: float,
-            grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
-    """Integrate y in place from the clock to `span` with constant forces on the arms; returns a `layout.Outcome`.
+def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, clock: Any, span: float,
+            tolerance: float, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
+    """Integrate y in place from the clock to `span` with constant forces; returns a `layout.Outcome`.
 
     Parameters
     ----------
     tables : series.Tables
         Workspace; its size sets the order.
     bodies, pairs : arrays (3, 4) and (2, 2)
-        See `layout`.
-    y : array (8,), mode : int array (2,), clock : array (2,)
-        State, pair modes and compensated time, updated in place.
+        See `layout`. Dry friction changes the row of the object.
+    friction : array (3,)
+        See `friction`.
+    y : array (8,), mode : int array (3,), clock : array (2,)
+        State, modes of the pairs and of the object, and compensated time, updated in place.
     span : float, s
         End of the integration on the clock.
     grid, out : arrays (n,) and (n, 6)
@@ -330,7 +183,15 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         Counters, see `layout.Work`.
     """
     n = tables.row.shape[0] - 1
+    bodies[OBJECT, MASS] = friction[TRUE_MASS]
     pace = fastest_rate(bodies)
+    if mode[LEFT] == UNKNOWN:
+        mode[OBJECT] = FREE
+        classify(bodies, pairs, y, mode)
+    stuck = mode[OBJECT] == STUCK
+    judge_slide(bodies, pairs, friction, y, mode)
+    if stuck and mode[OBJECT] != STUCK:  # other forces act from here on
+        record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
     idle = 0
     while True:
         limit = (span - clock[0]) - clock[1]
@@ -342,7 +203,7 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         filled[GRID] = row
         if not limit > 0.0:
             return DONE
-        if filled[EVENTS] + 2 > events.shape[0]:
+        if filled[EVENTS] + SPARE > events.shape[0]:
             return EVENTS_FULL
         settle(bodies, pairs, y, mode, tolerance)
         held_l, held_r = mode[LEFT] == HELD, mode[RIGHT] == HELD
@@ -351,10 +212,11 @@ def advance(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, clock: Any,
         if held_r:
             limit = min(limit, hold_time(bodies, pairs, y, mode, RIGHT, tolerance))
         if mode[LEFT] == CONTACT or mode[RIGHT] == CONTACT:
-            t = contact_segment(tables, bodies, pairs, y, mode, pace, clock, limit, tolerance, n, grid, out,
+            t = contact_segment(tables, bodies, pairs, friction, y, mode, pace, clock, limit, tolerance, n, grid, out,
                                 events, filled, work)
         else:
-            t = flight_segment(tables, bodies, pairs, y, mode, pace, clock, limit, grid, out, events, filled, work)
+            t = flight_segment(tables, bodies, pairs, friction, y, mode, pace, clock, limit, grid, out, events,
+                               filled, work)
         if held_l:
             resume(bodies, pairs, y, mode, LEFT, tolerance)
         if held_r:

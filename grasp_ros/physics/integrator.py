@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import math
 from enum import Enum
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics import hybrid, switching
-from grasp_ros.physics.layout import (
-    FORCE,
-    MASS,
-    U_L,
-    U_R,
-    Event,
-    Outcome,
-    Work,
-)
+from grasp_ros.physics import hybrid
+from grasp_ros.physics.friction import PUSH
+from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Event, Outcome, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
-from grasp_ros.physics.series import new_tables, series_order
+from grasp_ros.physics.series import Tables, new_tables, series_order
+from grasp_ros.physics.switching import SPARE, UNKNOWN
 from grasp_ros.physics.system import System
 
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
@@ -37,25 +32,36 @@ class Status(Enum):
 
 
 class SwitchEvent(NamedTuple):
-    """One switch of one pair."""
+    """One switch of one pair, or of the object."""
 
     time: float  # s
-    side: int  # layout.LEFT or layout.RIGHT
+    side: int  # layout.LEFT or RIGHT; OBJECT for what friction does
     kind: Event
-    u: float  # penetration, m
-    u_rate: float  # m/s
+    u: float  # penetration, m; 0 for the object
+    u_rate: float  # m/s; 0 for the object
 
 
 def to_events(switches: Array) -> list[SwitchEvent]:
     """Records of rows (m, 5)."""
-    return [SwitchEvent(t, int(side), Event(int(kind)), u, u_rate) for t, side, kind, u, u_rate in switches.tolist()]
+    time, side, kind, u, u_rate = switches.T.tolist()
+    return list(map(SwitchEvent, time, map(int, side), map(_KINDS.__getitem__, map(int, kind)), u, u_rate))
 
 
+_KINDS = tuple(Event)
 _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
     Outcome.STALLED: Status.STALLED,
 }
+
+
+@cache
+def _workspace(accuracy: float) -> tuple[Tables, Array]:
+    """Tables and rows for events that the kernels write to before they read; no call leaves anything there.
+
+    The kernels hold the interpreter's lock, so that integrators may share them.
+    """
+    return new_tables(series_order(accuracy)), np.empty((EVENT_ROWS, 5))
 
 
 class Integrator:
@@ -92,14 +98,13 @@ class Integrator:
         self._bodies = system.closed_loop if continuous else system.bodies.copy()
         self._bodies[self._bodies[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._bodies[:, FORCE].copy()
-        self._pairs = system.pairs.copy()
-        self._y = np.concatenate([state, [state[0] - state[2], state[2] - state[4]]])
-        self._mode = np.zeros(2, dtype=np.int64)
-        self._tables = new_tables(series_order(accuracy))
-        self._event_rows = np.zeros((EVENT_ROWS, 5))
+        self._pairs = system.pairs
+        self._friction = np.array([system.coulomb, self._bodies[OBJECT, MASS], self._own_forces[OBJECT]])
+        self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
+        self._mode = np.full(3, UNKNOWN, dtype=np.int64)
+        self._tables, self._event_rows = _workspace(accuracy)
         self._switches: list[Array] = []
         self._switch_count = 0
-        switching.classify(self._bodies, self._pairs, self._y, self._mode)
 
     @property
     def state(self) -> Array:
@@ -124,6 +129,7 @@ class Integrator:
     def hold(self, forces: Array) -> None:
         """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
         self._bodies[:, FORCE] = self._own_forces + forces
+        self._friction[PUSH] = self._bodies[OBJECT, FORCE]
 
     def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
         """Integrate for `duration` seconds.
@@ -153,10 +159,10 @@ class Integrator:
         clock = np.zeros(2)
         filled = np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
-            allowed = self._event_rows[: self._max_events - self._switch_count + 2]
+            allowed = self._event_rows[: self._max_events - self._switch_count + SPARE]
             outcome = hybrid.advance(
-                self._tables, self._bodies, self._pairs, self._y, self._mode, clock, duration, self._accuracy,
-                times, out, allowed, filled, self.work,
+                self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
+                self._accuracy, times, out, allowed, filled, self.work,
             )
             if filled[1]:
                 rows = self._event_rows[: filled[1]].copy()

@@ -41,10 +41,19 @@ CACHE_DIRECTORY = _cache_directory()
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function to machine code at its first call and keep the result on disk."""
+    return _compiled(function, False)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A kernel that becomes part of its callers: handing over many arrays can cost as much as a short function."""
+    return _compiled(function, True)
+
+
+def _compiled(function: Callable[..., Any], inline: bool) -> Any:
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(CACHE_DIRECTORY)
     try:
-        return numba.njit(cache=True, error_model="numpy")(function)
+        return numba.njit(cache=True, error_model="numpy", forceinline=inline)(function)
     finally:
         numba.config.CACHE_DIR = before
 

@@ -18,7 +18,8 @@ MASS, STIFFNESS, DAMPING, FORCE = 0, 1, 2, 3  # columns of bodies: kg, N/m, N s/
 HERTZ, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
 X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)
 LANES = 8  # of a table of polynomials: order k holds the coefficients k at LANES k
-TIME, CHECK, Z_L, Z_R = X_L, X_R, U_L, U_R  # in contact x_l and x_r follow from the others; z is w, or u of an open pair
+TIME, CHECK = X_L, X_R  # in contact x_l and x_r follow from the others
+Z_L, Z_R = U_L, U_R  # w = sqrt(u) of a pair in contact, u of an open one
 
 
 class Pair(IntEnum):
@@ -32,13 +33,24 @@ class Pair(IntEnum):
     ABSENT = 5  # a body is missing, or its contact: never any force
 
 
+class Slide(IntEnum):
+    """What dry friction makes of the object during a segment."""
+
+    FREE = 0  # there is none
+    RIGHTWARD = 1
+    LEFTWARD = 2
+    STUCK = 3
+
+
 class Event(IntEnum):
-    """Switches of one pair."""
+    """Switches of one pair, and of the object."""
 
     TOUCH = 0  # u rises through 0
     RELEASE = 1  # u falls through 0
     CLAMP = 2  # u' falls through -1/p while u > 0
     REENTRY = 3  # u' rises through -1/p while u > 0
+    STICK = 4  # the object comes to rest by friction
+    SLIP = 5  # what pushes the object exceeds its friction
 
 
 class Outcome(IntEnum):

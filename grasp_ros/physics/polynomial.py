@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.physics.flight import EPS, safe_step
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import LANES, TIME, V_L, V_O, V_R, Z_L, Z_R
 
 MAX_ITERATIONS = 100_000
@@ -46,7 +46,7 @@ def horner(total: Any, s: float, x: Any) -> Any:
     )
 
 
-@kernel
+@inlined
 def values(c: Any, n: int, s: float, at: Any) -> None:
     """Write the lanes' values at s, of the even degree n, to `at`.
 
@@ -61,7 +61,7 @@ def values(c: Any, n: int, s: float, at: Any) -> None:
         at[lane] = total[lane]
 
 
-@kernel
+@inlined
 def curvatures(c: Any, n: int, s: float, size: Any) -> None:
     """Write the lanes' sums of |c_k| s^k over k >= 2 to `size`."""
     square = s * s
@@ -73,12 +73,12 @@ def curvatures(c: Any, n: int, s: float, size: Any) -> None:
         size[lane] = (even[lane] + s * odd[lane]) * square
 
 
-@kernel
+@inlined
 def lane_range(c: Any, lane: int, s: float, at: Any, size: Any) -> Any:
-    """Bounds (low, high) that a lane's values in (0, s] keep to, as far as the line from c_0 to them does.
+    """Bounds (low, high) of a lane in (0, s], in proportion to the distance from its value c_0 at 0.
 
-    The values of one sign of all terms beyond the linear one lie between 0 and their sum, so that with at = f(s)
-    and size = sum of |c_k| s^k over k >= 2 the polynomial stays below the line from c_0 to `high`, above the one to `low`.
+    With at = f(s) and size = sum of |c_k| s^k over k >= 2, the terms of one sign beyond the linear one lie between 0
+    and half of their signed and absolute sums: f stays between the lines from c_0 to `low` and to `high`.
     """
     line = c[lane] + s * c[LANES + lane]
     middle, width = 0.5 * (line + at[lane]), 0.5 * size[lane] + NOISE * (abs(c[lane]) + abs(line) + size[lane])
@@ -138,7 +138,7 @@ def first_rise(f: Any, n: int, h: float, noise: float, work: Any) -> float:
     """First s in (0, h] at which a polynomial f, with f(0) <= 0, rises through zero; inf if there is none.
 
     The second derivative is bounded by sums of |f_k|, so the steps of `safe_step` cannot jump over a root, until f
-    is known to increase all the way to h. Within the rounding noise of its terms, or within `noise`, f counts as negative.
+    is known to increase all the way to h. Within `noise`, or the rounding noise of its terms, f counts as negative.
     """
     size = 0.0
     for k in range(n, -1, -1):
@@ -167,7 +167,7 @@ def first_rise(f: Any, n: int, h: float, noise: float, work: Any) -> float:
     return math.nan
 
 
-@kernel
+@inlined
 def invert_time(c: Any, n: int, unit: float, tau: float, high: float, total: float, left: bool, right: bool,
                 at: Any) -> float:
     """The s / unit in [0, high] at which the time since the beginning of a step is tau; `total` is the time at high.

@@ -9,13 +9,14 @@ touch and release, and w simply crosses zero at release. Its Taylor coefficients
 only nonlinear operation is the product of two series (Cauchy product), so one step is one loop over the order.
 The coefficients are also the dense output, and bounds on them prove where an event function has no root.
 
-With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g + (p H g) u'. An order waits only for the newest
+With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g (1 + p u'). An order waits only for the newest
 coefficients of the velocities, and they pass through one product; w, u = w^2 and g are known one order ahead.
 
 Source of step size and order: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by
 means of high-order Taylor methods, Experimental Mathematics 14 (2005), sections 3.1 and 3.2.
 """
 
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -23,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.flight import FLIGHT_ORDER
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -36,7 +37,6 @@ from grasp_ros.physics.layout import (
     OBJECT,
     RIGHT,
     STIFFNESS,
-    TIME,
     V_L,
     V_O,
     V_R,
@@ -117,7 +117,7 @@ def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: flo
     return ((total + a_0 * b) + (a_before * b_1 + a_1 * b_before)) + a * b_0
 
 
-@kernel
+@inlined
 def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
 
@@ -170,7 +170,7 @@ def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, 
         put(c, LANES * (k + 1), time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r)
 
 
-@kernel
+@inlined
 def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with both sides in contact: G = w_l w_r. The series are in s / unit.
 
@@ -218,7 +218,7 @@ def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) ->
         put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)
 
 
-@kernel
+@inlined
 def step_size(c: Any, left: bool, right: bool, w_l: float, w_r: float, v: float, n: int, tolerance: float) -> float:
     """Step in s / unit at which the first neglected term is `tolerance` times the scales of the impact.
 
@@ -239,7 +239,7 @@ def step_size(c: Any, left: bool, right: bool, w_l: float, w_r: float, v: float,
 
 
 class Tables(NamedTuple):
-    """Workspace of one caller, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
+    """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
 
     The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
     the beginning of the step, and CHECK for the product w w or w_l w_r as far as it is expanded.
@@ -253,16 +253,10 @@ class Tables(NamedTuple):
 
 
 def new_tables(order: int) -> Tables:
-    """Workspace for steps of one order."""
-    rows = max(order, FLIGHT_ORDER) + 1
-    return Tables(
-        _aligned(rows * LANES), _aligned(rows * FACTORS), _aligned(LANES), _aligned(LANES), np.zeros(order + 1)
-    )
-
-
-def _aligned(size: int) -> NDArray[np.float64]:
-    """Zeros that begin at a cache line, which vector loads want."""
-    line = CACHE_LINE // 8
-    room = np.zeros(size + line)
-    begin = -(room.ctypes.data // 8) % line
-    return room[begin : begin + size]
+    """Workspace for steps of one order; its tables begin at cache lines, which vector loads want."""
+    orders, line = max(order, FLIGHT_ORDER) + 1, CACHE_LINE // 8
+    ends = list(itertools.accumulate((LANES * orders, FACTORS * orders, LANES, LANES)))
+    room = np.zeros(ends[-1] + order + 1 + line)
+    room = room[-(room.ctypes.data // 8) % line :]
+    c, f, at, size, row = np.split(room, ends)
+    return Tables(c, f, at, size, row[: order + 1])

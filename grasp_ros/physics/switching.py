@@ -3,7 +3,8 @@
 import math
 from typing import Any
 
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.flight import EPS
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -26,10 +27,14 @@ from grasp_ros.physics.layout import (
 )
 
 OPEN, CONTACT, CLAMPED, LEAVING, HELD, ABSENT = (int(p) for p in Pair)
-TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in Event)
+TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = (int(e) for e in Event)
 GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
+SPARE = 3  # events that one segment can have: one per pair, and one of the object
+UNKNOWN = -1  # mode of a pair before the first call
+TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
 
-@kernel
+
+@inlined
 def relative_motion(bodies: Any, y: Any, side: int) -> Any:
     """u' and the u'' that both bodies would have without impact forces."""
     x, v = (y[X_L], y[V_L]) if side == LEFT else (y[X_R], y[V_R])
@@ -71,7 +76,7 @@ def root_of_two(x: float, degree: int) -> float:
     return math.ldexp(1.0, (math.frexp(x)[1] - 1) // degree + 1) if x > 0.0 else 0.0
 
 
-@kernel
+@inlined
 def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
     """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
 
@@ -84,23 +89,24 @@ def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
     return root_of_two(2.5 * energy / hertz, 5), root_of_two(2.0 * energy / mu, 2)
 
 
-@kernel
+@inlined
 def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int) -> Any:
     """Scales of w and u' of one pair's impact; the other pair's impact may push it."""
-    _, a = relative_motion(bodies, y, side)
-    if mode[1 - side] in (CONTACT, HELD):
-        w, v = own_scales(bodies, pairs, y, 1 - side, 0.0)
+    d, a = relative_motion(bodies, y, side)
+    other = 1 - side
+    if mode[other] in (CONTACT, HELD):
+        w, v = impact_scales(pairs[other, HERTZ], reduced_mass(bodies, other), y[U_L + other],
+                             relative_motion(bodies, y, other)[0], 0.0)
         if w > 0.0:
             a = max(a, 0.0) + v * v / (w * w)
-    return own_scales(bodies, pairs, y, side, a)
+    return impact_scales(pairs[side, HERTZ], reduced_mass(bodies, side), y[U_L + side], d, a)
 
 
 @kernel
-def own_scales(bodies: Any, pairs: Any, y: Any, side: int, a: float) -> Any:
-    """`impact_scales` of one pair with the acceleration a from outside."""
+def reduced_mass(bodies: Any, side: int) -> float:
+    """mu of one pair."""
     m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
-    d, _ = relative_motion(bodies, y, side)
-    return impact_scales(pairs[side, HERTZ], m * m_o / (m + m_o), y[U_L + side], d, a)
+    return m / (1.0 + m / m_o)  # m_o is infinite if the object sticks
 
 
 @kernel
@@ -140,7 +146,7 @@ def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: flo
         mode[side] = judge(bodies, pairs, y, side, mode[1 - side] == CONTACT)
 
 
-@kernel
+@inlined
 def settle(bodies: Any, pairs: Any, y: Any, mode: Any, tolerance: float) -> None:
     """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time.
 
@@ -164,9 +170,9 @@ def settle(bodies: Any, pairs: Any, y: Any, mode: Any, tolerance: float) -> None
         elif d < 0.0 and u < shallow * w * w and 20.0 * u * abs(a) < d * d:
             leaving += 1
     if approaching == 2:
-        mode[:] = HELD
+        mode[LEFT] = mode[RIGHT] = HELD
     elif leaving == 2:
-        mode[:] = LEAVING
+        mode[LEFT] = mode[RIGHT] = LEAVING
 
 
 @kernel
@@ -181,11 +187,22 @@ def fire(y: Any, mode: Any, side: int, kind: int, now: float, events: Any, fille
     if kind == TOUCH and d <= 0.0:
         mode[side] = OPEN
         return
+    mode[side] = OPEN if kind == RELEASE else (CLAMPED if kind == CLAMP else CONTACT)
+    record(now, side, kind, y[U_L + side], d, events, filled)
+
+
+@kernel
+def record(now: float, side: int, kind: int, u: float, d: float, events: Any, filled: Any) -> None:
+    """Append a row to the events."""
     n = filled[EVENTS]
     filled[EVENTS] = n + 1
-    mode[side] = OPEN if kind == RELEASE else (CLAMPED if kind == CLAMP else CONTACT)
-    events[n, 0] = now
-    events[n, 1] = side
-    events[n, 2] = kind
-    events[n, 3] = y[U_L + side]
-    events[n, 4] = d
+    events[n, 0], events[n, 1], events[n, 2], events[n, 3], events[n, 4] = now, side, kind, u, d
+
+
+@kernel
+def tick(clock: Any, step: float) -> None:
+    """Add to the compensated clock (two-sum), so that long runs do not drift."""
+    total = clock[0] + step
+    back = total - clock[0]
+    clock[1] += (clock[0] - (total - back)) + (step - back)
+    clock[0] = total
