@@ -18,7 +18,7 @@ from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 
 GRID_POINTS = 2001
@@ -38,9 +38,8 @@ class Trajectory:
     t : array (n,), s
     state : array (n, 6), m and m/s
         x_l, v_l, x_o, v_o, x_r, v_r; NaN for a body that is not there.
-    command : array (n, 2), N
-        f_l, f_r: what the feedback answers to the states, (4), (5), or what sampled controllers answered last; 0
-        without a controller.
+    answers : array (n, 2), N, or None
+        What sampled controllers answered last; None under continuous feedback.
     switches : array (m, 5)
         Time in s, side, kind, u in m and u' in m/s of every switch, in the order of time; see `events`.
     work : array of int
@@ -52,10 +51,21 @@ class Trajectory:
     sampled: bool
     t: Array
     state: Array
-    command: Array
+    answers: Array | None
     switches: Array
     work: np.ndarray
     status: Status
+
+    @property
+    def command(self) -> Array:
+        """Commands f_l, f_r (n, 2) in N: what the feedback answers to the states, (4), (5), or answered last.
+
+        0 without a controller.
+        """
+        if self.answers is not None:
+            return self.answers
+        answers: Array = self.scene.system.commands(0, self.state.T)[:2].T
+        return answers
 
     @property
     def energy(self) -> Energy:
@@ -103,8 +113,9 @@ def load(path: Path) -> Trajectory:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
+            answers = data["command"] if data["sampled"] else None
             return Trajectory(
-                scene, bool(data["sampled"]), data["t"], data["state"], data["command"], data["events"], data["work"],
+                scene, bool(data["sampled"]), data["t"], data["state"], answers, data["events"], data["work"],
                 Status[str(data["status"])],
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
@@ -157,13 +168,13 @@ def simulate(
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
         raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
     if sampled:
-        states, command = _sampled(scene, integrator, grid, changes, progress)
+        states, answers = _sampled(scene, integrator, grid, changes, progress)
     else:
-        states = _continuous(scene, integrator, grid)
-        command = scene.system.commands(0, states.T)[:2].T
-    states[:, _absent(scene.system)] = np.nan
+        states, answers = _continuous(scene, integrator, grid), None
+    for body in scene.system.absent:
+        states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return Trajectory(
-        scene, sampled, grid[: len(states)], states, command, integrator.switches, integrator.work.copy(),
+        scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
         integrator.status,
     )
 
@@ -171,12 +182,6 @@ def simulate(
 def tick_times(scene: Scene) -> Array:
     """Times in s of all control periods of a scene, shape (ticks + 1,)."""
     return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
-
-
-def _absent(system: System) -> list[int]:
-    """Columns of the state of bodies that are not there."""
-    gone = [column for body, column in COLUMN.items() if body not in system.present]
-    return [column + part for column in gone for part in (0, 1)]
 
 
 def _continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:

@@ -124,10 +124,10 @@ def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
     assert (two_runs[0] / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("name", ["noise", "pulse", "hammer", "no_contact"])
+@pytest.mark.parametrize("name", ["noise", "everything", "hammer", "no_contact", "friction_slide"])
 def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) -> None:
     """Simulation, graph and bag; and nothing is there that the scene does not name."""
-    settings = ["time.duration_s=1.0", *(["object_pulse.start_s=0.3"] if name == "pulse" else [])]
+    settings = ["time.duration_s=1.0", *(["object_pulse.start_s=0.3"] if name == "everything" else [])]
     graph = Graph(scene.load(name, settings), tmp_path / "run", ACCURACY)
     graph.start()
     try:

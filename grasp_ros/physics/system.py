@@ -81,6 +81,11 @@ class System:
         return [body for body in BODIES if self.bodies[body, MASS] > 0.0]
 
     @property
+    def absent(self) -> list[int]:
+        """Bodies that are not there."""
+        return [body for body in BODIES if self.bodies[body, MASS] == 0.0]
+
+    @property
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
         return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZ] > 0.0]

@@ -121,8 +121,8 @@ def _ours(scene: Scene) -> Method:
     def build(accuracy: float) -> Solve:
         def solve(grid: Array) -> Answer:
             motion = simulation.simulate(scene, grid=grid, accuracy=accuracy)
-            touches = [event.side for event in motion.events if event.kind == Event.TOUCH]
-            return Answer(motion.state, (touches.count(LEFT), touches.count(RIGHT)), motion.status.name.lower())
+            touches = len(motion.times(Event.TOUCH, LEFT)), len(motion.times(Event.TOUCH, RIGHT))
+            return Answer(motion.state, touches, motion.status.name.lower())
 
         return solve
 
