@@ -4,13 +4,14 @@ import math
 from typing import Any
 
 from grasp_ros.physics.flight import EPS
-from grasp_ros.physics.friction import contact_slide, fire_slide
+from grasp_ros.physics.friction import FREE, contact_slide, fire_slide
 from grasp_ros.physics.jit import inlined
 from grasp_ros.physics.layout import (
     CHECK,
     DISSIPATION,
     LANES,
     LEFT,
+    OBJECT,
     RIGHT,
     TIME,
     U_L,
@@ -176,7 +177,9 @@ def contact_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any,
     curvatures(c, n, h, tables.size)
     s_l, kind_l = contact_switch(tables, pairs, mode, LEFT, n, h, work)
     s_r, kind_r = contact_switch(tables, pairs, mode, RIGHT, n, h, work)
-    s_o, following = contact_slide(tables, pairs, friction, mode, n, h, work)
+    s_o, following = math.inf, FREE
+    if mode[OBJECT] != FREE:
+        s_o, following = contact_slide(tables, pairs, friction, mode, n, h, work)
     if math.isnan(h) or math.isnan(s_l) or math.isnan(s_r) or math.isnan(s_o):
         return math.nan
     s = min(h, s_l, s_r, s_o)

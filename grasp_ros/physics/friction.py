@@ -122,8 +122,6 @@ def contact_slide(tables: Any, pairs: Any, friction: Any, mode: Any, n: int, h: 
     After a stop the next mode is left to `judge_slide`.
     """
     slide, row = mode[OBJECT], tables.row
-    if slide == FREE:
-        return math.inf, FREE
     if slide != STUCK:
         factor = -1.0 if slide == RIGHTWARD else 1.0
         for k in range(n + 1):
