@@ -15,6 +15,7 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
+from grasp_ros.methods.registry import ACCURACY_KNOB, EXACT, METHODS, STEP, TOLERANCE, UNITS
 from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Integrator, Status, compile_kernels
 from grasp_ros.physics.jit import COMPILING, kernels_on_disk
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
@@ -49,10 +50,12 @@ def _parser() -> argparse.ArgumentParser:
         return sub
 
     add("scenes", _scenes, "list the scenes that come with the package")
+    add("methods", _methods, "list the methods of integration: order, source, what each does at a touch")
     sub = add("simulate", _simulate, "simulate a scene without ROS")
     _add_scene(sub)
     sub.add_argument("--grid", type=_grid, metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
+    _add_method(sub)
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
     sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
     _add_scene(sub)
@@ -87,6 +90,23 @@ def _add_scene(sub: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_method(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument("--method", choices=METHODS, default=EXACT, help="way to integrate; see `grasp methods`")
+    setting = sub.add_mutually_exclusive_group()
+    setting.add_argument("--step", type=float, metavar="S", help="step in s of a method with a fixed step")
+    setting.add_argument("--tolerance", type=float, metavar="T", help="tolerance (rtol = atol) of an adaptive method")
+
+
+def _setting(options: argparse.Namespace) -> float | None:
+    """The number that belongs to the method's knob; one that belongs to another knob is refused."""
+    given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
+    knob = METHODS[options.method].knob
+    for other in (STEP, TOLERANCE):
+        if other != knob and given[other] is not None:
+            raise ValueError(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
+    return None if given[knob] is None else float(given[knob])
+
+
 def _grid(word: str) -> int:
     number = int(word)
     if number < 2:
@@ -106,6 +126,13 @@ def _scenes(_: argparse.Namespace) -> int:
     return 0
 
 
+def _methods(_: argparse.Namespace) -> int:
+    for name, method in METHODS.items():
+        print(f"{name}\n  order: {method.order}\n  source: {method.source}\n  at a touch: {method.at_touch}")
+        print(f"  --{method.knob}, default {method.default:g}{UNITS[method.knob]}")
+    return 0
+
+
 def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.report import describe_trajectory, table
 
@@ -114,14 +141,23 @@ def _simulate(options: argparse.Namespace) -> int:
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=not options.sampled, delay=1.0) as bar:
         trajectory = simulate(
-            scene, grid=grid, sampled=options.sampled, accuracy=options.accuracy,
+            scene, grid=grid, sampled=options.sampled, method=options.method, setting=_setting(options),
             progress=lambda reached: bar.update(reached - bar.n),
         )
-    print(table(describe_trajectory(trajectory)))
+    print(table({**dict(describe_trajectory(trajectory)), **_describe_method(trajectory)}.items()))
     if options.output is not None:
         trajectory.save(options.output)
         print(f"written to {options.output}")
     return 0 if trajectory.status is Status.DONE else 1
+
+
+def _describe_method(trajectory: Trajectory) -> dict[str, str]:
+    method = METHODS[trajectory.method]
+    rows = {
+        "method": f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}",
+        "work": ", ".join(f"{number} {name}" for name, number in trajectory.counters.items()),
+    }
+    return rows if method.finds_contacts else {"touches left, right": "not looked for", **rows}
 
 
 def _run(options: argparse.Namespace) -> int:
