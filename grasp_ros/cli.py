@@ -19,6 +19,7 @@ from grasp_ros.methods.registry import ACCURACY_KNOB, EXACT, METHODS, STEP, TOLE
 from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Integrator, Status, compile_kernels
 from grasp_ros.physics.jit import COMPILING, kernels_on_disk
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
+from grasp_ros.studies import commands as studies
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -65,17 +66,8 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("plot", _plot, "draw a bag, a file of `grasp simulate`, or a scene")
     sub.add_argument("source", metavar="BAG|FILE.npz|SCENE")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE", help="image file (default: beside the source)")
-    studies = commands.add_parser("study", help="measure, and print what was measured").add_subparsers(
-        required=True, metavar="study"
-    )
-    sub = studies.add_parser("speed", help="time to a given error, beside other solvers")
-    sub.set_defaults(command=_study_speed)
-    _add_scene(sub)
-    sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")
-    sub.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write the records")
-    sub = studies.add_parser("graph", help="lockstep ticks per second, beside a bare rclpy graph")
-    sub.set_defaults(command=_study_graph)
-    _add_scene(sub)
+    study = commands.add_parser("study", help="measure, and print what was measured")
+    studies.add_to(study.add_subparsers(required=True, metavar="study"), _add_scene, _prepare)
     return parser
 
 
@@ -221,22 +213,6 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or (beside if source.exists() else Path(f"{motion.scene.name}.png"))
     plots.draw(motion, output, motion.scene.feedback_in_words(sampled))
     print(f"written to {output}")
-    return 0
-
-
-def _study_speed(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import speed
-
-    _prepare()
-    speed.run(scenes.load(options.scene, options.settings), options.error, options.output)
-    return 0
-
-
-def _study_graph(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import graph
-
-    _prepare()
-    graph.run(scenes.load(options.scene, options.settings), options.accuracy)
     return 0
 
 

@@ -6,6 +6,7 @@ the switches of (10) as terminal events, and starts afresh after each.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -158,9 +159,11 @@ def _integrate(
             return super().step()
 
     options = {"jac": jacobian} if name in IMPLICIT else {}
-    result = integrate.solve_ivp(
-        slopes, span, y, Counting, grid, events=events, args=args, rtol=tolerance, atol=tolerance, **options
-    )
+    with warnings.catch_warnings():  # an integration that fails says so in its status
+        warnings.simplefilter("ignore")
+        result = integrate.solve_ivp(
+            slopes, span, y, Counting, grid, events=events, args=args, rtol=tolerance, atol=tolerance, **options
+        )
     work[Work.RIGHT_HAND_SIDES] += result.nfev
     work[Work.IMPLICIT_ITERATIONS] += result.nlu
     return result

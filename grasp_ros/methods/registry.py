@@ -52,7 +52,7 @@ def _tens(first: float, last: float, per_decade: int = 1) -> tuple[float, ...]:
                                                                         round(last * per_decade) + 1))
 
 
-_STEPS = tuple(base * 10.0**-decade for decade in range(2, 6) for base in (1.0, 0.5, 0.2))[:-2]
+_STEPS = tuple(base * 10.0**-decade for decade in range(2, 6) for base in (1.0, 0.5, 0.2))
 _HAIRER = "Hairer, Norsett, Wanner, Solving ODEs I"
 _STIFF = "Hairer, Wanner, Solving ODEs II"
 _INSIDE = "nothing: the switches are inside the right-hand side"

@@ -18,18 +18,23 @@ import numba
 numba.config.SLP_VECTORIZE = 1
 
 
+def sources_digest(room: Path) -> str:
+    """A short name of the sources of this room, and of a room whose kernels call them."""
+    digest = hashlib.sha256()
+    for source in sorted({*Path(__file__).parent.glob("*.py"), *room.glob("*.py")}):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
 @cache
 def _cache_directory(room: Path) -> Path:
-    """A writable directory named after the sources of this room, and of the room whose kernels it is for.
+    """A writable directory for the kernels of a room.
 
     numba looks for changes only in the file of the function that is called, not in those that it calls from other
     files: without the digest an edited kernel would go on running as it was.
     """
-    digest = hashlib.sha256()
-    for source in sorted({*Path(__file__).parent.glob("*.py"), *room.glob("*.py")}):
-        digest.update(source.read_bytes())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    directory = Path(base) / "grasp_ros" / digest.hexdigest()[:16]
+    directory = Path(base) / "grasp_ros" / sources_digest(room)
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError:

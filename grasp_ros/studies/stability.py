@@ -1,0 +1,117 @@
+"""At which control period the sampled loop loses stability: exactly, from the sampled linear system of a free arm.
+
+With a command that is held over a period h, and computed from the state `delay` periods before, the state of a free
+arm and its waiting commands goes from tick to tick by a constant matrix. The loop is stable where its spectral
+radius is below 1 (K. J. Astrom, B. Wittenmark: Computer-Controlled Systems, section 3.2). Contacts are not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.integrator import Integrator
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp, feedback
+
+FIRST_S, LAST_S, SCAN = 1e-4, 10.0, 3000  # periods that are looked at for the first crossing
+TICKS = 4000
+NEAR = (0.98, 1.02)  # of the limit: where the simulation confirms it
+
+
+class Limit(NamedTuple):
+    """Loss of stability of one arm."""
+
+    delay: int  # periods
+    period: float  # s; infinite if there is none
+    checks: tuple[tuple[float, float, float], ...]  # period, spectral radius, growth per period in the simulation
+
+
+def transition(arm: Arm, period: float, delay: int) -> Array:
+    """Matrix from tick to tick of (x, v, commands that wait), shape (2 + delay, 2 + delay)."""
+    from scipy.linalg import expm
+
+    m = arm.mass
+    system = np.array([[0.0, 1.0, 0.0], [-arm.stiffness / m, -arm.damping / m, 1.0 / m], [0.0, 0.0, 0.0]])
+    flow = expm(system * period)
+    gain = np.array([-arm.position_gain, -arm.velocity_gain])
+    if delay == 0:
+        return np.asarray(flow[:2, :2] + np.outer(flow[:2, 2], gain))
+    matrix = np.zeros((2 + delay, 2 + delay))
+    matrix[:2, :2] = flow[:2, :2]
+    matrix[:2, 2] = flow[:2, 2]  # the oldest command acts
+    matrix[2:-1, 3:] = np.eye(delay - 1)
+    matrix[-1, :2] = gain
+    return matrix
+
+
+def spectral_radius(arm: Arm, period: float, delay: int) -> float:
+    """Factor per period by which the slowest motion decays or grows."""
+    return float(np.abs(np.linalg.eigvals(transition(arm, period, delay))).max())
+
+
+def first_limit(arm: Arm, delay: int) -> float:
+    """Smallest period in s at which the spectral radius passes 1 upwards; infinite if there is none up to LAST_S."""
+    from scipy.optimize import brentq
+
+    periods = np.geomspace(FIRST_S, LAST_S, SCAN)
+    above = np.array([spectral_radius(arm, period, delay) >= 1.0 for period in periods])
+    crossings = np.nonzero(above[1:] & ~above[:-1])[0]
+    if not len(crossings):
+        return math.inf
+    low, high = periods[crossings[0]], periods[crossings[0] + 1]
+    return float(brentq(lambda h: spectral_radius(arm, h, delay) - 1.0, low, high, xtol=1e-15, rtol=1e-15))
+
+
+def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) -> float:
+    """Growth per period of a free arm in the plant's own simulation, from the second half of the run."""
+    far, none = Arm(1.0, 0.0, 0.0, 0.0, 0.0), Contact(1.0, 0.0)
+    start = np.array([1e-150, 0.0, 1e150, 0.0, 2e150, 0.0])  # room to grow without ever meeting the object
+    integrator = Integrator(Grasp(arm, far, none, none, 1.0), start, continuous=False)
+    waiting = [0.0] * delay
+    sizes = []
+    for tick in range(ticks):
+        x, v = integrator.state[:2]
+        sizes.append(math.hypot(math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * x, v))
+        waiting.append(feedback(arm, x, v))
+        integrator.hold(waiting.pop(0), 0.0)
+        integrator.advance(period, start=tick * period)
+    half = ticks // 2
+    window = ticks // 8  # maxima over a window: the phase of the oscillation drops out
+    return float((max(sizes[-window:]) / max(sizes[half - window : half])) ** (1.0 / (ticks - half)))
+
+
+def limits(arm: Arm, delays: tuple[int, ...] = (0, 1)) -> list[Limit]:
+    """The first limit for each delay, confirmed by simulation a little below and above it."""
+    found = []
+    for delay in delays:
+        period = first_limit(arm, delay)
+        near = [factor * period for factor in NEAR if math.isfinite(period)]
+        checks = tuple((h, spectral_radius(arm, h, delay), simulated_growth(arm, h, delay)) for h in near)
+        found.append(Limit(delay, period, checks))
+    return found
+
+
+def report(name: str, found: list[Limit]) -> str:
+    """Lines for one arm."""
+    lines = [f"{name}: largest stable control period"]
+    for limit in found:
+        lines.append(f"  delay of {limit.delay} periods: {1e3 * limit.period:.10g} ms (spectral radius 1)")
+        for period, radius, growth in limit.checks:
+            lines.append(f"    at {1e3 * period:8.3f} ms: spectral radius {radius:.6f}, simulated {growth:.6f}")
+    return "\n".join(lines)
+
+
+def curves(arm: Arm) -> tuple[dict[str, tuple[Array, Array]], list[tuple[float, float]], dict[str, float]]:
+    """What `figures.stability` draws: radius against period for both delays, simulated growth, and the limits."""
+    found = {f"delay of {limit.delay} periods": limit for limit in limits(arm) if math.isfinite(limit.period)}
+    last = 1.3 * max((limit.period for limit in found.values()), default=FIRST_S)
+    periods = np.linspace(last / 300.0, last, 300)
+    radii = {
+        label: (periods, np.array([spectral_radius(arm, h, limit.delay) for h in periods]))
+        for label, limit in found.items()
+    }
+    simulated = [(h, growth) for limit in found.values() for h, _, growth in limit.checks]
+    simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in found.values() for h in periods[30::45]]
+    return radii, simulated, {label: limit.period for label, limit in found.items()}
