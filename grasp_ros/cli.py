@@ -93,8 +93,8 @@ def _setting(options: argparse.Namespace) -> float | None:
     """The number that belongs to the method's knob; one that belongs to another knob is refused."""
     given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
     knob = METHODS[options.method].knob
-    for other in (STEP, TOLERANCE):
-        if other != knob and given[other] is not None:
+    for other, number in given.items():
+        if other != knob and number not in (None, ACCURACY):
             raise ValueError(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
     return None if given[knob] is None else float(given[knob])
 

@@ -17,8 +17,9 @@ from grasp_ros import simulation
 from grasp_ros.methods import registry
 from grasp_ros.scene import Scene
 from grasp_ros.studies import measure
+from grasp_ros.studies.contenders import OURS, all_contenders
 from grasp_ros.studies.measure import Effort
-from grasp_ros.studies.peers import OURS, Contender, all_contenders
+from grasp_ros.studies.peers import Contender
 from grasp_ros.studies.records import (
     Journal,
     Record,

@@ -8,11 +8,11 @@ from typing import NamedTuple
 from grasp_ros.methods.registry import UNITS
 from grasp_ros.scene import Scene
 from grasp_ros.studies import accuracy
-from grasp_ros.studies.measure import FULL, Effort
-from grasp_ros.studies.peers import own_contenders
+from grasp_ros.studies.contenders import own_contenders
+from grasp_ros.studies.measure import FULL, QUICK
 from grasp_ros.studies.records import Record
 
-HASTE: Effort = FULL._replace(patience=0.3)  # an adviser is asked for a minute
+HASTE = FULL._replace(patience=0.3)  # an adviser is asked for a minute
 OTHERS = 3
 
 
@@ -61,7 +61,7 @@ def advise(records: list[Record], error: float | None = None, budget: float | No
     return Advice(ranked[0] if ranked else None, ranked[1 : 1 + OTHERS], min(sound, key=limited))
 
 
-def run(scene: Scene, directory: Path, error: float | None, budget: float | None) -> tuple[Advice, str]:
+def run(scene: Scene, directory: Path, error: float | None, budget: float | None, quick: bool) -> tuple[Advice, str]:
     """Measure what is not in the journal yet, and answer in words.
 
     Raises
@@ -71,7 +71,8 @@ def run(scene: Scene, directory: Path, error: float | None, budget: float | None
     """
     if (error is None) == (budget is None):
         raise ValueError("--error, --budget: allowed: exactly one of them, a number > 0")
-    advice = advise(accuracy.run([scene], directory, HASTE, own_contenders()), error, budget)
+    effort = QUICK if quick else HASTE
+    advice = advise(accuracy.run([scene], directory, effort, own_contenders()), error, budget)
     wish = f"an error of {error:g}" if budget is None else f"{budget:g} s"
     lines = [f"{scene.name}, {wish}; error: {accuracy.METRIC}"]
     if advice.choice is None:

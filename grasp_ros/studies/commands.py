@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ def add_to(
     """Add all studies to the parser of `grasp study`; `prepare` compiles what one needs when it runs."""
     def add(name: str, command: Callable[[argparse.Namespace], int], text: str) -> argparse.ArgumentParser:
         sub: argparse.ArgumentParser = studies.add_parser(name, help=text, description=text)
-        sub.set_defaults(command=command, prepare=prepare)
+        sub.set_defaults(command=partial(_with_packages, command), prepare=prepare)
         return sub
 
     sub = add("accuracy", _accuracy, "error against time of every method: records, tables, figures; resumes")
@@ -30,6 +31,7 @@ def add_to(
     add_scene(sub)
     sub.add_argument("--error", type=float, help="largest error that is acceptable, in all states (m, m/s)")
     sub.add_argument("--budget", type=float, metavar="SECONDS", help="longest time that a simulation may take")
+    sub.add_argument("--quick", action="store_true", help="fewer settings: an answer in seconds")
     _add_directory(sub)
     sub = add("loop", _loop, "control period against deviation and wall time; largest stable period")
     add_scene(sub)
@@ -47,6 +49,13 @@ def add_to(
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write the records")
     sub = add("graph", _graph, "lockstep ticks per second, beside a bare rclpy graph")
     add_scene(sub)
+
+
+def _with_packages(command: Callable[[argparse.Namespace], int], options: argparse.Namespace) -> int:
+    try:
+        return command(options)
+    except ModuleNotFoundError as error:
+        raise ValueError(f"this study needs {error.name}; pip install 'grasp_ros[study]'") from None
 
 
 def _add_scenes(sub: argparse.ArgumentParser) -> None:
@@ -74,7 +83,7 @@ def _subjects(options: argparse.Namespace) -> Sequence[Scene]:
 
 def _accuracy(options: argparse.Namespace) -> int:
     from grasp_ros.studies import accuracy, drift, figures, measure
-    from grasp_ros.studies.peers import all_contenders
+    from grasp_ros.studies.contenders import all_contenders
 
     options.prepare()
     effort = measure.QUICK if options.quick else measure.FULL
@@ -96,7 +105,7 @@ def _advise(options: argparse.Namespace) -> int:
 
     options.prepare()
     scene = scenes.load(options.scene, options.settings)
-    advice, text = adviser.run(scene, options.output, options.error, options.budget)
+    advice, text = adviser.run(scene, options.output, options.error, options.budget, options.quick)
     print(text)
     return 0 if advice.choice is not None else 1
 
@@ -110,9 +119,10 @@ def _loop(options: argparse.Namespace) -> int:
     points = loop.run(scene, options.output, periods)
     print(loop.report(points))
     figures.control_period(points, scene.name, options.output / "control_period.png")
-    for name, arm in (("left arm", scene.grasp.left), ("right arm", scene.grasp.right)):
-        print("\n" + stability.report(name, stability.limits(arm)))
-    figures.stability(*stability.curves(scene.grasp.left), options.output / "stability.png")
+    for name, arm in (("left", scene.grasp.left), ("right", scene.grasp.right)):
+        found = stability.limits(arm)
+        print("\n" + stability.report(f"{name} arm", found))
+        figures.stability(*stability.curves(arm, found), options.output / f"stability_{name}.png")
     print(f"written to {options.output}")
     return 0
 

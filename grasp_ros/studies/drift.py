@@ -14,7 +14,8 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.model import energy
 from grasp_ros.scene import Scene
 from grasp_ros.studies import measure
-from grasp_ros.studies.peers import Contender, all_contenders
+from grasp_ros.studies.contenders import all_contenders
+from grasp_ros.studies.peers import Contender
 from grasp_ros.studies.records import Journal, origin, scene_key
 
 SECONDS = 2000.0

@@ -114,7 +114,11 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
         if not grid[row, 0].xaxis_inverted():
             grid[row, 0].invert_xaxis()
         grid[row, 0].set_ylabel("touches missed\nor invented")
-        grid[row, -1].legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        lines = {line.get_label(): line for axes in grid[row] for line in axes.get_lines()}
+        figure.legend(
+            lines.values(), lines.keys(), fontsize=7, loc=("outside right upper", "outside right lower")[row],
+            frameon=False,
+        )
     _save(figure, path)
 
 
@@ -146,7 +150,7 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
     period = [point.period_ms for point in points]
     left.plot(period, [point.deviation for point in points], "o-", color="#0072b2")
     deviation = "largest deviation of a position\nfrom continuous feedback, m"
-    left.set(ylabel=deviation, title=f"{name}: a long period costs")
+    left.set(ylabel=deviation, title=f"{name}: what a short period gives")
     for label, values, line in (
         ("one process", [point.one_process for point in points], {"color": "#0072b2", "marker": "o"}),
         ("four processes, with bag and monitor", [point.four_processes for point in points],
@@ -159,7 +163,7 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
             right.plot(*zip(*there, strict=True), label=label, **line)
     right.axhline(1.0, color="black", linewidth=0.8, linestyle=":")
     right.text(period[0], 1.15, "real time", fontsize=7)
-    right.set(ylabel="wall seconds per simulated second", title="and saves")
+    right.set(ylabel="wall seconds per simulated second", title="what it takes")
     right.legend(fontsize=7)
     for axes in (left, right):
         axes.set(xscale="log", yscale="log", xlabel="control period, ms")

@@ -40,7 +40,7 @@ class Effort(NamedTuple):
 
 
 FULL = Effort(patience=0.7, deadline=10.0, budget=0.25, most=30, stride=1)
-QUICK = Effort(patience=0.2, deadline=10.0, budget=0.02, most=3, stride=4)
+QUICK = Effort(patience=0.2, deadline=60.0, budget=0.02, most=3, stride=4)
 
 
 class Deadline(Exception):  # noqa: N818 - an instant, not an error

@@ -13,7 +13,7 @@ from grasp_ros import simulation
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
 from grasp_ros.studies import accuracy, drift, figures, loop, measure, predictability, sections, stability
-from grasp_ros.studies.peers import all_contenders, own_contenders
+from grasp_ros.studies.contenders import all_contenders, own_contenders
 from grasp_ros.studies.records import write_csv
 
 COMMAND = "grasp study page"
@@ -46,6 +46,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     records = accuracy.run(subjects, directory, effort, contenders)
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
+    limits = stability.limits(case.grasp.left)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
     place = docs / "accuracy"
@@ -56,12 +57,12 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     figures.energy_drift(drifts, place / "energy_drift.png")
     figures.prediction(predictions, place / "prediction.png")
     figures.control_period(points, case.name, place / "control_period.png")
-    figures.stability(*stability.curves(case.grasp.left), place / "stability.png")
+    figures.stability(*stability.curves(case.grasp.left, limits), place / "stability.png")
     page = docs / "accuracy.md"
     text = [
         sections.head(COMMAND), sections.choice(records), sections.paper(records), sections.tolerance(records),
         sections.missed(records), sections.energy(drifts), sections.prediction(predictions),
-        sections.topics(case.title, points, stability.limits(case.grasp.left)), sections.output(_output(subjects)),
+        sections.topics(case.title, points, limits), sections.output(_output(subjects)),
         sections.methods(), sections.details(records),
     ]
     page.write_text("\n\n".join(text) + "\n", encoding="utf-8")

@@ -20,7 +20,8 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.studies import accuracy, measure, peer_heyoka, predictability
-from grasp_ros.studies.peers import Contender, Solve, all_contenders, own_contenders
+from grasp_ros.studies.contenders import all_contenders, own_contenders
+from grasp_ros.studies.peers import Contender, Solve
 from grasp_ros.studies.records import Journal, Record, describe_machine
 
 BUDGET_S, FEWEST, MOST = 3.0, 3, 200  # per solver: time for its repeats, and their number

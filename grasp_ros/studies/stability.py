@@ -8,6 +8,7 @@ radius is below 1 (K. J. Astrom, B. Wittenmark: Computer-Controlled Systems, sec
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,27 +29,54 @@ class Limit(NamedTuple):
     checks: tuple[tuple[float, float, float], ...]  # period, spectral radius, growth per period in the simulation
 
 
-def transition(arm: Arm, period: float, delay: int) -> Array:
-    """Matrix from tick to tick of (x, v, commands that wait), shape (2 + delay, 2 + delay)."""
-    from scipy.linalg import expm
+def transition(arm: Arm, period: Array, delay: int) -> Array:
+    """Matrices from tick to tick of (x, v, commands that wait).
 
-    m = arm.mass
-    system = np.array([[0.0, 1.0, 0.0], [-arm.stiffness / m, -arm.damping / m, 1.0 / m], [0.0, 0.0, 0.0]])
-    flow = expm(system * period)
+    Parameters
+    ----------
+    arm : Arm
+    period : array (n,), s
+    delay : int
+        Periods between a state and the command that answers it.
+
+    Returns
+    -------
+    array (n, 2 + delay, 2 + delay)
+    """
+    flow = held_flow(arm, period)
     gain = np.array([-arm.position_gain, -arm.velocity_gain])
     if delay == 0:
-        return np.asarray(flow[:2, :2] + np.outer(flow[:2, 2], gain))
-    matrix = np.zeros((2 + delay, 2 + delay))
-    matrix[:2, :2] = flow[:2, :2]
-    matrix[:2, 2] = flow[:2, 2]  # the oldest command acts
-    matrix[2:-1, 3:] = np.eye(delay - 1)
-    matrix[-1, :2] = gain
+        return np.asarray(flow[:, :2, :2] + flow[:, :2, 2:] * gain)
+    matrix = np.zeros((len(period), 2 + delay, 2 + delay))
+    matrix[:, :2, :3] = flow[:, :2, :]  # the oldest command acts
+    matrix[:, 2:-1, 3:] = np.eye(delay - 1)
+    matrix[:, -1, :2] = gain
     return matrix
 
 
+def held_flow(arm: Arm, period: Array) -> Array:
+    """(x, v) after a period from x, v and a command that is held: arrays (n, 2, 3), by the roots of the arm."""
+    m, k, c = arm.mass, arm.stiffness, arm.damping
+    s = c / (2.0 * m)
+    r = np.sqrt(complex(s * s - k / m))
+    fast, slow = np.exp((-s - r) * period), np.exp((-s + r) * period)
+    even = (0.5 * (slow + fast)).real
+    odd = ((slow - fast) / (2.0 * r)).real if r != 0.0 else period * np.exp(-s * period)
+    x_x = even + s * odd
+    without_spring = (period - odd) / c if c > 0.0 else 0.5 * period**2 / m
+    pushed = (1.0 - x_x) / k if k > 0.0 else without_spring
+    columns = [[x_x, odd, pushed], [-k / m * odd, even - s * odd, odd / m]]
+    return np.moveaxis(np.array(columns), 2, 0)
+
+
+def spectral_radii(arm: Arm, period: Array, delay: int) -> Array:
+    """Factor per period by which the slowest motion decays or grows, for periods (n,) in s."""
+    return np.asarray(np.abs(np.linalg.eigvals(transition(arm, period, delay))).max(axis=1))
+
+
 def spectral_radius(arm: Arm, period: float, delay: int) -> float:
-    """Factor per period by which the slowest motion decays or grows."""
-    return float(np.abs(np.linalg.eigvals(transition(arm, period, delay))).max())
+    """The same for one period."""
+    return float(spectral_radii(arm, np.array([period]), delay)[0])
 
 
 def first_limit(arm: Arm, delay: int) -> float:
@@ -56,7 +84,7 @@ def first_limit(arm: Arm, delay: int) -> float:
     from scipy.optimize import brentq
 
     periods = np.geomspace(FIRST_S, LAST_S, SCAN)
-    above = np.array([spectral_radius(arm, period, delay) >= 1.0 for period in periods])
+    above = spectral_radii(arm, periods, delay) >= 1.0
     crossings = np.nonzero(above[1:] & ~above[:-1])[0]
     if not len(crossings):
         return math.inf
@@ -103,15 +131,14 @@ def report(name: str, found: list[Limit]) -> str:
     return "\n".join(lines)
 
 
-def curves(arm: Arm) -> tuple[dict[str, tuple[Array, Array]], list[tuple[float, float]], dict[str, float]]:
-    """What `figures.stability` draws: radius against period for both delays, simulated growth, and the limits."""
-    found = {f"delay of {limit.delay} periods": limit for limit in limits(arm) if math.isfinite(limit.period)}
-    last = 1.3 * max((limit.period for limit in found.values()), default=FIRST_S)
+def curves(
+    arm: Arm, found: Sequence[Limit]
+) -> tuple[dict[str, tuple[Array, Array]], list[tuple[float, float]], dict[str, float]]:
+    """What `figures.stability` draws: radius against period, simulated growth, and the limits; by delay."""
+    named = {f"delay of {limit.delay} periods": limit for limit in found if math.isfinite(limit.period)}
+    last = 1.3 * max((limit.period for limit in named.values()), default=FIRST_S)
     periods = np.linspace(last / 300.0, last, 300)
-    radii = {
-        label: (periods, np.array([spectral_radius(arm, h, limit.delay) for h in periods]))
-        for label, limit in found.items()
-    }
-    simulated = [(h, growth) for limit in found.values() for h, _, growth in limit.checks]
-    simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in found.values() for h in periods[30::45]]
-    return radii, simulated, {label: limit.period for label, limit in found.items()}
+    radii = {label: (periods, spectral_radii(arm, periods, limit.delay)) for label, limit in named.items()}
+    simulated = [(h, growth) for limit in named.values() for h, _, growth in limit.checks]
+    simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in named.values() for h in periods[30::45]]
+    return radii, simulated, {label: limit.period for label, limit in named.items()}
