@@ -12,9 +12,9 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
-from grasp_ros.studies import accuracy, drift, figures, loop, measure, predictability, sections, stability
+from grasp_ros.studies import accuracy, drift, figures, loop, measure, predictability, sections, speed, stability
 from grasp_ros.studies.contenders import all_contenders, own_contenders
-from grasp_ros.studies.records import write_csv
+from grasp_ros.studies.records import Journal, write_csv
 
 COMMAND = "grasp study page"
 LOOP_SCENE = "case_01"
@@ -63,10 +63,18 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         sections.head(COMMAND), sections.choice(records), sections.paper(records), sections.tolerance(records),
         sections.missed(records), sections.energy(drifts), sections.prediction(predictions),
         sections.topics(case.title, points, limits), sections.output(_output(subjects)),
+        *([] if quick else [sections.final_state(_final_states(subjects, directory))]),
         sections.methods(), sections.details(records),
     ]
     page.write_text("\n\n".join(text) + "\n", encoding="utf-8")
     return page
+
+
+def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
+    journal = Journal(directory)
+    return {
+        scene.name: speed.final_state(scene, measure.truth(scene, journal), sections.FINAL_ERROR) for scene in subjects
+    }
 
 
 def _output(subjects: Sequence[Scene]) -> dict[str, tuple[float, float]]:
