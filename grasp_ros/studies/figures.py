@@ -183,14 +183,11 @@ def prediction(predictions: Sequence[Prediction], path: Path) -> None:
         axes.plot(row.t[there], row.distance[there], label=row.scene, color=shade, linewidth=1.5)
     for level in LEVELS:
         axes.axhline(level, color="#888888", linewidth=0.7, linestyle=":")
-        axes.text(
-            0.5, level, f"left of the crossing an error of {level:.0e} is for sale", fontsize=7, color="#666666",
-            va="center", bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-        )
+        axes.text(1.01, level, f"{level:.0e}", transform=axes.get_yaxis_transform(), fontsize=8, va="center")
     axes.set(
         yscale="log", xlabel="simulated time, s", ylim=(1e-17, 10.0),
         ylabel="largest distance of motions\nthat begin two roundings apart, m or m/s",
-        title="how far ahead double precision can see",
+        title="how far ahead double precision can see: an error is for sale until its line is crossed",
     )
     axes.legend(fontsize=8, loc="lower right")
     axes.grid(alpha=0.25)

@@ -26,7 +26,6 @@ GRAPH_PERIODS_MS = (20.0, 5.0, 1.0, 0.5, 0.1)
 COMMON_S = 0.02  # the deviation is looked at where all periods have a tick
 PAIRS = 2  # of runs, bare and ours in turn; the fastest counts
 TICKS = 1000  # of a graph; its speed does not depend on how far it goes
-CONTINUOUS = "continuous feedback"
 
 
 class Point(NamedTuple):
