@@ -3,10 +3,11 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
+SLOWER ?= 30%
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-.PHONY: demo test lint install study clean
+.PHONY: demo test lint install study benchmark clean
 
 demo: install
 	$(BIN)/grasp run case_01
@@ -23,9 +24,17 @@ install: $(VENV)/ready
 
 # The peers of the benchmarks are large and only wanted here.
 study: install
-	$(BIN)/pip install --quiet -c constraints.txt scipy heyoka
+	$(BIN)/pip install --quiet -c constraints.txt ".[study]"
+	$(BIN)/grasp study page
 	$(BIN)/grasp study speed case_01
 	$(BIN)/grasp study graph case_01
+
+# Saves a result in runs/benchmarks, and fails if the fastest run of a benchmark is slower than in the last one there.
+benchmark: install
+	$(BIN)/pip install --quiet -c constraints.txt ".[study]"
+	$(BIN)/pytest benchmarks -W default --benchmark-storage=runs/benchmarks --benchmark-autosave \
+	    --benchmark-columns=min,median,rounds \
+	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))
 
 $(VENV)/ready: setup.py constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12) and 'Python 3.11 or 3.12 is needed')"

@@ -36,7 +36,7 @@ setup(
             "pytest", "gmpy2", "mpmath", "mcap", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML", "types-tqdm",
             "colcon-common-extensions",
         ],
-        "study": ["gmpy2", "scipy", "heyoka"],
+        "study": ["gmpy2", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],
     },
     entry_points={
         "console_scripts": [

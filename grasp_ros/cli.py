@@ -15,9 +15,11 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
+from grasp_ros.methods.registry import ACCURACY_KNOB, EXACT, METHODS, STEP, TOLERANCE, UNITS
 from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Integrator, Status, compile_kernels
 from grasp_ros.physics.jit import COMPILING, kernels_on_disk
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
+from grasp_ros.studies import commands as studies
 
 Command = Callable[[argparse.Namespace], int]
 
@@ -49,10 +51,12 @@ def _parser() -> argparse.ArgumentParser:
         return sub
 
     add("scenes", _scenes, "list the scenes that come with the package")
+    add("methods", _methods, "list the methods of integration: order, source, what each does at a touch")
     sub = add("simulate", _simulate, "simulate a scene without ROS")
     _add_scene(sub)
     sub.add_argument("--grid", type=_grid, metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
+    _add_method(sub)
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
     sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
     _add_scene(sub)
@@ -62,21 +66,8 @@ def _parser() -> argparse.ArgumentParser:
     sub = add("plot", _plot, "draw a bag, a file of `grasp simulate`, or a scene")
     sub.add_argument("source", metavar="BAG|FILE.npz|SCENE")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE", help="image file (default: beside the source)")
-    studies = commands.add_parser("study", help="measure, and print what was measured").add_subparsers(
-        required=True, metavar="study"
-    )
-    sub = studies.add_parser("speed", help="time to a given error, beside other solvers")
-    sub.set_defaults(command=_study_speed)
-    _add_scene(sub)
-    sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")
-    sub.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="write the records")
-    sub = studies.add_parser("effects", help="what each effect costs: time and size of the bag")
-    sub.set_defaults(command=_study_effects)
-    _add_scene(sub)
-    sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
-    sub = studies.add_parser("graph", help="lockstep ticks per second, beside a bare rclpy graph")
-    sub.set_defaults(command=_study_graph)
-    _add_scene(sub)
+    study = commands.add_parser("study", help="measure, and print what was measured")
+    studies.add_to(study.add_subparsers(required=True, metavar="study"), _add_scene, _prepare)
     return parser
 
 
@@ -89,6 +80,23 @@ def _add_scene(sub: argparse.ArgumentParser) -> None:
         "--accuracy", type=float, default=ACCURACY, metavar="A",
         help=f"first neglected term of a contact, relative, {FINEST:g} to {COARSEST:g} (default {ACCURACY:g})",
     )
+
+
+def _add_method(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument("--method", choices=METHODS, default=EXACT, help="way to integrate; see `grasp methods`")
+    setting = sub.add_mutually_exclusive_group()
+    setting.add_argument("--step", type=float, metavar="S", help="step in s of a method with a fixed step")
+    setting.add_argument("--tolerance", type=float, metavar="T", help="tolerance (rtol = atol) of an adaptive method")
+
+
+def _setting(options: argparse.Namespace) -> float | None:
+    """The number that belongs to the method's knob; one that belongs to another knob is refused."""
+    given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
+    knob = METHODS[options.method].knob
+    for other, number in given.items():
+        if other != knob and number not in (None, ACCURACY):
+            raise ValueError(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
+    return None if given[knob] is None else float(given[knob])
 
 
 def _grid(word: str) -> int:
@@ -110,6 +118,13 @@ def _scenes(_: argparse.Namespace) -> int:
     return 0
 
 
+def _methods(_: argparse.Namespace) -> int:
+    for name, method in METHODS.items():
+        print(f"{name}\n  order: {method.order}\n  source: {method.source}\n  at a touch: {method.at_touch}")
+        print(f"  --{method.knob}, default {method.default:g}{UNITS[method.knob]}")
+    return 0
+
+
 def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.report import describe_trajectory, table
 
@@ -119,14 +134,23 @@ def _simulate(options: argparse.Namespace) -> int:
     quick = not (options.sampled or scene.sampled)
     with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
         trajectory = simulate(
-            scene, grid=grid, sampled=options.sampled, accuracy=options.accuracy,
+            scene, grid=grid, sampled=options.sampled, method=options.method, setting=_setting(options),
             progress=lambda reached: bar.update(reached - bar.n),
         )
-    print(table(describe_trajectory(trajectory)))
+    print(table({**dict(describe_trajectory(trajectory)), **_describe_method(trajectory)}.items()))
     if options.output is not None:
         trajectory.save(options.output)
         print(f"written to {options.output}")
     return 0 if trajectory.status is Status.DONE else 1
+
+
+def _describe_method(trajectory: Trajectory) -> dict[str, str]:
+    method = METHODS[trajectory.method]
+    rows = {
+        "method": f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}",
+        "work": ", ".join(f"{number} {name}" for name, number in trajectory.counters.items()),
+    }
+    return rows if method.finds_contacts else {"touches left, right": "not looked for", **rows}
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -190,30 +214,6 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or (beside if source.exists() else Path(f"{motion.scene.name}.png"))
     plots.draw(motion, output, motion.scene.feedback_in_words(sampled))
     print(f"written to {output}")
-    return 0
-
-
-def _study_speed(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import speed
-
-    _prepare()
-    speed.run(scenes.load(options.scene, options.settings), options.error, options.output)
-    return 0
-
-
-def _study_effects(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import effects
-
-    _prepare()
-    effects.run(scenes.load(options.scene, options.settings), options.output)
-    return 0
-
-
-def _study_graph(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import graph
-
-    _prepare()
-    graph.run(scenes.load(options.scene, options.settings), options.accuracy)
     return 0
 
 

@@ -13,6 +13,8 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.effects.base import NANOSECONDS
+from grasp_ros.methods import equations, registry
+from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.certificate import Energy, energy
 from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
@@ -43,8 +45,12 @@ class Trajectory:
     switches : array (m, 5)
         Time in s, side, kind, u in m and u' in m/s of every switch, in the order of time; see `events`.
     work : array of int
-        Counters, see `layout.Work`.
+        Counters, see `layout.Work` for `exact` and `methods.equations.Work` for the others.
     status : Status
+    method : str
+        A key of `methods.registry.METHODS`.
+    setting : float
+        Its accuracy, step in s, or tolerance.
     """
 
     scene: Scene
@@ -55,6 +61,14 @@ class Trajectory:
     switches: Array
     work: np.ndarray
     status: Status
+    method: str = EXACT
+    setting: float = ACCURACY
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The work by its names."""
+        names = Work if self.method == EXACT else equations.Work
+        return {entry.name.lower().replace("_", " "): int(self.work[entry]) for entry in names}
 
     @property
     def command(self) -> Array:
@@ -97,8 +111,9 @@ class Trajectory:
                 mode=level.mode, touch_left=self.times(Event.TOUCH, LEFT), touch_right=self.times(Event.TOUCH, RIGHT),
                 release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
                 events=self.switches, work=self.work,
-                work_names=np.array([entry.name.lower() for entry in Work]), status=self.status.name,
-                sampled=self.sampled, scene_name=self.scene.name, scene=self.scene.to_yaml(),
+                work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
+                method=self.method, setting=self.setting, sampled=self.sampled, scene_name=self.scene.name,
+                scene=self.scene.to_yaml(),
             )
 
 
@@ -116,7 +131,7 @@ def load(path: Path) -> Trajectory:
             answers = data["command"] if data["sampled"] else None
             return Trajectory(
                 scene, bool(data["sampled"]), data["t"], data["state"], answers, data["events"], data["work"],
-                Status[str(data["status"])],
+                Status[str(data["status"])], str(data["method"]), float(data["setting"]),
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
         raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
@@ -128,6 +143,8 @@ def simulate(
     grid: Array | None = None,
     sampled: bool = False,
     accuracy: float = ACCURACY,
+    method: str = EXACT,
+    setting: float | None = None,
     max_events: int = 10**7,
     changes: Changes = MappingProxyType({}),
     progress: Progress = None,
@@ -144,7 +161,11 @@ def simulate(
         False: feedback acts continuously, as in the paper, unless the scene itself has a `loop`. True: as in the
         graph, each command is computed from the state at the beginning of a control period and held over it.
     accuracy : float
-        See `physics.integrator.Integrator`.
+        Of the method `exact`, see `physics.integrator.Integrator`.
+    method : str
+        A key of `methods.registry.METHODS`.
+    setting : float, optional
+        Accuracy, step in s, or tolerance of the method. Default: `accuracy` for `exact`, otherwise the method's own.
     max_events : int
         Budget of contact switches.
     changes : mapping of int to mapping of str to float
@@ -156,10 +177,11 @@ def simulate(
     Raises
     ------
     ValueError
-        If the accuracy is outside its range or the grid is not ascending within the horizon.
+        If the accuracy is outside its range, the grid is not ascending within the horizon, or the method cannot do
+        what is asked, see `methods.registry.check`.
     """
     sampled = sampled or scene.sampled
-    integrator = Integrator(scene.system, continuous=not sampled, accuracy=accuracy, max_events=max_events)
+    setting = registry.check(method, scene, accuracy if method == EXACT and setting is None else setting, sampled)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = np.asarray(grid, dtype=float)
@@ -167,6 +189,13 @@ def simulate(
         raise ValueError("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
         raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+    if method != EXACT:
+        found = registry.solve(method, scene, grid, setting, min(max_events, registry.MOST_EVENTS))
+        return Trajectory(
+            scene, False, grid[: len(found.state)], found.state, None, found.switches, found.work, found.status, method,
+            setting,
+        )
+    integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events)
     if sampled:
         states, answers = _sampled(scene, integrator, grid, changes, progress)
     else:
@@ -175,7 +204,7 @@ def simulate(
         states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return Trajectory(
         scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
-        integrator.status,
+        integrator.status, EXACT, setting,
     )
 
 

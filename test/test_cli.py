@@ -57,6 +57,9 @@ def test_simulate_writes_what_the_function_returns(tmp_path: Path) -> None:
         (["simulate", "case_01", "--set", "mass"], "--set mass: not understood; allowed: section.key=value"),
         (["simulate", "case_01", "--accuracy", "1"], "accuracy: 1.0 is outside [1e-16, 0.001]"),
         (["simulate", "case_01", "--grid", "1"], "1 is not allowed; allowed: a whole number >= 2"),
+        (["simulate", "case_01", "--method", "paper", "--tolerance", "1"], "--tolerance is not allowed; allowed for"),
+        (["simulate", "case_01", "--method", "rk4", "--accuracy", "1e-8"], "--accuracy is not allowed; allowed for"),
+        (["simulate", "case_01", "--method", "rk4", "--sampled"], "rk4: only continuous feedback"),
         (["simulate", "case_01", "-o", "no/such/directory.npz"], "No such file or directory"),
         (["run", "case_01", "-o", "."], "File exists"),
         (["inspect", "."], "not a bag of this package"),
@@ -84,3 +87,20 @@ def test_a_scene_file_of_ones_own(tmp_path: Path) -> None:
     result = grasp("simulate", "mine.yaml", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     assert "Case 5" in result.stdout
+
+
+def test_simulate_with_another_method_says_what_it_did(tmp_path: Path) -> None:
+    result = grasp("simulate", "case_01", "--method", "paper", "--step", "1e-3", "-o", "out.npz", cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert "paper, step 0.001 s" in result.stdout
+    assert "20088 steps, 80352 right hand sides" in result.stdout
+    loaded = simulation.load(tmp_path / "out.npz")
+    assert (loaded.method, loaded.setting) == ("paper", 1e-3)
+    plain = grasp("simulate", "case_01", "--method", "rk4", cwd=tmp_path)
+    assert "touches left, right  not looked for" in plain.stdout
+
+
+def test_methods_lists_order_source_and_touch(tmp_path: Path) -> None:
+    text = grasp("methods", cwd=tmp_path).stdout
+    assert text.startswith("exact\n  order: ")
+    assert text.count("at a touch:") == 13

@@ -7,6 +7,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +18,23 @@ import numba
 numba.config.SLP_VECTORIZE = 1
 
 
-def _cache_directory() -> Path:
-    """A writable directory named after the kernels' sources.
+def sources_digest(room: Path) -> str:
+    """A short name of the sources of this room, and of a room whose kernels call them."""
+    digest = hashlib.sha256()
+    for source in sorted({*Path(__file__).parent.glob("*.py"), *room.glob("*.py")}):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _cache_directory(room: Path) -> Path:
+    """A writable directory for the kernels of a room.
 
     numba looks for changes only in the file of the function that is called, not in those that it calls from other
     files: without the digest an edited kernel would go on running as it was.
     """
-    digest = hashlib.sha256()
-    for source in sorted(Path(__file__).parent.glob("*.py")):
-        digest.update(source.read_bytes())
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    directory = Path(base) / "grasp_ros" / digest.hexdigest()[:16]
+    directory = Path(base) / "grasp_ros" / sources_digest(room)
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError:
@@ -36,7 +43,7 @@ def _cache_directory() -> Path:
 
 
 COMPILING = "compiling the kernels; this happens once after an installation and takes some 15 s"
-CACHE_DIRECTORY = _cache_directory()
+CACHE_DIRECTORY = _cache_directory(Path(__file__).parent)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -51,7 +58,7 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def _compiled(function: Callable[..., Any], inline: bool) -> Any:
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(CACHE_DIRECTORY)
+    numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
         return numba.njit(cache=True, error_model="numpy", forceinline=inline)(function)
     finally:

@@ -35,8 +35,8 @@ def run(scene: Scene, accuracy: float) -> None:
     """
     bare, ours = [], []
     for _ in tqdm(range(REPEATS), desc="pairs of runs", unit="pair"):
-        bare.append(_bare_speed(scene.ticks))
-        ours.append(_our_speed(scene, accuracy))
+        bare.append(bare_speed(scene.ticks))
+        ours.append(our_speed(scene, accuracy))
     ratios = [mine / theirs for mine, theirs in zip(ours, bare, strict=True)]
     print(f"{scene.title}, {scene.ticks} ticks in lockstep, {REPEATS} pairs of runs, {os.cpu_count()} processors")
     print(", ".join(f"{name} {version}" for name, version in versions().items()))
@@ -49,7 +49,8 @@ def run(scene: Scene, accuracy: float) -> None:
         print(f"{name:<34} median {median:.4g}{unit}, {low:.4g} to {high:.4g}")
 
 
-def _our_speed(scene: Scene, accuracy: float) -> float:
+def our_speed(scene: Scene, accuracy: float) -> float:
+    """Ticks per second of the whole graph with physics, monitor and bag."""
     with tempfile.TemporaryDirectory() as directory:
         graph = Graph(scene, Path(directory) / "run", accuracy, errors=subprocess.PIPE)
         graph.start()
@@ -60,7 +61,8 @@ def _our_speed(scene: Scene, accuracy: float) -> float:
         return _speed(graph.processes["plant"])
 
 
-def _bare_speed(ticks: int) -> float:
+def bare_speed(ticks: int) -> float:
+    """Ticks per second of the same graph on plain rclpy."""
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     processes = {
         name: subprocess.Popen(

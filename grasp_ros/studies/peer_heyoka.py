@@ -10,6 +10,7 @@ instant is not handled: w_l w_r = 0 stops the regularised time, and the attempt 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -19,25 +20,26 @@ from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.layout import LEFT, RIGHT, X_L, X_O, X_R
 from grasp_ros.physics.model import Array, Grasp
 from grasp_ros.scene import Scene
-from grasp_ros.studies.peers import Answer, Method, other_side_touches
+from grasp_ros.studies.peers import Answer, Contender, other_side_touches
 
 BALLISTIC_S = 1e-7  # both sides' forces are left out so long after a touch of both: 1e-14 N s of impulse in case 1
+BALLISTIC_HERTZ = 1e4  # where that holds, N/m^1.5; the impulse at 1 m/s is H t^2.5
 # heyoka passes over an event function that is exactly zero where a step begins, so that none may be:
 FIRST_W = 1e-13  # w at a touch, m^0.5
 FIRST_GAP_M = 1e-15  # at a release, if rounding leaves none
 NEVER_S = 1e9  # end of a contact's variable: the release comes first
 ROUNDING = 4e-16
 MAX_LEG_STEPS = 10_000
+VARIANTS: tuple[dict[str, bool], ...] = (
+    {}, {"fast_math": True}, {"high_accuracy": True}, {"compact_mode": True}, {"slp_vectorize": True},
+)
+LADDER = (1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15)
 
 
-def heyoka_methods(scene: Scene) -> list[Method]:
-    """Each way of heyoka to generate code, over its tolerance."""
-    ladder = tuple(10.0 ** (-k / 2) for k in range(12, 31))
-    variants: tuple[dict[str, bool], ...] = (
-        {}, {"fast_math": True}, {"high_accuracy": True}, {"compact_mode": True}, {"slp_vectorize": True},
-    )
+def contenders(variants: Sequence[dict[str, bool]] = VARIANTS[:2]) -> list[Contender]:
+    """Ways of heyoka to generate code, over its tolerance; by default the two that are worth their compile time."""
     return [
-        Method("heyoka", " ".join(options) or "defaults", "tol", ladder, partial(_HeyokaGrasp, scene, options))
+        Contender("heyoka", "_".join(["heyoka", *options]), "tolerance", LADDER, partial(_HeyokaGrasp, options))
         for options in variants
     ]
 
@@ -180,11 +182,13 @@ class _Leg:
 class _HeyokaGrasp:
     """One scene's flights and contacts, built for one tolerance; call it with the output times."""
 
-    def __init__(self, scene: Scene, options: dict[str, bool], tolerance: float) -> None:
+    def __init__(self, options: dict[str, bool], scene: Scene, tolerance: float) -> None:
         import heyoka as hy
 
         settings = {"tol": tolerance, **options}
         self._start = scene.initial_state
+        hertz = max(scene.grasp.left_contact.hertz, scene.grasp.right_contact.hertz)
+        self._ballistic_s = BALLISTIC_S * (BALLISTIC_HERTZ / hertz) ** 0.4
         self._legs = [_Leg(hy, scene.grasp, mode, settings) for mode in range(4)]
         flight, _ = heyoka_system(hy, scene.grasp, False, False)
         self._ballistic = hy.taylor_adaptive(flight, [0.0] * 6, **settings)
@@ -206,7 +210,7 @@ class _HeyokaGrasp:
             side = -1 - outcome
             if row == len(grid) or side not in (LEFT, RIGHT):
                 status = "done" if row == len(grid) else f"stopped with heyoka's outcome {outcome}"
-                return Answer(out[:row], (touches[LEFT], touches[RIGHT]), status)
+                return Answer(out[:row], (touches[LEFT], touches[RIGHT]), status, None, None)
             begin += leg.elapsed()
             state, w = leg.y[:6].copy(), [FIRST_W, FIRST_W]
             for i, pressed in enumerate(leg.sides):
@@ -221,13 +225,13 @@ class _HeyokaGrasp:
                     mode = 3
                     touches[1 - side] += 1
                     state, w = self._pass_corner(state)
-                    begin += BALLISTIC_S
+                    begin += self._ballistic_s
 
     def _pass_corner(self, state: Array) -> tuple[Array, list[float]]:
         """State and w a moment after a touch of both sides; at w_l = w_r = 0 the regularised time stands still."""
         flight = self._ballistic
         flight.state[:] = state
-        flight.step(BALLISTIC_S)
+        flight.step(self._ballistic_s)
         y = flight.state.copy()
         return y, [math.sqrt(y[X_L] - y[X_O]), math.sqrt(y[X_O] - y[X_R])]
 

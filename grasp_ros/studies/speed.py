@@ -1,207 +1,171 @@
-"""What it costs to simulate a scene to a given error: this package beside heyoka and scipy, in one run.
+"""What it costs to simulate one scene to a given error: every solver at its first setting that reaches it, in turn.
 
-The error is measured against `reference`, not believed from a tolerance. Every solver climbs a ladder of settings
-from loose to tight and is timed at the first one that reaches the error. The timings are interleaved, so that their
-ratios hold on a machine that is shared.
+The same measurements as `accuracy`, with two differences: the timings are interleaved, so that their ratios hold on
+a machine that is shared, and they are taken with and without the output of all times.
 """
 
 from __future__ import annotations
 
 import json
-import platform
 import statistics
 import sys
-import time
-from functools import partial
-from importlib import metadata
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros import reference, simulation
-from grasp_ros import scene as scenes
-from grasp_ros.physics.layout import LEFT, RIGHT, Event
+from grasp_ros.methods.registry import EXACT
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.studies.peer_heyoka import heyoka_methods
-from grasp_ros.studies.peers import Answer, Method, Solve, scipy_methods
-from grasp_ros.studies.speed_report import OURS, Attempt, Growth, Timing, report
+from grasp_ros.studies import accuracy, measure, peer_heyoka, predictability
+from grasp_ros.studies.contenders import all_contenders, own_contenders
+from grasp_ros.studies.peers import Contender, Solve
+from grasp_ros.studies.records import Journal, Record, describe_machine
 
-DIGITS = 25
-PATIENCE_S = 20.0  # a solver that needs longer for one run climbs no further
-BUDGET_S, FEWEST, MOST = 3.0, 3, 200  # per solver: time for its repeats, and their number
-ENDURANCE = (1.0, 1e2, 1e4, 1e6)  # s
-MULTIPLES = (0.25, 0.5, 1.0, 2.0)  # of the scene's duration
-SWINGING = (  # an undamped left arm that swings for ever and touches nothing
-    "left_arm.position_m=-0.3", "left_arm.damping_Ns_per_m=0", "left_feedback.velocity_gain_Ns_per_m=0",
-    "object.position_m=1", "object.velocity_m_per_s=0", "right_arm.position_m=2", "right_arm.velocity_m_per_s=0",
-    "right_arm.stiffness_N_per_m=0", "right_feedback.position_gain_N_per_m=0",
-)
+BUDGET_S, FEWEST, MOST = 1.5, 3, 200  # per solver: time for its repeats, and their number
+PATIENCE_S = 2.0  # a solver that needs longer for one run climbs no further
+WARM_S = 0.05  # a solver that takes longer is warm by itself
+FINER = 2  # settings a decade of `exact`
+HORIZONS_S = (0.25, 0.5, 1.0, 2.0)  # of the scene's duration
 
 
-class Truth(NamedTuple):
-    """The solution in high precision."""
+class Timing(NamedTuple):
+    """Repeats of a solver that reaches the error, without what it compiles."""
 
-    grid: Array  # (n,), s
-    state: Array  # (n, 6), m and m/s
-    touches: tuple[int, int]
+    record: Record
+    least: float  # s
+    median: float  # s
+    repeats: int
 
 
-def run(scene: Scene, error: float, out: Path | None) -> None:
-    """Print time to an error of all solvers, their ratios, and how the cost grows; write the records as JSON.
-
-    Parameters
-    ----------
-    scene : Scene
-    error : float
-        Largest absolute error allowed, over all six states (m and m/s) and all output times.
-    out : Path, optional
+def run(scene: Scene, error: float, out: Path | None, directory: Path) -> None:
+    """Print time to an error of all solvers and their ratios; write the records as JSON.
 
     Raises
     ------
     ValueError
-        If the error is not positive, a pair starts in contact, or condition (10)'s second surface acts: the peers
-        know neither.
+        If the error is not positive, or the scene is one that the peers cannot treat, see `measure.check`.
     """
-    _check(scene, error)
-    truth = _truth(scene)
-    outputs = {"grid": truth.grid, "end": truth.grid[-1:]}
-    attempts: list[Attempt] = []
-    timings: list[Timing] = []
-    methods = [_ours(scene), *heyoka_methods(scene), *scipy_methods(scene)]
-    for output, grid in outputs.items():
-        finalists = []
-        for method in tqdm(methods, desc=f"error at the {output}", file=sys.stderr):
-            tries, solve = _climb(method, output, grid, truth, error)
-            attempts += tries
-            if solve is not None:
-                finalists.append((tries[-1], solve))
-        timings += _race(finalists, grid, output)
-    endurance = [_growth(_horizon(scene, seconds, SWINGING)) for seconds in ENDURANCE]
-    contacts = [_growth(_horizon(scene, factor * scene.duration)) for factor in MULTIPLES]
-    heading = [
-        f"{scene.name}: time to an error of at most {error:g}",
-        f"error: {_metric(scene, truth)}",
-        f"touches there are: {truth.touches[LEFT]}/{truth.touches[RIGHT]} left/right; -: not looked for",
-        "first: construction and first run, with what it compiles; min, median: later runs, solvers in turn",
-        ", ".join(f"{name} {version}" for name, version in _machine().items()),
-    ]
-    print("\n".join([*heading, *report(attempts, timings, endurance, contacts)]))
-    if out is not None:
-        record = {
-            "scene": scene.to_yaml(), "metric": _metric(scene, truth), "error": error, "machine": _machine(),
-            "touches": truth.touches, "attempts": [attempt._asdict() for attempt in attempts],
-            "timings": [{**timing._asdict(), "attempt": timing.attempt._asdict()} for timing in timings],
-            "duration": [row._asdict() for row in endurance], "contacts": [row._asdict() for row in contacts],
-        }
-        out.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-
-
-def _check(scene: Scene, error: float) -> None:
     if not error > 0.0:
         raise ValueError(f"--error {error!r} is not allowed; allowed: a number > 0")
-    x_l, _, x_o, _, x_r, _ = scene.initial_state
-    if not x_l < x_o < x_r:
-        raise ValueError(f"{scene.name}: starts in contact; allowed here: scenes that start with gaps on both sides")
-    if any(event.kind == Event.CLAMP for event in simulation.simulate(scene).events):
-        raise ValueError(f"{scene.name}: a pair separates faster than 1/p; allowed here: scenes where none does")
+    measure.check(scene)
+    target = measure.truth(scene, Journal(directory))
+    heading = [
+        f"{scene.name}: time to an error of at most {error:g}", f"error: {accuracy.METRIC}; end: the last time only",
+        f"touches there are: {target.touches[LEFT]}/{target.touches[RIGHT]} left/right",
+        ", ".join(f"{name} {version}" for name, version in describe_machine().items()),
+    ]
+    print("\n".join(heading))
+    results: dict[str, list[Timing]] = {}
+    for output, grid in (("grid", target.grid), ("end", target.grid[-1:])):
+        finalists: list[tuple[Record, Solve | None]] = []
+        failures: list[tuple[Record, Solve | None]] = []
+        for contender in tqdm(contenders(), desc=f"error at the {output}", file=sys.stderr):
+            last, solve = first_to_reach(contender, scene, grid, target, error)
+            (finalists if solve is not None else failures).append((last, solve))
+        results[output] = race(finalists, grid, output)
+        print("\n".join(_table(results[output], output) + [_failure(record) for record, _ in failures]))
+    grid_cost, end_cost = (next(t.median for t in results[o] if t.record.method == EXACT) for o in ("grid", "end"))
+    print(f"{EXACT}: {len(target.grid)} output times / the last alone: {grid_cost / end_cost:.2f}")
+    print("\n".join(_growth(scene)))
+    if out is not None:
+        record = {"scene": scene.to_yaml(), "metric": accuracy.METRIC, "error": error, "machine": describe_machine()}
+        timings = {o: [{**t._asdict(), "record": t.record._asdict()} for t in rows] for o, rows in results.items()}
+        out.write_text(json.dumps({**record, "timings": timings}, indent=1) + "\n", encoding="utf-8")
 
 
-def _truth(scene: Scene) -> Truth:
-    grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
-    with tqdm(total=1, desc="reference", file=sys.stderr) as bar:
-        exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid.tolist(), digits=DIGITS)
-        bar.update()
-    return Truth(grid, exact.as_array(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
+def final_state(scene: Scene, target: measure.Truth, error: float) -> list[Timing]:
+    """`exact` and its closest rival, heyoka, where only the last state is asked for."""
+    grid = target.grid[-1:]
+    rivals = [contenders()[0], peer_heyoka.contenders()[-1]]
+    tries = [first_to_reach(rival, scene, grid, target, error) for rival in rivals]
+    return race([(record, solve) for record, solve in tries if solve is not None], grid, "end")
 
 
-def _ours(scene: Scene) -> Method:
-    def build(accuracy: float) -> Solve:
-        def solve(grid: Array) -> Answer:
-            motion = simulation.simulate(scene, grid=grid, accuracy=accuracy)
-            touches = len(motion.times(Event.TOUCH, LEFT)), len(motion.times(Event.TOUCH, RIGHT))
-            return Answer(motion.state, touches, motion.status.name.lower())
-
-        return solve
-
-    return Method(OURS, "simulate", "accuracy", tuple(10.0 ** (-k / 2) for k in range(12, 33)), build)
+def contenders() -> list[Contender]:
+    """All, with every way of heyoka to generate code; ours with finer settings, as a user of one error has them."""
+    exact = next(contender for contender in own_contenders() if contender.name == EXACT)
+    finer = tuple(10.0 ** (-k / FINER) for k in range(3 * FINER, 16 * FINER + 1))
+    others = [c for c in all_contenders() if c.name != EXACT and c.family != "heyoka"]
+    return [exact._replace(ladder=finer), *peer_heyoka.contenders(peer_heyoka.VARIANTS), *others]
 
 
-def _climb(method: Method, output: str, grid: Array, truth: Truth, error: float) -> tuple[list[Attempt], Solve | None]:
-    """Try the settings from loose to tight up to the first that reaches the error; None if none does."""
-    tries = []
-    for setting in method.ladder:
-        begin = time.perf_counter()
-        note = partial(Attempt, method.family, method.name, f"{method.knob} {setting:.0e}", output)
-        try:
-            solve = method.build(setting)
-            answer = solve(grid)
-        except ImportError:
-            return [Attempt(method.family, method.name, "", output, None, None, 0.0, "not installed", False)], None
-        seconds = time.perf_counter() - begin
-        complete = len(answer.state) == len(grid)
-        found = float(np.abs(answer.state - truth.state[-len(grid) :]).max()) if complete else None
-        reached = found is not None and found <= error
-        tries.append(note(found, answer.touches, seconds, answer.status, reached))
-        if reached:
-            return tries, solve
-        if seconds > PATIENCE_S:
+def first_to_reach(
+    contender: Contender, scene: Scene, grid: Array, target: measure.Truth, error: float
+) -> tuple[Record, Solve | None]:
+    """The first setting, from loose to tight, that reaches an error; without a solver if none does."""
+    effort = measure.FULL._replace(patience=PATIENCE_S, deadline=3.0 * PATIENCE_S, most=1)
+    best: Record | None = None
+    for setting in contender.ladder:
+        record, solve = measure.attempt(contender, scene, setting, target, effort, grid)
+        if record.good and record.error is not None and record.error <= error:
+            return record, solve
+        if best is None or (record.error is not None and (best.error is None or record.error < best.error)):
+            best = record
+        if measure.given_up(record, effort):
             break
-    return tries, None
+    assert best is not None
+    return best, None
 
 
-def _race(finalists: list[tuple[Attempt, Solve]], grid: Array, output: str) -> list[Timing]:
-    """Time the finalists in turn; slow ones drop out once their time is used up."""
+def race(finalists: list[tuple[Record, Solve | None]], grid: Array, output: str) -> list[Timing]:
+    """Time the finalists in turn, warm; slow ones drop out once their time is used up.
+
+    A fast one runs once before it is timed: what its predecessor has left in the caches is not its own cost.
+    """
     samples: list[list[float]] = [[] for _ in finalists]
-    for _ in tqdm(range(MOST), desc=f"timing at the {output}", file=sys.stderr):
-        for (_, solve), times in zip(finalists, samples, strict=True):
-            if len(times) < FEWEST or sum(times) < BUDGET_S:
-                times.append(_seconds(solve, grid))
+    for _ in tqdm(range(MOST), desc=f"timing at the {output}", file=sys.stderr, leave=False):
+        for (record, solve), times in zip(finalists, samples, strict=True):
+            if solve is not None and (len(times) < FEWEST or sum(times) < BUDGET_S):
+                if record.least is not None and record.least < WARM_S:
+                    solve(grid)
+                times.append(measure.seconds(solve, grid))
     return [
-        Timing(attempt, min(times), statistics.median(times), len(times))
-        for (attempt, _), times in zip(finalists, samples, strict=True)
+        Timing(record, min(times), statistics.median(times), len(times))
+        for (record, _), times in zip(finalists, samples, strict=True)
     ]
 
 
-def _seconds(solve: Solve, grid: Array) -> float:
-    begin = time.perf_counter()
-    solve(grid)
-    return time.perf_counter() - begin
+def _table(timings: list[Timing], output: str) -> list[str]:
+    ours = next((timing.median for timing in timings if timing.record.method == EXACT), float("nan"))
+    lines = [
+        f"\n{'output: ' + output:32}{'setting':17}{'error':>8}{'touches':>9}{'first ms':>10}{'min ms':>9}"
+        f"{'median ms':>11}{'runs':>5}{'ratio':>8}"
+    ]
+    for timing in sorted(timings, key=lambda timing: timing.median):
+        record = timing.record
+        touches = "-" if record.found is None else f"{record.found[LEFT]}/{record.found[RIGHT]}"
+        lines.append(
+            f"  {record.method:30}{record.knob + f' {record.setting:.0e}':17}{record.error:8.1e}{touches:>9}"
+            f"{1e3 * record.first:10.1f}{1e3 * timing.least:9.3f}{1e3 * timing.median:11.3f}{timing.repeats:5}"
+            f"{timing.median / ours:8.2f}"
+        )
+    for family in dict.fromkeys(timing.record.family for timing in timings):
+        best = min((t for t in timings if t.record.family == family and t.record.method != EXACT),
+                   key=lambda timing: timing.median, default=None)
+        if best is not None:
+            lines.append(f"  ratio of medians, {family} at its best ({best.record.method}) / {EXACT}:"
+                         f" {best.median / ours:.2f}")
+    return lines
 
 
-def _horizon(scene: Scene, duration: float, settings: tuple[str, ...] = ()) -> Scene:
-    return scenes.parse(scene.to_yaml(), scene.name, scene.name, [*settings, f"time.duration_s={duration}"])
+def _failure(record: Record) -> str:
+    best = "no result" if record.error is None else f"does not reach it: best {record.error:.1e}"
+    return f"  {record.method:30}{best}, {record.knob} {record.setting:.0e}: {record.status}"
 
 
-def _growth(scene: Scene) -> Growth:
-    grid = np.array([scene.duration])
-    touches = sum(event.kind == Event.TOUCH for event in simulation.simulate(scene, grid=grid).events)
-    times = [_seconds(partial(_final_state, scene), grid) for _ in range(MOST)]
-    return Growth(scene.duration, touches, statistics.median(times))
-
-
-def _final_state(scene: Scene, grid: Array) -> Answer:
-    return Answer(simulation.simulate(scene, grid=grid).state, None, "")
-
-
-def _metric(scene: Scene, truth: Truth) -> str:
-    return (
-        f"largest absolute error over six states (m, m/s), against {DIGITS} digits; grid: {len(truth.grid)} times in"
-        f" [0, {scene.duration:g}] s; end: the last of them only"
-    )
-
-
-def _machine() -> dict[str, str]:
-    cpu = Path("/proc/cpuinfo")
-    model = platform.processor()
-    if cpu.exists():
-        model = next((line.split(": ")[1] for line in cpu.read_text().splitlines() if "model name" in line), model)
-    packages = {}
-    for name in ("grasp_ros", "numpy", "numba", "llvmlite", "heyoka", "scipy"):
-        try:
-            packages[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            packages[name] = "not installed"
-    return {"platform": platform.platform(), "cpu": model, "python": platform.python_version(), **packages}
+def _growth(scene: Scene) -> list[str]:
+    """Cost of the same scene over other horizons."""
+    lines = [f"\ncost grows with contacts: {'horizon s':>10}{'touches':>9}{'median ms':>11}{'us a touch':>12}"]
+    exact = next(contender for contender in own_contenders() if contender.name == EXACT)
+    for factor in HORIZONS_S:
+        longer = predictability.horizon(scene, factor * scene.duration)
+        solve = exact.build(longer, exact.ladder[-1])
+        grid = np.array([longer.duration])
+        touches = sum(solve(grid).touches or (0, 0))
+        median = statistics.median(measure.seconds(solve, grid) for _ in range(MOST))
+        each = f"{1e6 * median / touches:12.1f}" if touches else f"{'-':>12}"
+        lines.append(f"{'':26}{longer.duration:10g}{touches:9}{1e3 * median:11.4f}{each}")
+    return lines

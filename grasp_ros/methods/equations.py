@@ -1,0 +1,121 @@
+"""What all methods share: the compiled right-hand side, the frozen modes, and the record of a solution."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.integrator import Status
+from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.layout import LEFT, Event, Pair
+from grasp_ros.physics.model import Array, Grasp
+
+OPEN, CONTACT, CLAMPED = int(Pair.OPEN), int(Pair.CONTACT), int(Pair.CLAMPED)
+EPS = 2.0**-52
+SLIVER = 1e-9  # of a step: what rounding may leave at the end of the horizon
+TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in (Event.TOUCH, Event.RELEASE, Event.CLAMP, Event.REENTRY))
+
+
+class Work(IntEnum):
+    """Columns of the work counters of a method that steps in time."""
+
+    STEPS = 0  # steps, and parts of steps between switches
+    RIGHT_HAND_SIDES = 1
+    EVENT_EVALUATIONS = 2  # trial steps or interpolants that look for a switch
+    IMPLICIT_ITERATIONS = 3  # Newton iterations, or factorised Jacobians
+
+
+class Solution(NamedTuple):
+    """What a method delivers."""
+
+    state: Array  # (n, 6), m and m/s; fewer rows than output times if it stopped early
+    switches: Array  # (m, 5): time, side, kind, u, u'; none if the method does not look for them
+    work: Any  # int array, columns `Work`
+    status: Status
+
+
+def parameters(grasp: Grasp) -> Array:
+    """m, K, C, H, p of the left and of the right side, then m_o, shape (11,), SI; the feedback is in K and C."""
+    sides = ((grasp.left, grasp.left_contact), (grasp.right, grasp.right_contact))
+    rows = [
+        (arm.mass, arm.stiffness + arm.position_gain, arm.damping + arm.velocity_gain, pair.hertz, pair.dissipation)
+        for arm, pair in sides
+    ]
+    return np.array([*rows[0], *rows[1], grasp.object_mass])
+
+
+@kernel
+def rates(q: Any, push_l: bool, push_r: bool, y: Any) -> Any:
+    """Time derivative of y = (x_l, v_l, x_o, v_o, x_r, v_r): (1) to (8); a side that may not push is frozen open."""
+    x_l, v_l, x_o, v_o, x_r, v_r = y
+    f_l, f_r = 0.0, 0.0
+    if push_l:
+        u = max(x_l - x_o, 0.0)
+        f_l = q[3] * (u * math.sqrt(u)) * max(1.0 + q[4] * (v_l - v_o), 0.0)
+    if push_r:
+        u = max(x_o - x_r, 0.0)
+        f_r = q[8] * (u * math.sqrt(u)) * max(1.0 + q[9] * (v_o - v_r), 0.0)
+    a_l = (-q[1] * x_l - q[2] * v_l - f_l) / q[0]
+    a_r = (-q[6] * x_r - q[7] * v_r + f_r) / q[5]
+    return v_l, a_l, v_o, (f_l - f_r) / q[10], v_r, a_r
+
+
+@kernel
+def along(y: Any, h: float, f: Any) -> Any:
+    """y + h f of six components."""
+    return (
+        y[0] + h * f[0], y[1] + h * f[1], y[2] + h * f[2], y[3] + h * f[3], y[4] + h * f[4], y[5] + h * f[5],
+    )
+
+
+@kernel
+def relative(y: Any, side: int) -> Any:
+    """u and u' of one pair, (8)."""
+    if side == LEFT:
+        return y[0] - y[2], y[1] - y[3]
+    return y[2] - y[4], y[3] - y[5]
+
+
+@kernel
+def condition(q: Any, y: Any, side: int) -> int:
+    """Mode of one pair by (10): OPEN, CONTACT, or CLAMPED (u >= 0 and u' < -1/p)."""
+    u, d = relative(y, side)
+    if not u >= 0.0:
+        return OPEN
+    return CONTACT if 1.0 + q[4 + 5 * side] * d >= 0.0 else CLAMPED
+
+
+@kernel
+def kind_of(before: int, after: int) -> int:
+    """Event between two modes of one pair."""
+    if after == OPEN:
+        return RELEASE
+    if before == OPEN:
+        return TOUCH
+    return CLAMP if after == CLAMPED else REENTRY
+
+
+@kernel
+def note(switches: Any, count: int, time: float, side: int, kind: int, y: Any) -> None:
+    """Write one row of the record of switches."""
+    u, d = relative(y, side)
+    switches[count, 0], switches[count, 1], switches[count, 2] = time, side, kind
+    switches[count, 3], switches[count, 4] = u, d
+
+
+@kernel
+def hermite(y: Any, f: Any, z: Any, g: Any, h: float, theta: float) -> Any:
+    """Cubic interpolant of a step from y (slope f) to z (slope g), at the fraction theta; error O(h^4)."""
+    a = theta * theta * (3.0 - 2.0 * theta)
+    b = h * theta * (1.0 - theta) ** 2
+    c = h * theta * theta * (theta - 1.0)
+    return along(along(along(y, a, along(z, -1.0, y)), b, f), c, g)
+
+
+@kernel
+def put(out: Any, row: int, y: Any) -> None:
+    """Write one state to a row of the output."""
+    out[row, 0], out[row, 1], out[row, 2], out[row, 3], out[row, 4], out[row, 5] = y

@@ -1,0 +1,173 @@
+"""scipy's solvers on the grasp, with a compiled right-hand side: explicit pairs and implicit methods.
+
+Two ways: `straight` leaves (6), (7) and (10) to the right-hand side. `restarted` freezes the mode, lets scipy find
+the switches of (10) as terminal events, and starts afresh after each.
+"""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+import numpy as np
+
+from grasp_ros.methods.equations import (
+    CLAMPED,
+    CONTACT,
+    OPEN,
+    Solution,
+    Work,
+    condition,
+    kind_of,
+    parameters,
+    rates,
+    relative,
+)
+from grasp_ros.physics.integrator import Status
+from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array, Grasp
+
+TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's switch is a switch of both
+MAX_IDLE = 100  # switches without progress in time
+IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
+SIDES = (int(LEFT), int(RIGHT))
+
+
+@kernel
+def slopes(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
+    """Right-hand side as an array (6,)."""
+    f = rates(q, push_l, push_r, (y[0], y[1], y[2], y[3], y[4], y[5]))
+    return np.array(f)
+
+
+@kernel
+def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
+    """Derivative of `slopes` by y, shape (6, 6)."""
+    j = np.zeros((6, 6))
+    for side in range(2):
+        m, K, C, H, p = q[5 * side : 5 * side + 5]
+        x, v = 4 * side, 4 * side + 1
+        sign = 1.0 if side == 0 else -1.0
+        j[x, v], j[v, x], j[v, v] = 1.0, -K / m, -C / m
+        u, d = sign * (y[x] - y[2]), sign * (y[v] - y[3])
+        factor = 1.0 + p * d
+        if not (push_l if side == 0 else push_r) or u <= 0.0 or factor <= 0.0:
+            continue
+        by_u, by_d = 1.5 * H * np.sqrt(u) * factor, p * H * u * np.sqrt(u)
+        for column, slope in ((x, by_u), (v, by_d)):
+            other = column - x + 2
+            j[v, column] -= slope / m
+            j[v, other] += slope / m
+            j[3, column] += slope / q[10]
+            j[3, other] -= slope / q[10]
+    j[2, 3] = 1.0
+    return j
+
+
+def straight(
+    name: str, grasp: Grasp, state: Array, duration: float, grid: Array, tolerance: float, max_events: int
+) -> Solution:
+    """Integrate over everything with rtol = atol."""
+    work = np.zeros(len(Work), dtype=np.int64)
+    result = _integrate(name, (0.0, duration), state, grid, (parameters(grasp), True, True), tolerance, None, work)
+    return Solution(_rows(result), np.empty((0, 5)), work, Status.STALLED if result.status < 0 else Status.DONE)
+
+
+def restarted(
+    name: str, grasp: Grasp, state: Array, duration: float, grid: Array, tolerance: float, max_events: int
+) -> Solution:
+    """Integrate from switch to switch with rtol = atol."""
+    q, work = parameters(grasp), np.zeros(len(Work), dtype=np.int64)
+    mode = [int(condition(q, tuple(state), side)) for side in SIDES]
+    gaps = [_gaps(LEFT, grasp.left_contact.dissipation, work), _gaps(RIGHT, grasp.right_contact.dissipation, work)]
+    t, y, row, idle, states = 0.0, state, 0, 0, []
+    switches: list[tuple[float, ...]] = []
+    while True:
+        active = [*gaps[LEFT][mode[LEFT]], *gaps[RIGHT][mode[RIGHT]]]
+        args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
+        result = _integrate(name, (t, duration), y, grid[row:], args, tolerance, active, work)
+        states.append(_rows(result))
+        row += len(states[-1])
+        if status := _status(result, len(switches) >= max_events, idle > MAX_IDLE):
+            return Solution(np.concatenate(states), np.array(switches).reshape(-1, 5), work, status)
+        first = next(gap for gap, times in zip(active, result.t_events, strict=True) if len(times))
+        at = result.t_events[active.index(first)][0]
+        y = result.y_events[active.index(first)][0]
+        idle = 0 if at > t else idle + 1
+        t = at
+        f = slopes(t, y, *args)
+        for gap in (first, *(gap for gap in active if gap.side != first.side and gap.fires_too(y, f))):
+            switches.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
+            mode[gap.side] = gap.after
+
+
+def _status(result: Any, spent: bool, idle: bool) -> Status | None:
+    """How the integration ended; None if it goes on behind a switch."""
+    if result.status == 0:
+        return Status.DONE
+    if result.status < 0 or idle:
+        return Status.STALLED
+    return Status.EVENT_BUDGET if spent else None
+
+
+class _Gap:
+    """Event function of scipy: u, or u' + 1/p, of one pair."""
+
+    terminal = True
+
+    def __init__(self, side: int, after: int, direction: float, p: float | None, work: Any) -> None:
+        self.side, self.after, self.direction, self._work = side, after, direction, work
+        rate = 0 if p is None else 1
+        self._front, self._back = 2 * side + rate, 2 * side + 2 + rate
+        self._offset = 0.0 if p is None else 1.0 / p
+
+    def __call__(self, t: float, y: Array, *_: Any) -> float:
+        self._work[Work.EVENT_EVALUATIONS] += 1
+        return float(y[self._front] - y[self._back] + self._offset)
+
+    def fires_too(self, y: Array, f: Array) -> bool:
+        """Whether it fires with another one: equal arms at rest reach the object at the same instant.
+
+        scipy would lose it: a function that is zero, or a rounding past it, where a step begins is no event.
+        """
+        moving = self.direction * (f[self._front] - f[self._back]) > 0.0
+        return bool(moving and abs(self(0.0, y)) < TOGETHER)
+
+
+def _gaps(side: int, p: float, work: Any) -> dict[int, list[_Gap]]:
+    """The events that can end each mode of a pair."""
+    release = _Gap(side, OPEN, -1.0, None, work)
+    faster = [_Gap(side, CLAMPED, -1.0, p, work)] if p > 0.0 else []
+    slower = [_Gap(side, CONTACT, 1.0, p, work)] if p > 0.0 else []
+    return {OPEN: [_Gap(side, CONTACT, 1.0, None, work)], CONTACT: [release, *faster], CLAMPED: [release, *slower]}
+
+
+def _integrate(
+    name: str, span: tuple[float, float], y: Array, grid: Array, args: tuple[Any, ...], tolerance: float,
+    events: list[Any] | None, work: Any,
+) -> Any:
+    from scipy import integrate
+
+    base: Any = getattr(integrate, name)
+
+    class Counting(base):
+        """scipy's solver, which counts its steps."""
+
+        def step(self) -> Any:
+            work[Work.STEPS] += 1
+            return super().step()
+
+    options = {"jac": jacobian} if name in IMPLICIT else {}
+    with warnings.catch_warnings():  # an integration that fails says so in its status
+        warnings.simplefilter("ignore")
+        result = integrate.solve_ivp(
+            slopes, span, y, Counting, grid, events=events, args=args, rtol=tolerance, atol=tolerance, **options
+        )
+    work[Work.RIGHT_HAND_SIDES] += result.nfev
+    work[Work.IMPLICIT_ITERATIONS] += result.nlu
+    return result
+
+
+def _rows(result: Any) -> Array:
+    return np.reshape(result.y, (6, -1)).T

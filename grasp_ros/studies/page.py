@@ -1,0 +1,90 @@
+"""Runs all studies and writes docs/accuracy.md with its figures and records."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros import simulation
+from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.scene import Scene
+from grasp_ros.studies import accuracy, drift, figures, loop, measure, predictability, sections, speed, stability
+from grasp_ros.studies.contenders import all_contenders, own_contenders
+from grasp_ros.studies.records import Journal, write_csv
+
+COMMAND = "grasp study page"
+LOOP_SCENE = "case_01"
+QUICK_S = 5.0
+QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
+OUTPUT_RUNS = 100
+
+
+def write(docs: Path, directory: Path, quick: bool) -> Path:
+    """Run all studies, as far as the journal does not have them; returns the page.
+
+    Parameters
+    ----------
+    docs : Path
+        Directory of the page; figures and records go to `accuracy` in it.
+    directory : Path
+        The journal.
+    quick : bool
+        Few settings on two short scenes, without the outside peers and without ROS.
+    """
+    subjects = accuracy.default_scenes()
+    case = scenes.load(LOOP_SCENE)
+    if quick:
+        subjects = [predictability.horizon(scene, QUICK_S) for scene in subjects[:2]]
+        case = predictability.horizon(case, QUICK_S)
+    effort, contenders = (
+        (measure.QUICK, accuracy.quick_contenders()) if quick else (measure.FULL, all_contenders())
+    )
+    records = accuracy.run(subjects, directory, effort, contenders)
+    drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
+    predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
+    limits = stability.limits(case.grasp.left)
+    points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
+
+    place = docs / "accuracy"
+    place.mkdir(parents=True, exist_ok=True)
+    write_csv(records, place / "records.csv")
+    figures.work_precision(records, accuracy.METRIC, place / "error_against_time.png")
+    figures.contacts_missed(records, place / "contacts_missed.png")
+    figures.energy_drift(drifts, place / "energy_drift.png")
+    figures.prediction(predictions, place / "prediction.png")
+    figures.control_period(points, case.name, place / "control_period.png")
+    figures.stability(*stability.curves(case.grasp.left, limits), place / "stability.png")
+    page = docs / "accuracy.md"
+    text = [
+        sections.head(COMMAND), sections.choice(records), sections.paper(records), sections.tolerance(records),
+        sections.missed(records), sections.energy(drifts), sections.prediction(predictions),
+        sections.topics(case.title, points, limits), sections.output(_output(subjects)),
+        *([] if quick else [sections.final_state(_final_states(subjects, directory))]),
+        sections.methods(), sections.details(records),
+    ]
+    page.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+    return page
+
+
+def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
+    journal = Journal(directory)
+    return {
+        scene.name: speed.final_state(scene, measure.truth(scene, journal), sections.FINAL_ERROR) for scene in subjects
+    }
+
+
+def _output(subjects: Sequence[Scene]) -> dict[str, tuple[float, float]]:
+    """Seconds of `exact` with all output times and with the last alone, in turn."""
+    exact = next(contender for contender in own_contenders() if contender.name == EXACT)
+    costs = {}
+    for scene in subjects:
+        solve = exact.build(scene, METHODS[EXACT].default)
+        grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
+        pairs = [(measure.seconds(solve, grid), measure.seconds(solve, grid[-1:])) for _ in range(OUTPUT_RUNS)]
+        both, last = zip(*pairs, strict=True)
+        costs[scene.name] = (statistics.median(both), statistics.median(last))
+    return costs

@@ -1,0 +1,74 @@
+"""How far ahead a scene can be predicted in double precision: accuracy that a scene cannot hold is not for sale."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.integrator import Integrator
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import System
+from grasp_ros.scene import Scene
+
+SECONDS = 100.0
+POINTS = 10_001
+RUNS = 8
+ROUNDINGS = 2.0  # of the initial state, in units of its last place
+SMALL = 1e-11  # relative, of the perturbation whose growth is measured; still small when the scene has amplified it
+LEVELS = (1e-9, 1e-6, 1e-3)
+
+
+class Prediction(NamedTuple):
+    """One scene."""
+
+    scene: str
+    t: Array  # (n,), s
+    distance: Array  # (n,): largest distance so far of motions that begin some roundings apart, m or m/s
+    growth: float  # of a small perturbation over the scene's own duration, largest component by largest component
+
+    def until(self, level: float) -> float | None:
+        """When the distance passes a level, s; None: not within the time that was looked at."""
+        passed = np.nonzero(self.distance > level)[0]
+        return float(self.t[passed[0]]) if len(passed) else None
+
+
+def run(subjects: Sequence[Scene], seconds: float = SECONDS) -> list[Prediction]:
+    """Measure with `exact`; the perturbations are the same in every run."""
+    return [_predict(scene, seconds) for scene in subjects]
+
+
+def _predict(scene: Scene, seconds: float) -> Prediction:
+    grid = np.linspace(0.0, seconds, POINTS)
+    signs = np.random.default_rng(1990).choice([-1.0, 1.0], size=(RUNS, 6))
+    start = scene.initial_state
+    plain = _states(scene, start, grid)
+    shifted = [_states(scene, start + ROUNDINGS * np.spacing(np.abs(start)) * sign, grid) for sign in signs]
+    distance = np.maximum.accumulate(np.abs(np.array(shifted) - plain).max(axis=(0, 2)))
+    own = np.linspace(0.0, scene.duration, POINTS)
+    plain = _states(scene, start, own)
+    pushes = SMALL * np.abs(start).max() * signs
+    grown = max(np.abs(_states(scene, start + push, own) - plain).max() for push in pushes)
+    return Prediction(scene.name, grid, distance, float(grown / np.abs(pushes).max()))
+
+
+def _states(scene: Scene, start: Array, grid: Array) -> Array:
+    return Integrator(System.of(scene.grasp, start), continuous=True).advance(float(grid[-1]), grid)
+
+
+def report(predictions: Sequence[Prediction]) -> str:
+    """Lines: growth, and until when two roundings stay below some levels."""
+    heads = "".join(f"{f'> {level:.0e}':>12}" for level in LEVELS)
+    lines = [f"{'two roundings become':22}{heads}   growth of a perturbation over the scene"]
+    for row in predictions:
+        cells = [row.until(level) for level in LEVELS]
+        text = "".join(f"{'never' if at is None else f'{at:.1f} s':>12}" for at in cells)
+        lines.append(f"  {row.scene:20}{text}   {row.growth:.1e}")
+    return "\n".join([*lines, f"  never: not within {predictions[0].t[-1]:g} s"])
+
+
+def horizon(scene: Scene, seconds: float) -> Scene:
+    """The same scene over another horizon."""
+    return scenes.parse(scene.to_yaml(), scene.name, scene.name, [f"time.duration_s={seconds!r}"])

@@ -1,0 +1,155 @@
+"""Work-precision records, the machine they belong to, and a journal that a study can resume from."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import math
+import os
+import platform
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from grasp_ros import methods
+from grasp_ros.physics.jit import sources_digest
+from grasp_ros.scene import Scene
+
+PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "heyoka")
+ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
+
+
+class Record(NamedTuple):
+    """One method at one setting on one scene."""
+
+    scene: str
+    family: str
+    method: str
+    knob: str
+    setting: float
+    error: float | None  # see `metric`; None: not all the output
+    seconds: float | None  # median of the warm runs; None: no warm run
+    least: float | None  # s, fastest warm run
+    repeats: int
+    first: float  # s, construction and first run, with what they compile
+    steps: int | None  # None: the method does not say
+    right_hand_sides: int | None
+    found: tuple[int, int] | None  # touches left, right; None: it does not look for them
+    there_are: tuple[int, int]
+    status: str
+
+    @property
+    def missed(self) -> int | None:
+        """By how many touches the count of a side is wrong, both sides together."""
+        if self.found is None:
+            return None
+        return sum(abs(a - b) for a, b in zip(self.found, self.there_are, strict=True))
+
+    @property
+    def time(self) -> float:
+        """Fastest warm run in s: on a machine that is shared the others tell of the neighbours; infinite if none."""
+        return math.inf if self.least is None else self.least
+
+    @property
+    def good(self) -> bool:
+        """Whether there is a result, with its time."""
+        return self.error is not None and self.seconds is not None and math.isfinite(self.error)
+
+
+def metric(points: int, digits: int) -> str:
+    """What `Record.error` is, in words: the label of every axis and column that shows it."""
+    return (
+        f"largest absolute error over six states (m, m/s) and {points} output times,"
+        f" against a reference of {digits} digits"
+    )
+
+
+def describe_machine() -> dict[str, str]:
+    """Platform, processor and versions."""
+    cpu = Path("/proc/cpuinfo")
+    model = platform.processor()
+    if cpu.exists():
+        model = next((line.split(": ")[1] for line in cpu.read_text().splitlines() if "model name" in line), model)
+    packages = {}
+    for name in PACKAGES:
+        try:
+            packages[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            packages[name] = "not installed"
+    system = f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors"
+    return {"system": system, "cpu": model, "python": platform.python_version(), **packages}
+
+
+def digest(*parts: object) -> str:
+    """A short name for things that must be the same for a measurement to be the same."""
+    return hashlib.sha256("\n".join(map(str, parts)).encode()).hexdigest()[:16]
+
+
+def origin(family: str) -> str:
+    """What a family's times depend on: machine, versions, and the sources of what this package adds to it."""
+    machine = describe_machine()
+    package = machine.get(ADAPTED.get(family, family), "")
+    own = sources_digest(Path(methods.__file__).parent) if family in ("grasp_ros", "scipy") else ""
+    return digest(machine["system"], machine["cpu"], machine["python"], machine["numba"], family, package, own)
+
+
+class Journal:
+    """Records on disk, one JSON line each, written as they are measured.
+
+    Parameters
+    ----------
+    directory : Path
+        Made if it does not exist.
+    """
+
+    def __init__(self, directory: Path) -> None:
+        directory.mkdir(parents=True, exist_ok=True)
+        self.directory = directory
+        self._path = directory / "journal.jsonl"
+        self._lines: dict[str, Any] = {}
+        if self._path.exists():
+            text = self._path.read_text(encoding="utf-8")
+            whole = text[: text.rfind("\n") + 1]
+            if whole != text:  # the last line of a run that was killed
+                self._path.write_text(whole, encoding="utf-8")
+            for line in whole.splitlines():
+                entry = json.loads(line)
+                self._lines[entry["key"]] = entry["value"]
+
+    def get(self, key: str) -> Any:
+        """What was noted under a key; None if nothing was."""
+        return self._lines.get(key)
+
+    def put(self, key: str, value: Any) -> None:
+        """Note something at once."""
+        self._lines[key] = value
+        with self._path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"key": key, "value": value}) + "\n")
+
+
+def to_record(value: dict[str, Any]) -> Record:
+    """A record from the journal."""
+    found = value["found"]
+    pairs = {"found": None if found is None else tuple(found), "there_are": tuple(value["there_are"])}
+    return Record(**{**value, **pairs})
+
+
+def scene_key(scene: Scene) -> str:
+    """A name for the physics of a scene, whatever it is called."""
+    return digest(json.dumps(scene.values, sort_keys=True, default=dict))
+
+
+def write_csv(records: Iterable[Record], path: Path) -> None:
+    """All records as a table with a header."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow([*Record._fields, "missed"])
+        for record in records:
+            row = record._replace(found=_pair(record.found), there_are=_pair(record.there_are))  # type: ignore[arg-type]
+            writer.writerow(["" if cell is None else cell for cell in (*row, record.missed)])
+
+
+def _pair(pair: tuple[int, int] | None) -> str | None:
+    return None if pair is None else f"{pair[0]}/{pair[1]}"

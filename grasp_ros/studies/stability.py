@@ -1,0 +1,145 @@
+"""At which control period the sampled loop loses stability: exactly, from the sampled linear system of a free arm.
+
+With a command that is held over a period h, and computed from the state `delay` periods before, the state of a free
+arm and its waiting commands goes from tick to tick by a constant matrix. The loop is stable where its spectral
+radius is below 1 (K. J. Astrom, B. Wittenmark: Computer-Controlled Systems, section 3.2). Contacts are not in it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.integrator import Integrator
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp, feedback
+from grasp_ros.physics.system import System
+
+FIRST_S, LAST_S, SCAN = 1e-4, 10.0, 3000  # periods that are looked at for the first crossing
+TICKS = 4000
+NEAR = (0.98, 1.02)  # of the limit: where the simulation confirms it
+
+
+class Limit(NamedTuple):
+    """Loss of stability of one arm."""
+
+    delay: int  # periods
+    period: float  # s; infinite if there is none
+    checks: tuple[tuple[float, float, float], ...]  # period, spectral radius, growth per period in the simulation
+
+
+def transition(arm: Arm, period: Array, delay: int) -> Array:
+    """Matrices from tick to tick of (x, v, commands that wait).
+
+    Parameters
+    ----------
+    arm : Arm
+    period : array (n,), s
+    delay : int
+        Periods between a state and the command that answers it.
+
+    Returns
+    -------
+    array (n, 2 + delay, 2 + delay)
+    """
+    flow = held_flow(arm, period)
+    gain = np.array([-arm.position_gain, -arm.velocity_gain])
+    if delay == 0:
+        return np.asarray(flow[:, :2, :2] + flow[:, :2, 2:] * gain)
+    matrix = np.zeros((len(period), 2 + delay, 2 + delay))
+    matrix[:, :2, :3] = flow[:, :2, :]  # the oldest command acts
+    matrix[:, 2:-1, 3:] = np.eye(delay - 1)
+    matrix[:, -1, :2] = gain
+    return matrix
+
+
+def held_flow(arm: Arm, period: Array) -> Array:
+    """(x, v) after a period from x, v and a command that is held: arrays (n, 2, 3), by the roots of the arm."""
+    m, k, c = arm.mass, arm.stiffness, arm.damping
+    s = c / (2.0 * m)
+    r = np.sqrt(complex(s * s - k / m))
+    fast, slow = np.exp((-s - r) * period), np.exp((-s + r) * period)
+    even = (0.5 * (slow + fast)).real
+    odd = ((slow - fast) / (2.0 * r)).real if r != 0.0 else period * np.exp(-s * period)
+    x_x = even + s * odd
+    without_spring = (period - odd) / c if c > 0.0 else 0.5 * period**2 / m
+    pushed = (1.0 - x_x) / k if k > 0.0 else without_spring
+    columns = [[x_x, odd, pushed], [-k / m * odd, even - s * odd, odd / m]]
+    return np.moveaxis(np.array(columns), 2, 0)
+
+
+def spectral_radii(arm: Arm, period: Array, delay: int) -> Array:
+    """Factor per period by which the slowest motion decays or grows, for periods (n,) in s."""
+    return np.asarray(np.abs(np.linalg.eigvals(transition(arm, period, delay))).max(axis=1))
+
+
+def spectral_radius(arm: Arm, period: float, delay: int) -> float:
+    """The same for one period."""
+    return float(spectral_radii(arm, np.array([period]), delay)[0])
+
+
+def first_limit(arm: Arm, delay: int) -> float:
+    """Smallest period in s at which the spectral radius passes 1 upwards; infinite if there is none up to LAST_S."""
+    from scipy.optimize import brentq
+
+    periods = np.geomspace(FIRST_S, LAST_S, SCAN)
+    above = spectral_radii(arm, periods, delay) >= 1.0
+    crossings = np.nonzero(above[1:] & ~above[:-1])[0]
+    if not len(crossings):
+        return math.inf
+    low, high = periods[crossings[0]], periods[crossings[0] + 1]
+    return float(brentq(lambda h: spectral_radius(arm, h, delay) - 1.0, low, high, xtol=1e-15, rtol=1e-15))
+
+
+def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) -> float:
+    """Growth per period of a free arm in the plant's own simulation, from the second half of the run."""
+    far, none = Arm(1.0, 0.0, 0.0, 0.0, 0.0), Contact(1.0, 0.0)
+    start = np.array([1e-150, 0.0, 1e150, 0.0, 2e150, 0.0])  # room to grow without ever meeting the object
+    integrator = Integrator(System.of(Grasp(arm, far, none, none, 1.0), start), continuous=False)
+    waiting = [0.0] * delay
+    sizes = []
+    for tick in range(ticks):
+        x, v = integrator.state[:2]
+        sizes.append(math.hypot(math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * x, v))
+        waiting.append(feedback(arm, x, v))
+        integrator.hold(np.array([waiting.pop(0), 0.0, 0.0]))
+        integrator.advance(period, start=tick * period)
+    half = ticks // 2
+    window = ticks // 8  # maxima over a window: the phase of the oscillation drops out
+    return float((max(sizes[-window:]) / max(sizes[half - window : half])) ** (1.0 / (ticks - half)))
+
+
+def limits(arm: Arm, delays: tuple[int, ...] = (0, 1)) -> list[Limit]:
+    """The first limit for each delay, confirmed by simulation a little below and above it."""
+    found = []
+    for delay in delays:
+        period = first_limit(arm, delay)
+        near = [factor * period for factor in NEAR if math.isfinite(period)]
+        checks = tuple((h, spectral_radius(arm, h, delay), simulated_growth(arm, h, delay)) for h in near)
+        found.append(Limit(delay, period, checks))
+    return found
+
+
+def report(name: str, found: list[Limit]) -> str:
+    """Lines for one arm."""
+    lines = [f"{name}: largest stable control period"]
+    for limit in found:
+        lines.append(f"  delay of {limit.delay} periods: {1e3 * limit.period:.10g} ms (spectral radius 1)")
+        for period, radius, growth in limit.checks:
+            lines.append(f"    at {1e3 * period:8.3f} ms: spectral radius {radius:.6f}, simulated {growth:.6f}")
+    return "\n".join(lines)
+
+
+def curves(
+    arm: Arm, found: Sequence[Limit]
+) -> tuple[dict[str, tuple[Array, Array]], list[tuple[float, float]], dict[str, float]]:
+    """What `figures.stability` draws: radius against period, simulated growth, and the limits; by delay."""
+    named = {f"delay of {limit.delay} periods": limit for limit in found if math.isfinite(limit.period)}
+    last = 1.3 * max((limit.period for limit in named.values()), default=FIRST_S)
+    periods = np.linspace(last / 300.0, last, 300)
+    radii = {label: (periods, spectral_radii(arm, periods, limit.delay)) for label, limit in named.items()}
+    simulated = [(h, growth) for limit in named.values() for h, _, growth in limit.checks]
+    simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in named.values() for h in periods[30::45]]
+    return radii, simulated, {label: limit.period for label, limit in named.items()}
