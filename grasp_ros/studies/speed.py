@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
+from grasp_ros import scene as scenes
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
@@ -28,7 +29,8 @@ BUDGET_S, FEWEST, MOST = 1.5, 3, 200  # per solver: time for its repeats, and th
 PATIENCE_S = 2.0  # a solver that needs longer for one run climbs no further
 WARM_S = 0.05  # a solver that takes longer is warm by itself
 FINER = 2  # settings a decade of `exact`
-HORIZONS_S = (0.25, 0.5, 1.0, 2.0)  # of the scene's duration
+HORIZONS = (0.25, 0.5, 1.0, 2.0)  # parts of the scene's duration
+ENDURANCE_S = (1.0, 1e2, 1e4, 1e6)
 
 
 class Timing(NamedTuple):
@@ -157,15 +159,16 @@ def _failure(record: Record) -> str:
 
 
 def _growth(scene: Scene) -> list[str]:
-    """Cost of the same scene over other horizons."""
-    lines = [f"\ncost grows with contacts: {'horizon s':>10}{'touches':>9}{'median ms':>11}{'us a touch':>12}"]
+    """Cost of the scene over other horizons, and of one without contacts: contacts count, the duration does not."""
+    lines = [f"\ncost of the last state {'horizon s':>12}{'touches':>9}{'median ms':>11}{'us a touch':>12}"]
     exact = next(contender for contender in own_contenders() if contender.name == EXACT)
-    for factor in HORIZONS_S:
-        longer = predictability.horizon(scene, factor * scene.duration)
+    quiet = scenes.load("no_contact")
+    longers = [predictability.horizon(scene, factor * scene.duration) for factor in HORIZONS]
+    for longer in [*longers, *(predictability.horizon(quiet, seconds) for seconds in ENDURANCE_S)]:
         solve = exact.build(longer, exact.ladder[-1])
         grid = np.array([longer.duration])
         touches = sum(solve(grid).touches or (0, 0))
         median = statistics.median(measure.seconds(solve, grid) for _ in range(MOST))
         each = f"{1e6 * median / touches:12.1f}" if touches else f"{'-':>12}"
-        lines.append(f"{'':26}{longer.duration:10g}{touches:9}{1e3 * median:11.4f}{each}")
+        lines.append(f"  {longer.name:20}{longer.duration:12g}{touches:9}{1e3 * median:11.4f}{each}")
     return lines
