@@ -16,9 +16,9 @@ from grasp_ros.physics.certificate import ledger
 from grasp_ros.physics.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene
+from grasp_ros.scene import PAPER, Scene
 from grasp_ros.simulation import Trajectory, simulate, tick_times
-from grasp_ros.studies.effects import registry_table
+from grasp_ros.studies.effects import registry_table, variants
 from grasp_ros.topics import JOINT_STATES, LYAPUNOV
 
 OTHERS = [name for name in scenes.names() if name not in CASES]
@@ -381,6 +381,16 @@ def test_the_example_of_the_documentation_works(monkeypatch: pytest.MonkeyPatch)
     assert simulate(rail).state.tobytes() == simulate(same).state.tobytes()
     with pytest.raises(scenes.SceneError, match="drag_Ns_per_m"):
         scenes.load("case_01", ["left_rail.drag_Ns_per_m=-1"])
+
+
+def test_every_effect_has_its_row_in_the_cost_table() -> None:
+    found = variants(scenes.load("case_01", ["time.duration_s=1.0"]))
+    missing = {effect.section for effect in EFFECTS} - found.keys()
+    assert missing == PAPER - {"left_feedback", "right_feedback"}
+    assert found["all together"].values.keys() == {effect.section for effect in EFFECTS}
+    assert found["all together"].system.delay == 2
+    for scene in found.values():
+        assert simulate(scene.changed({"time.duration_s": 0.1})).status is Status.DONE
 
 
 def test_the_documentation_lists_every_effect() -> None:

@@ -64,7 +64,7 @@ class Effect:
     problems : callable
         Finds what is wrong beyond ranges.
     example : mapping of str to numbers
-        What to add to a scene to see it; `grasp study effects` does. Empty for what every grasp has.
+        Keys to add to a scene to see what it does; `grasp study effects` does. Empty for what the paper's grasp has.
     """
 
     section: str

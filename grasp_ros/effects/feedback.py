@@ -32,6 +32,7 @@ EFFECTS = tuple(
         f"{side}_feedback", f"controller of the {side} arm: linear state feedback", PARAMETERS, partial(_build, side),
         "Kp x^2, with a set-point or a constant force (k + Kp) (x - x_e)^2; the feedback takes 2 Kv x'^2",
         needs=(f"{side}_arm",), node=f"{side}_controller", commands=COMMANDS[side],
+        example={"set_point_m": 0.05, "feed_forward_N": 0.5},
     )
     for side in SIDES
 )

@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from grasp_ros import plots, strict_yaml
 from grasp_ros import scene as scenes
-from grasp_ros.effects import BY_SECTION, EFFECTS
+from grasp_ros.effects import EFFECTS
 from grasp_ros.graph import Graph
 from grasp_ros.physics.layout import Event
 from grasp_ros.scene import Scene
@@ -30,6 +30,7 @@ from grasp_ros.versions import versions
 BARE = "bare"
 REPEATS, SAMPLED_REPEATS = 31, 5
 RECORDED_S = 1.0
+LESSER = ("hammer", "no_contact")  # scenes that name less than the paper's grasp
 REGISTRY, COSTS = "the registry", "what `grasp study effects` measured"  # marked parts of the documentation
 
 
@@ -91,18 +92,18 @@ def _put(text: str, part: str, block: str) -> str:
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
-    """The scene alone, with each effect that has an example, and with all of them, by name."""
+    """The scene alone, with each effect's example, with all of them, and scenes that name less, by name."""
     own = {key: dict(numbers) for key, numbers in scene.values.items()}
     found = {BARE: scene}
-    everything: dict[str, Mapping[str, Any]] = {}
+    everything: dict[str, Mapping[str, Any]] = dict(own)
     for effect in EFFECTS:
-        if effect.example and effect.section not in own:
-            added: dict[str, Mapping[str, Any]] = {key: {} for key in effect.needs if key not in own}
-            added[effect.section] = effect.example
-            everything.update(added)
-            found[effect.section] = _composed(scene, {**own, **added})
-    examples = {key: BY_SECTION[key].example for key in everything}
-    return {**found, "all together": _composed(scene, {**own, **examples})}
+        if effect.example:
+            needed: dict[str, Mapping[str, Any]] = {key: {} for key in effect.needs if key not in own}
+            added: dict[str, Mapping[str, Any]] = {effect.section: {**own.get(effect.section, {}), **effect.example}}
+            found[effect.section] = _composed(scene, {**own, **needed, **added})
+            everything = {**needed, **everything, **added}
+    lesser = {f"{name}.yaml": scenes.load(name) for name in LESSER}
+    return {**found, "all together": _composed(scene, everything), **lesser}
 
 
 def measure(found: Mapping[str, Scene], repeats: int, sampled_repeats: int) -> list[Cost]:
