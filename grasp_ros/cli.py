@@ -137,20 +137,11 @@ def _simulate(options: argparse.Namespace) -> int:
             scene, grid=grid, sampled=options.sampled, method=options.method, setting=_setting(options),
             progress=lambda reached: bar.update(reached - bar.n),
         )
-    print(table({**dict(describe_trajectory(trajectory)), **_describe_method(trajectory)}.items()))
+    print(table(describe_trajectory(trajectory)))
     if options.output is not None:
         trajectory.save(options.output)
         print(f"written to {options.output}")
     return 0 if trajectory.status is Status.DONE else 1
-
-
-def _describe_method(trajectory: Trajectory) -> dict[str, str]:
-    method = METHODS[trajectory.method]
-    rows = {
-        "method": f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}",
-        "work": ", ".join(f"{number} {name}" for name, number in trajectory.counters.items()),
-    }
-    return rows if method.finds_contacts else {"touches left, right": "not looked for", **rows}
 
 
 def _run(options: argparse.Namespace) -> int:

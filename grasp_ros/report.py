@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.bag import Recording
-from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.methods.registry import METHODS, UNITS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Event
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
@@ -26,20 +27,28 @@ def table(rows: Iterable[Row]) -> str:
 def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     """What happened in a simulation."""
     level = trajectory.energy
-    touches = [len(trajectory.times(Event.TOUCH, side)) for side in (LEFT, RIGHT)]
-    clamps = sum(len(trajectory.times(Event.CLAMP, side)) for side in (LEFT, RIGHT))
+    method = METHODS[trajectory.method]
     rows = [
         ("scene", trajectory.scene.title),
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
         ("status", trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
-        ("touches left, right", f"{touches[0]}, {touches[1]}" + (f"; {clamps} times u' < -1/p" if clamps else "")),
-        ("work", ", ".join(f"{trajectory.work[entry]} {entry.name.lower().replace('_', ' ')}" for entry in Work)),
+        ("touches left, right", _touches(trajectory) if method.finds_contacts else "not looked for"),
+        ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
+        ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
     ]
     if len(trajectory.t):
         rows.append(("V_c at both ends", _ends(level.V_c)))
     rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
     return _with_watch(trajectory.scene, rows)
+
+
+def _touches(trajectory: Trajectory) -> str:
+    """Touches of both sides; what is rare only where it happens."""
+    text = ", ".join(str(len(trajectory.times(Event.TOUCH, side))) for side in (LEFT, RIGHT))
+    clamps = sum(len(trajectory.times(Event.CLAMP, side)) for side in (LEFT, RIGHT))
+    sticks = len(trajectory.times(Event.STICK, OBJECT))
+    return text + (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
 
 
 def describe_recording(recording: Recording) -> list[Row]:
