@@ -486,5 +486,5 @@ def test_the_object_sticks_exactly_while_the_arms_push_too_weakly() -> None:
     assert not motion.state[end, 3].any()
     assert np.ptp(motion.state[end, 0]) > 1e-3  # the arm still swings
     lean = next(output.value(motion.scene.system, 0, motion.state[-1]) for output in motion.scene.outputs)
-    assert lean == pytest.approx(-15.0 * motion.state[-1, 0], rel=1e-6)  # the arm rests against it
+    assert lean == pytest.approx(-15.0 * motion.state[-1, 0], rel=1e-4)  # the arm rests against it
     assert 0.5 < lean < 1.0
