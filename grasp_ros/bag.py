@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -148,8 +149,13 @@ class Recording:
 
     @property
     def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode at the ticks, from the states; of the scene as it was at the start."""
-        return energy(self.scene.system, self.state)
+        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force."""
+        scene, starts = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
+        parts = []
+        for begin, end in pairwise(starts):
+            scene = scene.changed(self.changes.get(begin, {}))
+            parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
+        return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
     @property
     def missing(self) -> dict[str, int]:
@@ -177,6 +183,8 @@ def read(path: Path) -> Recording:
         reason = " ".join(str(error).split())
         raise BagError(f"{path}: not a bag of this package: {reason}") from None
     ticks, joints = columns[JOINT_STATES]
+    if not len(ticks):
+        raise BagError(f"{path}: holds no tick")
 
     def aligned(topic: Topic) -> Array:
         found, values = columns[topic]
@@ -229,6 +237,8 @@ def _joints(message: Any) -> Array:
 def _changes(reader: Reader, scene: scenes.Scene) -> dict[int, dict[str, float]]:
     changes: dict[int, dict[str, float]] = {}
     for topic in CHANGES.values():
-        for tick, message in _messages(reader, topic, scene):
+        for _, message in _messages(reader, topic, scene):
+            stamp = message.header.stamp  # a monitor that came late has recorded it late
+            tick = (stamp.sec * NANOSECONDS + stamp.nanosec) // scene.period_ns
             changes.setdefault(tick, {}).update(zip(message.name, message.position.tolist(), strict=True))
     return changes

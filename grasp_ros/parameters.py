@@ -49,7 +49,8 @@ class Parameter(NamedTuple):
         return int(value) if self.whole else float(value)
 
     def _accepts_one(self, value: Any) -> bool:
-        kinds = (int,) if self.whole else (int, float)
-        if not isinstance(value, kinds) or isinstance(value, bool):
+        if not isinstance(value, (int, float)) or isinstance(value, bool):
+            return False
+        if self.whole and value != value // 1:  # 7.0 is whole: messages carry nothing else
             return False
         return bool((self.low < value if self.open_low else self.low <= value) and value <= self.high)

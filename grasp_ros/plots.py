@@ -10,11 +10,13 @@ import matplotlib
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
+import numpy as np
 from matplotlib.axes import Axes
 
 from grasp_ros.physics.certificate import Energy
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
-from grasp_ros.scene import Scene
+from grasp_ros.scene import PAPER, Scene
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
 PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
@@ -70,25 +72,30 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
     )
     figure.suptitle(f"{motion.scene.title}\n{caption}", fontsize="medium")
     for column, label, color in ((0, "$x_l$", LEFT_COLOR), (2, "$x_o$", OBJECT_COLOR), (4, "$x_r$", RIGHT_COLOR)):
-        top.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
-    for column, label, color in ((0, "$f_l$", LEFT_COLOR), (1, "$f_r$", RIGHT_COLOR)):
-        middle.plot(motion.t, motion.command[:, column], label=label, color=color, linewidth=1.0)
-    _limits(top, PAPER_DISPLACEMENT, motion.state[:, 0::2], "displacement, m")
-    _limits(middle, PAPER_INPUT, motion.command, "input, N")
+        if not np.isnan(motion.state[:, column]).all():
+            top.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
+    for side, label, color in ((LEFT, "$f_l$", LEFT_COLOR), (RIGHT, "$f_r$", RIGHT_COLOR)):
+        if side in motion.scene.system.laws:
+            middle.plot(motion.t, motion.command[:, side], label=label, color=color, linewidth=1.0)
+    top.set_ylabel("displacement, m")
+    middle.set_ylabel("input, N")
+    if motion.scene.values.keys() == PAPER:
+        _limits(top, PAPER_DISPLACEMENT, motion.state[:, 0::2])
+        _limits(middle, PAPER_INPUT, motion.command)
     _draw_energy(bottom, motion)
     bottom.set_xlabel("time, s")
     bottom.set_xlim(motion.t[0], motion.t[-1])
     for axes in (top, middle, bottom):
         axes.grid(alpha=0.3)
-        axes.legend(loc="upper right", ncols=3, fontsize="small")
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(loc="upper right", ncols=3, fontsize="small")
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
 
-def _limits(axes: Axes, paper: tuple[float, float], values: Array, label: str) -> None:
+def _limits(axes: Axes, paper: tuple[float, float], values: Array) -> None:
     """The paper's axes, widened where the motion leaves them."""
     axes.set_ylim(min(paper[0], 1.05 * values.min()), max(paper[1], 1.05 * values.max()))
-    axes.set_ylabel(label)
 
 
 def _draw_energy(axes: Axes, motion: Motion) -> None:
@@ -97,7 +104,7 @@ def _draw_energy(axes: Axes, motion: Motion) -> None:
     axes.plot(motion.t, level.V, color="#cc79a7", linewidth=1.0, linestyle="--", label="$V$ of the paper")
     if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
         axes.set_yscale("log")
-    else:
+    elif level.V_c.min() >= 0.0:
         axes.set_ylim(0.0, 1.3 * level.V_c.max() or 1.0)
     axes.set_ylabel("twice the energy, J")
     for flag, low, label, color in (

@@ -129,6 +129,14 @@ class Scene:
         forces = [output.topic for output in self.outputs]
         return [JOINT_STATES, *self.controllers.values(), *forces, LYAPUNOV]
 
+    @property
+    def live(self) -> list[str]:
+        """Numbers, as "section.key", that belong to controllers: what they may be given in place of the scene's."""
+        return [
+            f"{effect.section}.{key}" for effect in self.effects if effect.node in self.controllers
+            for key in self.values[effect.section]
+        ]
+
     def certificate_in_words(self, sampled: bool) -> str:
         """Whether V_c can rise in this scene, and why."""
         held = [HELD] if sampled and not self.sampled and self.system.laws else []
@@ -156,6 +164,8 @@ class Scene:
         values = {section: dict(content) for section, content in self.values.items()}
         for name, number in numbers.items():
             section, _, key = name.partition(".")
+            if key not in values.get(section, {}):
+                raise SceneError(f"{self.name}: {name}: not in this scene; allowed: what it names")
             values[section][key] = number
         values = read_sections(self.name, values)
         check_together(self.name, values)

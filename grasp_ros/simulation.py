@@ -177,10 +177,11 @@ def simulate(
     Raises
     ------
     ValueError
-        If the accuracy is outside its range, the grid is not ascending within the horizon, or the method cannot do
-        what is asked, see `methods.registry.check`.
+        If the accuracy is outside its range, the grid is not ascending within the horizon, the changes are not those
+        of a running graph, or the method cannot do what is asked, see `methods.registry.check`.
     """
     sampled = sampled or scene.sampled
+    check_changes(scene, sampled, changes)
     setting = registry.check(method, scene, accuracy if method == EXACT and setting is None else setting, sampled)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
@@ -206,6 +207,23 @@ def simulate(
         scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
         integrator.status, EXACT, setting,
     )
+
+
+def check_changes(scene: Scene, sampled: bool, changes: Changes) -> None:
+    """Refuse changes that a running graph would refuse.
+
+    Raises
+    ------
+    ValueError
+        Names the first of them.
+    """
+    if changes and not sampled:
+        raise ValueError("changes: not allowed under continuous feedback; allowed: sampled=True")
+    live = scene.live
+    for tick, numbers in changes.items():
+        for name in numbers:
+            if name not in live or not 0 <= tick <= scene.ticks:
+                raise ValueError(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
 def tick_times(scene: Scene) -> Array:

@@ -9,7 +9,7 @@ from grasp_ros.effects import BY_SECTION, EFFECTS
 from grasp_ros.effects.base import Effect
 from grasp_ros.parameters import Parameter
 
-BODIES = frozenset(("left_arm", "object", "right_arm"))
+SOMETHING = frozenset(("left_arm", "object", "right_arm"))
 
 
 class SceneError(ValueError):
@@ -76,8 +76,8 @@ def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None
     SceneError
         Names the first that does not.
     """
-    if not BODIES & values.keys():
-        raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(sorted(BODIES))}")
+    if not SOMETHING & values.keys():
+        raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(sorted(SOMETHING))}")
     effects = [effect for effect in EFFECTS if effect.section in values]
     for effect in effects:
         for section in effect.needs:

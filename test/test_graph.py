@@ -241,6 +241,9 @@ def test_lonely_node_ends_cleanly_on_a_signal(tmp_path: Path, name: str, number:
         ("plant", "accuracy:=1.0", "accuracy: 1.0 is outside"),
         ("plant", "accuracy:=1", "accuracy: 1.0 is outside"),
         ("plant", "scene:=1", "scene"),
+        ("plant", "object.mas_kg:=4.0", "object.mas_kg: no such parameter"),
+        ("plant", "tilt.angle_rad:=0.3", "tilt.angle_rad: no such parameter"),
+        ("plant", "object.mass_kg:=-4.0", "object.mass_kg"),
         ("monitor", "bag:=.", "bag: '.' exists"),
     ],
 )

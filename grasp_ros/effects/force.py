@@ -18,7 +18,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
 from grasp_ros.topics import EXTERNAL_FORCES
 
-BODIES = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}
+SECTIONS = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}
 FORCE = Parameter("force_N", -1e12, 1e12, "force, positive to the right")
 PULSE = (
     FORCE,
@@ -83,8 +83,8 @@ def _off_tick(section: str, keys: tuple[str, ...], sections: Sections) -> Iterab
     for key in keys:
         value = sections[section][key]
         times = value if isinstance(value, tuple) else (value,)
-        ticks = [round(time * NANOSECONDS) / period for time in times]
-        if any(tick != round(tick) for tick in ticks):
+        whole = all(round(time * NANOSECONDS) / NANOSECONDS == time for time in times)
+        if not whole or any(round(time * NANOSECONDS) % period for time in times):
             yield Problem(f"{section}.{key}", value, f"whole control periods of {period / NANOSECONDS:g} s")
 
 
@@ -121,4 +121,4 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
         )
 
 
-EFFECTS = tuple(effect for name, body in BODIES.items() for effect in _effects(name, body))
+EFFECTS = tuple(effect for name, body in SECTIONS.items() for effect in _effects(name, body))

@@ -15,8 +15,8 @@ PARAMETERS = (
     Parameter("noise_seed", 0, 2**31 - 1, "seed of the noise", whole=True),
     Parameter("position_noise_m", 0.0, 1e3, "standard deviation of the measured position", optional=True),
     Parameter("velocity_noise_m_per_s", 0.0, 1e3, "standard deviation of the measured velocity", optional=True),
-    Parameter("position_step_m", 0.0, 1e3, "resolution of the measured position", open_low=True, optional=True),
-    Parameter("velocity_step_m_per_s", 0.0, 1e3, "resolution of the measured velocity", open_low=True, optional=True),
+    Parameter("position_step_m", 1e-12, 1e3, "resolution of the measured position", optional=True),
+    Parameter("velocity_step_m_per_s", 1e-12, 1e3, "resolution of the measured velocity", optional=True),
 )
 BLOCK = 1024  # ticks whose noise is drawn at once
 

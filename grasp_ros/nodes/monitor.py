@@ -60,7 +60,7 @@ class Monitor(GraspNode):
         self._recorder: Recorder | None = None
         self._pending: dict[Topic, deque[tuple[int, bytes]]] = {}
         self._announcements: list[_Announcements] = []
-        self._before: tuple[Array, Array] | None = None  # state and external forces of the last tick
+        self._before: tuple[int, Array, Array] | None = None  # time in ns, state and external forces of the last tick
         self.counters.update(ticks=0, **{"lost messages": 0, "alarms": 0})
         self._values = self.publisher(LYAPUNOV)
         self.subscribe(SCENE, self._on_scene)
@@ -125,10 +125,10 @@ class Monitor(GraspNode):
         state, inputs = messages.state_of(message)
         external = system.external_at(time_ns // self._scene.period_ns)
         unexplained, alarm = 0.0, False
-        if self._before is not None:
-            balance = ledger(system, self._before[0], state, inputs + self._before[1])
+        if self._before is not None and self._before[0] + self._scene.period_ns == time_ns:
+            balance = ledger(system, self._before[1], state, inputs + self._before[2])
             unexplained, alarm = balance.unexplained, balance.alarm
-        self._before = state, external
+        self._before = time_ns, state, external
         level = energy(system, state, external)
         if alarm:
             self.count("alarms")

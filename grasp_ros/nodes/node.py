@@ -65,10 +65,12 @@ class GraspNode(Node):
                 name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
                 default = list(value) if parameter.several else value
                 found = self.declare_parameter(name, default, _descriptor(parameter)).value
-                if parameter.several:
-                    found = list(found)
+                found = list(found) if parameter.several else parameter.read(found)
                 if found != default:
                     given[name] = found
+        unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        if unknown:  # rclpy itself would not say a word
+            raise ValueError(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
         return given
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:

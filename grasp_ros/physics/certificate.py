@@ -90,7 +90,7 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     levels = []
     rounding = 0.0
     for state in (before, after):
-        level = float(_mechanical(system, system.bodies, state))
+        level = _own_energy(system, state)
         for side, u, _ in _pairs(system, state):
             force = float(hertz_force(Contact(*system.pairs[side]), u))
             level += 0.8 * force * float(u)
@@ -118,12 +118,22 @@ def _mechanical(system: System, bodies: Array, state: Array) -> Array:
     return kinetic + potential
 
 
-def _size(system: System, state: Array) -> float:
-    """Sum of the sizes of the terms of `_mechanical`."""
+def _own_energy(system: System, state: Array) -> float:
+    """Twice the energy of the bodies by themselves; k x^2 - 2 f x, because (f / k)^2 may be large beside it."""
     total = 0.0
     for body in system.present:
         x, v = float(state[COLUMN[body]]), float(state[COLUMN[body] + 1])
-        mass, stiffness, _, force = system.bodies[body]
+        mass, stiffness, _, force = system.bodies[body].tolist()
+        total += mass * v * v + stiffness * x * x - 2.0 * force * x
+    return total
+
+
+def _size(system: System, state: Array) -> float:
+    """Sum of the sizes of the terms of `_own_energy`."""
+    total = 0.0
+    for body in system.present:
+        x, v = float(state[COLUMN[body]]), float(state[COLUMN[body] + 1])
+        mass, stiffness, _, force = system.bodies[body].tolist()
         total += mass * v * v + stiffness * x * x + 2.0 * abs(force * x)
     return total
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from grasp_ros.physics.flight import EPS
 from grasp_ros.physics.friction import FREE, contact_slide, fire_slide
-from grasp_ros.physics.jit import inlined
+from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     CHECK,
     DISSIPATION,
@@ -42,6 +42,8 @@ from grasp_ros.physics.switching import (
     scales,
     tick,
 )
+
+LONGEST = 2.0**500  # step in units of an impact
 
 
 @inlined
@@ -92,6 +94,26 @@ def contact_switch(tables: Any, pairs: Any, mode: Any, side: int, n: int, h: flo
 
 
 @inlined
+def mismatch(at: Any, left: bool, right: bool) -> float:
+    """Difference between the expanded product w_l w_r, or w w, and the product of the expanded factors."""
+    return abs(at[CHECK] - (at[Z_L] if left else at[Z_R]) * (at[Z_R] if right else at[Z_L]))
+
+
+@kernel
+def stretch(c: Any, n: int, span: float, left: bool, right: bool, allowed: float, at: Any) -> float:
+    """Step of a series whose tail has vanished, at rest or by underflow: to the end of the span, or while it agrees."""
+    h = 1.0
+    values(c, n, h, at)
+    while at[TIME] < span and h < LONGEST:
+        values(c, n, 2.0 * h, at)
+        if not mismatch(at, left, right) <= allowed:
+            break
+        h *= 2.0
+    values(c, n, h, at)
+    return h
+
+
+@inlined
 def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, span: float, tolerance: float,
                  n: int, work: Any) -> Any:
     """Expand the series at y; returns an accepted step in s / unit, and the unit. tables.at: values at its end.
@@ -118,14 +140,12 @@ def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: 
     else:
         expand_one(c, tables.f, bodies, pairs, LEFT if left else RIGHT, unit, n)
     h = step_size(c, left, right, w_l, w_r, max(v_l, v_r), n, tolerance)
-    if h == math.inf:
-        h = span / ((c[Z_L] if left else 1.0) * (c[Z_R] if right else 1.0) * unit)
-        values(c, n, h, at)
-        return h, unit
     allowed = (100.0 * tolerance + 100.0 * EPS) * (w_l * w_r if left and right else (w_l * w_r) ** 2)
+    if h == math.inf:
+        return stretch(c, n, span, left, right, allowed, at), unit
     for _ in range(60):
         values(c, n, h, at)
-        if abs(at[CHECK] - (at[Z_L] if left else at[Z_R]) * (at[Z_R] if right else at[Z_L])) <= allowed:
+        if mismatch(at, left, right) <= allowed:
             return h, unit
         work[2] += 1
         h *= 0.7

@@ -188,6 +188,8 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
     if mode[LEFT] == UNKNOWN:
         mode[OBJECT] = FREE
         classify(bodies, pairs, y, mode)
+        judge_slide(bodies, pairs, friction, y, mode)
+        classify(bodies, pairs, y, mode)  # a pair at rest at u = 0 moves as friction lets it
     stuck = mode[OBJECT] == STUCK
     judge_slide(bodies, pairs, friction, y, mode)
     if stuck and mode[OBJECT] != STUCK:  # other forces act from here on

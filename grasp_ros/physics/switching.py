@@ -134,6 +134,8 @@ def hold_time(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: 
     """
     d, _ = relative_motion(bodies, y, side)
     w, v = scales(bodies, pairs, y, mode, side)
+    if w == 0.0 or v == 0.0:  # nothing presses it together
+        return 0.0
     return (sliver(tolerance) if d > 0.0 else 0.3 * tolerance**0.25) * w * w / v
 
 

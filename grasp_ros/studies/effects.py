@@ -97,7 +97,7 @@ def variants(scene: Scene) -> dict[str, Scene]:
     found = {BARE: scene}
     everything: dict[str, Mapping[str, Any]] = dict(own)
     for effect in EFFECTS:
-        if effect.example:
+        if effect.example and own.keys() | {"loop"} >= set(effect.needs):
             needed: dict[str, Mapping[str, Any]] = {key: {} for key in effect.needs if key not in own}
             added: dict[str, Mapping[str, Any]] = {effect.section: {**own.get(effect.section, {}), **effect.example}}
             found[effect.section] = _composed(scene, {**own, **needed, **added})
