@@ -8,8 +8,6 @@ force without friction are kept beside it.
 import math
 from typing import Any
 
-import numpy as np
-
 from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -86,33 +84,38 @@ def flight_stop(bodies: Any, y: Any, mode: Any) -> float:
 
 @kernel
 def impact_series(tables: Any, pairs: Any, mode: Any, n: int, row: Any) -> None:
-    """Write the series of the impact forces on the object, H w^3 (1 + p u'), up to the order n."""
-    row[:] = 0.0
-    w, e, square, cube = np.empty(n + 1), np.empty(n + 1), np.empty(n + 1), np.empty(n + 1)
+    """Write the series of the impact forces on the object, H w^3 (1 + p u'), up to the order n.
+
+    The table of factors is free after the expansion and holds the series on the way.
+    """
+    f = tables.f
+    w, e, square, cube = 0, n + 1, 2 * (n + 1), 3 * (n + 1)
+    for k in range(n + 1):
+        row[k] = 0.0
     for side in (LEFT, RIGHT):
         if mode[side] != CONTACT:
             continue
         front, back = (V_L, V_O) if side == LEFT else (V_O, V_R)
         for k in range(n + 1):
-            w[k] = tables.c[LANES * k + Z_L + side]
-            e[k] = pairs[side, DISSIPATION] * (tables.c[LANES * k + front] - tables.c[LANES * k + back])
-        e[0] += 1.0
-        product(w, w, n, square)
-        product(square, w, n, cube)
-        product(cube, e, n, square)
+            f[w + k] = tables.c[LANES * k + Z_L + side]
+            f[e + k] = pairs[side, DISSIPATION] * (tables.c[LANES * k + front] - tables.c[LANES * k + back])
+        f[e] += 1.0
+        product(f, w, w, square, n)
+        product(f, square, w, cube, n)
+        product(f, cube, e, square, n)
         hertz = pairs[side, HERTZ] if side == LEFT else -pairs[side, HERTZ]
         for k in range(n + 1):
-            row[k] += hertz * square[k]
+            row[k] += hertz * f[square + k]
 
 
 @kernel
-def product(a: Any, b: Any, n: int, out: Any) -> None:
-    """Cauchy product of two series up to the order n."""
+def product(f: Any, a: int, b: int, out: int, n: int) -> None:
+    """Cauchy product up to the order n of two series that begin at a and b in f."""
     for k in range(n + 1):
         total = 0.0
         for j in range(k + 1):
-            total += a[j] * b[k - j]
-        out[k] = total
+            total += f[a + j] * f[b + k - j]
+        f[out + k] = total
 
 
 @kernel
@@ -131,7 +134,8 @@ def contact_slide(tables: Any, pairs: Any, friction: Any, mode: Any, n: int, h: 
     push = row[0] + friction[PUSH]
     row[0] = push - friction[COULOMB]
     to_right = first_rise(row, n, h, 0.0, work)
-    row[:] = -row
+    for k in range(1, n + 1):
+        row[k] = -row[k]
     row[0] = -push - friction[COULOMB]
     to_left = first_rise(row, n, h, 0.0, work)
     if math.isnan(to_right) or math.isnan(to_left):
