@@ -74,6 +74,9 @@ def _parser() -> argparse.ArgumentParser:
     sub.set_defaults(command=_study_effects)
     _add_scene(sub)
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
+    sub = studies.add_parser("certificate", help="where the paper's V jumps, from which p on, and limits of the period")
+    sub.set_defaults(command=_study_certificate)
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put tables and figure into this text")
     sub = studies.add_parser("graph", help="lockstep ticks per second, beside a bare rclpy graph")
     sub.set_defaults(command=_study_graph)
     _add_scene(sub)
@@ -206,6 +209,14 @@ def _study_effects(options: argparse.Namespace) -> int:
 
     _prepare()
     effects.run(scenes.load(options.scene, options.settings), options.output)
+    return 0
+
+
+def _study_certificate(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import certificate
+
+    _prepare()
+    certificate.run(options.output)
     return 0
 
 
