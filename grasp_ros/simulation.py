@@ -203,7 +203,8 @@ def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes
         if tick in changes:
             scene = scene.changed(changes[tick])
             system = scene.system
-        answers = system.commands(tick, integrator.state)
+        with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
+            answers = system.commands(tick, integrator.state)
         commands[tick] = answers[LEFT], answers[RIGHT]
         if progress is not None and tick % 100 == 0:
             progress(scene.time_of(tick))
