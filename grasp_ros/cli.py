@@ -77,6 +77,16 @@ def _parser() -> argparse.ArgumentParser:
     sub = studies.add_parser("certificate", help="where the paper's V jumps, from which p on, and limits of the period")
     sub.set_defaults(command=_study_certificate)
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put tables and figure into this text")
+    sub = studies.add_parser("hard", help="hard cases: what decides, the figure reached, and other solvers beside it")
+    sub.set_defaults(command=_study_hard)
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
+    sub.add_argument("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten")
+    sub = studies.add_parser("fuzz", help="random scenes against all properties")
+    sub.set_defaults(command=_study_fuzz)
+    sub.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
+    sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
+    sub.add_argument("-o", "--output", type=Path, default=Path("fuzz"), metavar="DIRECTORY",
+                     help="where scenes that fail are written (default fuzz)")
     sub = studies.add_parser("graph", help="lockstep ticks per second, beside a bare rclpy graph")
     sub.set_defaults(command=_study_graph)
     _add_scene(sub)
@@ -218,6 +228,20 @@ def _study_certificate(options: argparse.Namespace) -> int:
     _prepare()
     certificate.run(options.output)
     return 0
+
+
+def _study_hard(options: argparse.Namespace) -> int:
+    from grasp_ros.hard import study
+
+    _prepare()
+    return study.run(options.output, alone=options.alone)
+
+
+def _study_fuzz(options: argparse.Namespace) -> int:
+    from grasp_ros.hard import fuzz
+
+    _prepare()
+    return 1 if fuzz.run(options.seconds, options.seed, options.output) else 0
 
 
 def _study_graph(options: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ Numbers O1, O2, ... in comments and titles of cases count these relations. Deriv
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -95,6 +96,26 @@ def creep(mu: Any, hertz: Any, p: Any, speed: Any) -> Any:
     return way(-1) + way(0)
 
 
+LARGE = 20.0  # p v from which `impact` loses its exit speed
+
+
+def impact_numbers(m1: float, m2: float, hertz: float, p: float, speed: float) -> tuple[float, float]:
+    """Duration in s and restitution of an impact of two free bodies, in doubles, for any p."""
+    loss = p * speed
+    with mp.workdps(20 + (2 * math.ceil(-math.log10(loss)) if 0.0 < loss < 1.0 else 0)):  # what small losses cancel
+        mu = reduced_mass(m1, m2)
+        if p * speed > LARGE:
+            return float(creep(mu, hertz, p, speed)), 1.0 / (p * speed)
+        law = impact(mu, hertz, p, speed)
+        return float(law.duration), float(law.restitution)
+
+
+def first_peak(x: float, mass: float, stiffness: float, damping: float) -> Any:
+    """Where an under-damped arm that is released at rest at x first turns."""
+    s = mpf(damping) / (2 * mpf(mass))
+    return -mpf(x) * mp.exp(-s * mp.pi / mp.sqrt(mpf(stiffness) / mpf(mass) - s * s))
+
+
 def flight(body: Sequence[Any], x: Any, v: Any, t: Any) -> tuple[Any, Any]:
     """Position and velocity after t, by the matrix exponential of (x, v, 1); body is (m, k, c, f)."""
     m, k, c, f = (mpf(value) for value in body)
@@ -117,7 +138,7 @@ def holding_force(stiffness: Sequence[Any], hertz: Sequence[Any], overlap: Any) 
 class Ledger(NamedTuple):
     """Momentum and energy balance at the ends of the segments between events; all should vanish."""
 
-    momentum: Array  # relative to the largest momentum of an arm
+    momentum: Array  # relative to the largest of m, C, K times the largest speed, position and its integral
     energy: Array  # relative to V_c(0)
 
 
@@ -165,12 +186,15 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
     momentum: Array = np.zeros(len(at_edges))
     force: Array = np.zeros(inside.shape[:2])
     scale = 0.0
+    places, speeds = ([COLUMN[body] + part for body in system.present] for part in (0, 1))
+    farthest, fastest = float(np.abs(at_edges[:, places]).max()), float(np.abs(at_edges[:, speeds]).max())
     for body in system.present:
         place = at_edges[:, COLUMN[body]], at_edges[:, COLUMN[body] + 1]
         momentum = momentum + bodies[body, MASS] * place[1] + bodies[body, DAMPING] * place[0]
         force = force + bodies[body, STIFFNESS] * inside[..., COLUMN[body]] - bodies[body, FORCE]
-        scale = max(scale, float(np.abs(bodies[body, MASS] * place[1]).max()))
-    P = momentum + integral(force)
+        scale = max(scale, bodies[body, MASS] * fastest, bodies[body, DAMPING] * farthest)
+    pushed = integral(force)
+    P, scale = momentum + pushed, max(scale, float(np.abs(pushed).max()))
     V_c = energy(system, at_edges).V_c
     E = V_c + 2.0 * integral(_dissipation(system, inside))
     return Ledger((P - P[0]) / scale, (E - E[0]) / V_c[0])

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
-from mpmath import mpf
 
 from grasp_ros.hard.case import Case, Solver
 from grasp_ros.hard.scenes import AWAY, FREE, STANDARD, grasp
@@ -22,7 +21,7 @@ def _alone(arm: Arm, solver: Solver) -> float:
     """An arm that meets nobody, beside the exact flight."""
     scene = grasp([-0.3, 0.7, AWAY, 0.0, 2.0 * AWAY, 0.0], TIMES[-1], left=arm, right=FREE)
     states = solver.states(scene, TIMES)
-    body = arm.mass, mpf(arm.stiffness) + mpf(arm.position_gain), mpf(arm.damping) + mpf(arm.velocity_gain), 0
+    body = arm.mass, arm.stiffness + arm.position_gain, arm.damping + arm.velocity_gain, 0.0
     worst = 0.0
     for time, state in zip(TIMES, states, strict=True):
         x, v = (float(value) for value in flight(body, -0.3, 0.7, time))

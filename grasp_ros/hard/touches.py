@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
-from mpmath import mp, mpf
 
 from grasp_ros.hard.case import Case, Product, Solver
 from grasp_ros.hard.scenes import AWAY, FREE, STANDARD, distance, grasp, library, part, reference
-from grasp_ros.oracles import first_touch_from_rest
+from grasp_ros.oracles import first_peak, first_touch_from_rest
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.model import Arm, Contact
 
@@ -24,7 +23,7 @@ def _first_touch(name: str, damping: float, solver: Solver) -> float:
     times = [event.time for event in solver.events(library(name, 0.5)) if event.kind is Event.TOUCH]
     if len(times) < 2:
         return np.inf
-    expected = float(first_touch_from_rest(1, 15, mpf(damping)))
+    expected = float(first_touch_from_rest(1, 15, damping))
     return max(abs(time / expected - 1.0) for time in times[:2])
 
 
@@ -42,17 +41,10 @@ def _symmetric(arm: Arm, p: float, solver: Solver) -> float:
     return float(max(np.abs(states[:, 2:4]).max(), np.abs(states[:, 0:2] + states[:, 4:6]).max()))
 
 
-@lru_cache(maxsize=1)
-def peak_of_the_standard_arm() -> mpf:
-    """Where an arm of case 1 turns if nothing is in its way."""
-    damping = mpf(STANDARD.damping + STANDARD.velocity_gain)
-    s = damping / 2
-    return mpf(0.3) * mp.exp(-s * mp.pi / mp.sqrt(mpf(15) - s * s))
-
-
 def _graze(overshoot: float, solver: Solver) -> float:
     """The speed that a grazed object gets; of a near miss the speed itself, which is 0."""
-    face = float(peak_of_the_standard_arm() - mpf(overshoot))
+    peak = first_peak(-0.3, 1.0, 15.0, STANDARD.damping + STANDARD.velocity_gain)
+    face = float(peak - overshoot)
     scene = grasp([-0.3, 0.0, face, 0.0, AWAY, 0.0], 1.0, right=FREE, contact=Contact(1e4, 0.0), mass=1.0)
     found = float(solver.states(scene, [1.0])[0, 3])
     if overshoot <= 0.0:
