@@ -96,7 +96,7 @@ def creep(mu: Any, hertz: Any, p: Any, speed: Any) -> Any:
     return way(-1) + way(0)
 
 
-LARGE = 20.0  # p v from which `impact` loses its exit speed
+LARGE = 20.0  # p v from which `impact` loses the end of the way back
 
 
 def impact_numbers(m1: float, m2: float, hertz: float, p: float, speed: float) -> tuple[float, float]:
@@ -104,8 +104,8 @@ def impact_numbers(m1: float, m2: float, hertz: float, p: float, speed: float) -
     loss = p * speed
     with mp.workdps(20 + (2 * math.ceil(-math.log10(loss)) if 0.0 < loss < 1.0 else 0)):  # what small losses cancel
         mu = reduced_mass(m1, m2)
-        if p * speed > LARGE:
-            return float(creep(mu, hertz, p, speed)), 1.0 / (p * speed)
+        if loss > LARGE:
+            return float(creep(mu, hertz, p, speed)), float(_exit(mpf(loss)) / mpf(loss))
         law = impact(mu, hertz, p, speed)
         return float(law.duration), float(law.restitution)
 

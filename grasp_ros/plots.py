@@ -153,3 +153,27 @@ def draw_jumps(motions: Sequence[Motion], path: Path) -> None:
     panels[1, 0].set_ylabel("1")
     figure.savefig(path, dpi=150)
     plt.close(figure)
+
+
+def draw_hard(rows: Sequence[tuple[str, float, float | None, float | None]], path: Path) -> None:
+    """Draw what hard cases reach: family, what is promised, our figure and that of a peer; None: no result."""
+    figure, axes = plt.subplots(figsize=(11.0, 5.0), layout="constrained")
+    floor = 1e-17  # where an exact 0 is drawn
+    for column, label, color, marker in ((2, "this package", LEFT_COLOR, "o"), (3, "scipy", RIGHT_COLOR, "x")):
+        found = [(place, max(float(row[column] or 0.0), floor)) for place, row in enumerate(rows)
+                 if row[column] is not None]
+        if found:
+            axes.plot(*zip(*found, strict=True), marker, color=color, markersize=4, label=label)
+    axes.plot([max(row[1], floor) for row in rows], "_", color="black", markersize=6, label="promised")
+    families = [row[0] for row in rows]
+    begins = [place for place, family in enumerate(families) if place == 0 or families[place - 1] != family]
+    for place in begins:
+        axes.axvline(place - 0.5, color="black", linewidth=0.5, alpha=0.4)
+    axes.set_xticks(begins, [families[place] for place in begins], rotation=60, ha="left", fontsize="small")
+    axes.set_yscale("log")
+    axes.set_ylim(floor / 3.0, 1e3)
+    axes.set_ylabel("error by the case's oracle")
+    axes.grid(axis="y", alpha=0.3)
+    axes.legend(loc="upper right", ncols=3, fontsize="small")
+    figure.savefig(path, dpi=150)
+    plt.close(figure)

@@ -31,7 +31,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     rows = [
         ("scene", trajectory.scene.title),
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
-        ("status", trajectory.status.value),
+        ("status", trajectory.alarm or trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
         ("touches left, right", f"{touches[0]}, {touches[1]}" + (f"; {clamps} times u' < -1/p" if clamps else "")),
         ("work", ", ".join(f"{trajectory.work[entry]} {entry.name.lower().replace('_', ' ')}" for entry in Work)),

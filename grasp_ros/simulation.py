@@ -12,7 +12,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.effects.base import NANOSECONDS
-from grasp_ros.physics.certificate import Energy, energy
+from grasp_ros.physics.certificate import Energy, energy, ledger
 from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
@@ -45,6 +45,8 @@ class Trajectory:
     work : array of int
         Counters, see `layout.Work`.
     status : Status
+    alarm : str
+        Why the run was cut: energy that no work explains, with time, mode and state; empty if there was none.
     """
 
     scene: Scene
@@ -55,6 +57,7 @@ class Trajectory:
     switches: Array
     work: np.ndarray
     status: Status
+    alarm: str = ""
 
     @property
     def energy(self) -> Energy:
@@ -87,7 +90,7 @@ class Trajectory:
                 release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
                 events=self.switches, work=self.work,
                 work_names=np.array([entry.name.lower() for entry in Work]), status=self.status.name,
-                sampled=self.sampled, scene_name=self.scene.name, scene=self.scene.to_yaml(),
+                sampled=self.sampled, alarm=self.alarm, scene_name=self.scene.name, scene=self.scene.to_yaml(),
             )
 
 
@@ -104,7 +107,7 @@ def load(path: Path) -> Trajectory:
             scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
             return Trajectory(
                 scene, bool(data["sampled"]), data["t"], data["state"], data["command"], data["events"], data["work"],
-                Status[str(data["status"])],
+                Status[str(data["status"])], str(data["alarm"]),
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
         raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
@@ -155,15 +158,16 @@ def simulate(
         raise ValueError("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
         raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+    alarm = ""
     if sampled:
-        states, command = _sampled(scene, integrator, grid, changes, progress)
+        states, command, alarm = _sampled(scene, integrator, grid, changes, progress)
     else:
         states = _continuous(scene, integrator, grid)
         command = scene.system.commands(0, states.T)[:2].T
     states[:, _absent(scene.system)] = np.nan
     return Trajectory(
         scene, sampled, grid[: len(states)], states, command, integrator.switches, integrator.work.copy(),
-        integrator.status,
+        integrator.status, alarm,
     )
 
 
@@ -191,15 +195,17 @@ def _continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:
 
 
 def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress) -> tuple[
-    Array, Array
+    Array, Array, str
 ]:
-    """States (n, 6), and the commands (n, 2) that the controllers gave last."""
+    """States (n, 6), the commands (n, 2) that the controllers gave last, and the alarm that cut them, if any."""
     system = scene.system
     line = DelayLine(system.delay)
     commands = np.empty((scene.ticks + 1, 2))
+    states_of_ticks, held = np.zeros((scene.ticks + 1, 6)), np.zeros((scene.ticks + 1, 3))
+    last = 0
 
     def forces(tick: int) -> Array:
-        nonlocal scene, system
+        nonlocal scene, system, last
         if tick in changes:
             scene = scene.changed(changes[tick])
             system = scene.system
@@ -208,12 +214,32 @@ def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes
         commands[tick] = answers[LEFT], answers[RIGHT]
         if progress is not None and tick % 100 == 0:
             progress(scene.time_of(tick))
-        return line.pass_on(answers) + system.external_at(tick)
+        last, states_of_ticks[tick] = tick, integrator.state
+        held[tick] = line.pass_on(answers) + system.external_at(tick)
+        acting: Array = held[tick]
+        return acting
 
     states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
-    forces(scene.ticks)
+    if integrator.status is Status.DONE:
+        forces(scene.ticks)
+    states, alarm = _cut(scene, grid, states, states_of_ticks[: last + 1], held[:last])
     latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
-    return states, commands[latest]
+    return states, commands[latest], alarm
+
+
+def _cut(scene: Scene, grid: Array, states: Array, ticks: Array, held: Array) -> tuple[Array, str]:
+    """Output states up to the first tick (n, 6) whose energy the held forces (n - 1, 3) do not explain, and why."""
+    system = scene.system
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has a status of its own
+        book = ledger(system, ticks[:-1], ticks[1:], held)
+        found = np.flatnonzero(book.alarm & np.isfinite(book.rounding) & np.isfinite(book.rise))
+    if not len(found):
+        return states, ""
+    first = int(found[0])
+    reason = (f"stopped: the energy rose by {float(book.unexplained[first])!r} J more than the held forces explain,"
+              f" t = {scene.time_of(first + 1)} s, mode {int(energy(system, ticks[first + 1]).mode)},"
+              f" state {ticks[first + 1].tolist()}")
+    return states[: np.searchsorted(grid, scene.time_of(first + 1), side="right")], reason
 
 
 def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],

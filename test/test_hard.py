@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from grasp_ros import scene as scenes
 from grasp_ros.hard.case import Case, Product, judge
 from grasp_ros.hard.registry import cases
-from grasp_ros.physics.integrator import Status
+from grasp_ros.physics.integrator import Integrator, Status
+from grasp_ros.physics.model import Array
+from grasp_ros.simulation import simulate
 
 NOT_YET = {
     "a force of 50 N at 3 Hz": "external forces on the object do not act while a pair is in contact",
@@ -58,3 +62,21 @@ def test_oracles_notice_a_coarse_solver() -> None:
 def test_a_figure_that_is_not_a_number_is_no_success() -> None:
     case = replace(cases()[0], figure=lambda _: float("nan"))
     assert not judge(case, Product()).right(case)
+
+
+def test_sampled_runs_are_cut_where_energy_comes_from_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A controller that pushes harder than its commands say."""
+    scene = scenes.load("case_01").changed({"time.duration_s": 1.0})
+    whole = simulate(scene, sampled=True)
+    hold = Integrator.hold
+
+    def stronger(self: Integrator, forces: Array) -> None:
+        hold(self, forces * (1.5 if np.abs(forces).max() > 2.0 else 1.0))
+
+    monkeypatch.setattr(Integrator, "hold", stronger)
+    cut = simulate(scene, sampled=True)
+    assert "the energy rose by" in cut.alarm
+    assert ", mode " in cut.alarm
+    assert f"t = {cut.t[-1]} s" in cut.alarm
+    assert 0 < len(cut.t) == len(cut.state) == len(cut.command) < len(whole.t)
+    assert whole.alarm == ""

@@ -57,8 +57,8 @@ class Product:
         result = simulate(scene, grid=grid, sampled=sampled, accuracy=self.accuracy,
                           max_events=self.max_events)
         self.runs.append(result)
-        if result.status is not Status.DONE:
-            raise Unfinished(result.status.value)
+        if result.alarm or result.status is not Status.DONE:
+            raise Unfinished(result.alarm or result.status.value)
         return result
 
     def states(self, scene: Scene, times: Iterable[float]) -> Array:

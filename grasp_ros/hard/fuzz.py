@@ -29,7 +29,7 @@ def run(seconds: float, seed: int, directory: Path) -> int:
     sampled = 0
     with tqdm(total=seconds, unit="s", desc="fuzz", file=sys.stderr, bar_format="{l_bar}{bar}| {postfix}") as bar:
         while (passed := time.monotonic() - begin) < seconds:
-            scene = draw_scene(rng.random(NUMBERS))
+            scene = draw_scene(rng.random(NUMBERS).tolist())
             sampled += scene.sampled
             try:
                 found = failures(scene)

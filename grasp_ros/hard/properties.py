@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -226,7 +227,7 @@ def _balances(scene: Scene, run: Trajectory) -> list[Failure]:
         if len(times) * pieces > 10_000:
             return []
         product = Product(MOST_EVENTS)
-        book = balance(scene.system, scene.duration, times, lambda grid, who=product: who.states(scene, grid), pieces)
+        book = balance(scene.system, scene.duration, times, partial(product.states, scene), pieces)
         now = np.array([np.abs(book.momentum).max(), np.abs(book.energy).max()])
         agreed = before is not None and bool((np.abs(now - before) <= 0.1 * np.array(BALANCED)).all())
         if (now <= BALANCED).all() or (pieces == FINEST and agreed):
