@@ -169,7 +169,7 @@ def draw_hard(rows: Sequence[tuple[str, float, float | None, float | None]], pat
     begins = [place for place, family in enumerate(families) if place == 0 or families[place - 1] != family]
     for place in begins:
         axes.axvline(place - 0.5, color="black", linewidth=0.5, alpha=0.4)
-    axes.set_xticks(begins, [families[place] for place in begins], rotation=60, ha="left", fontsize="small")
+    axes.set_xticks(begins, [families[place] for place in begins], rotation=45, ha="right", fontsize="small")
     axes.set_yscale("log")
     axes.set_ylim(floor / 3.0, 1e3)
     axes.set_ylabel("error by the case's oracle")

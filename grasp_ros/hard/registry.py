@@ -10,6 +10,8 @@ from grasp_ros.hard.case import Case
 
 @lru_cache(maxsize=1)
 def cases() -> tuple[Case, ...]:
-    """Every case of every family, in the order of the table."""
-    families = (impacts, touches, switching, flights, horizons, loops, relations)
-    return tuple(case for family in families for case in family.cases())
+    """Every case, family by family."""
+    files = (impacts, touches, switching, flights, horizons, loops, relations)
+    found = [case for file in files for case in file.cases()]
+    families = list(dict.fromkeys(case.family for case in found))
+    return tuple(sorted(found, key=lambda case: families.index(case.family)))
