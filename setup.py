@@ -33,10 +33,10 @@ setup(
     ],
     extras_require={
         "test": [
-            "pytest", "gmpy2", "mpmath", "mcap", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML", "types-tqdm",
-            "colcon-common-extensions",
+            "pytest", "hypothesis", "gmpy2", "mpmath", "mcap", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
+            "types-tqdm", "colcon-common-extensions", "scipy",
         ],
-        "study": ["gmpy2", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],
+        "study": ["gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],
     },
     entry_points={
         "console_scripts": [

@@ -15,7 +15,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.effects.base import NANOSECONDS
 from grasp_ros.methods import equations, registry
 from grasp_ros.methods.registry import EXACT
-from grasp_ros.physics.certificate import Energy, energy
+from grasp_ros.physics.certificate import Energy, energy, ledger
 from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
@@ -51,6 +51,8 @@ class Trajectory:
         A key of `methods.registry.METHODS`.
     setting : float
         Its accuracy, step in s, or tolerance.
+    alarm : str
+        Why the run was cut: energy that no work explains, with time, mode and state; empty if there was none.
     """
 
     scene: Scene
@@ -63,6 +65,7 @@ class Trajectory:
     status: Status
     method: str = EXACT
     setting: float = ACCURACY
+    alarm: str = ""
 
     @property
     def counters(self) -> dict[str, int]:
@@ -112,8 +115,8 @@ class Trajectory:
                 release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
                 events=self.switches, work=self.work,
                 work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
-                method=self.method, setting=self.setting, sampled=self.sampled, scene_name=self.scene.name,
-                scene=self.scene.to_yaml(),
+                method=self.method, setting=self.setting, sampled=self.sampled, alarm=self.alarm,
+                scene_name=self.scene.name, scene=self.scene.to_yaml(),
             )
 
 
@@ -131,7 +134,7 @@ def load(path: Path) -> Trajectory:
             answers = data["command"] if data["sampled"] else None
             return Trajectory(
                 scene, bool(data["sampled"]), data["t"], data["state"], answers, data["events"], data["work"],
-                Status[str(data["status"])], str(data["method"]), float(data["setting"]),
+                Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["alarm"]),
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
         raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
@@ -197,15 +200,16 @@ def simulate(
             setting,
         )
     integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events)
+    alarm = ""
     if sampled:
-        states, answers = _sampled(scene, integrator, grid, changes, progress)
+        states, answers, alarm = _sampled(scene, integrator, grid, changes, progress)
     else:
         states, answers = _continuous(scene, integrator, grid), None
     for body in scene.system.absent:
         states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return Trajectory(
         scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
-        integrator.status, EXACT, setting,
+        integrator.status, EXACT, setting, alarm,
     )
 
 
@@ -244,28 +248,51 @@ def _continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:
 
 
 def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress) -> tuple[
-    Array, Array
+    Array, Array, str
 ]:
-    """States (n, 6), and the commands (n, 2) that the controllers gave last."""
+    """States (n, 6), the commands (n, 2) that the controllers gave last, and the alarm that cut them, if any."""
     system = scene.system
     line = DelayLine(system.delay)
     commands = np.empty((scene.ticks + 1, 2))
+    states_of_ticks, held = np.zeros((scene.ticks + 1, 6)), np.zeros((scene.ticks + 1, 3))
+    last = 0
 
     def forces(tick: int) -> Array:
-        nonlocal scene, system
+        nonlocal scene, system, last
         if tick in changes:
             scene = scene.changed(changes[tick])
             system = scene.system
-        answers = system.commands(tick, integrator.state)
+        with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
+            answers = system.commands(tick, integrator.state)
         commands[tick] = answers[LEFT], answers[RIGHT]
         if progress is not None and tick % 100 == 0:
             progress(scene.time_of(tick))
-        return line.pass_on(answers) + system.external_at(tick)
+        last, states_of_ticks[tick] = tick, integrator.state
+        held[tick] = line.pass_on(answers) + system.external_at(tick)
+        acting: Array = held[tick]
+        return acting
 
     states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
-    forces(scene.ticks)
+    if integrator.status is Status.DONE:
+        forces(scene.ticks)
+    states, alarm = _cut(scene, grid, states, states_of_ticks[: last + 1], held[:last])
     latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
-    return states, commands[latest]
+    return states, commands[latest], alarm
+
+
+def _cut(scene: Scene, grid: Array, states: Array, ticks: Array, held: Array) -> tuple[Array, str]:
+    """Output states up to the first tick (n, 6) whose energy the held forces (n - 1, 3) do not explain, and why."""
+    system = scene.system
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has a status of its own
+        book = ledger(system, ticks[:-1], ticks[1:], held)
+        found = np.flatnonzero(book.alarm & np.isfinite(book.rounding) & np.isfinite(book.rise))
+    if not len(found):
+        return states, ""
+    first = int(found[0])
+    reason = (f"stopped: the energy rose by {float(book.unexplained[first])!r} J more than the held forces explain,"
+              f" t = {scene.time_of(first + 1)} s, mode {int(energy(system, ticks[first + 1]).mode)},"
+              f" state {ticks[first + 1].tolist()}")
+    return states[: np.searchsorted(grid, scene.time_of(first + 1), side="right")], reason
 
 
 def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],

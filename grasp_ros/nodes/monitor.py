@@ -16,7 +16,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.bag import Recorder
 from grasp_ros.effects.base import NANOSECONDS
 from grasp_ros.nodes import messages
-from grasp_ros.nodes.node import PATIENCE_SECONDS, GraspNode, run
+from grasp_ros.nodes.node import GraspNode, run
 from grasp_ros.physics.certificate import energy, ledger
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -116,7 +116,7 @@ class Monitor(GraspNode):
         self._recorder.write_lyapunov(time_ns, values)
         self._values.publish(messages.lyapunov(time_ns, values))
         self.count("ticks")
-        self.finished = time_ns == self._scene.ticks * self._scene.period_ns
+        self.finished = bool(self.exit_code) or time_ns == self._scene.ticks * self._scene.period_ns
 
     def _evaluate(self, time_ns: int, message: JointState) -> list[float]:
         """What `lyapunov` publishes, see `topics.LYAPUNOV_NAMES`."""
@@ -127,15 +127,17 @@ class Monitor(GraspNode):
         unexplained, alarm = 0.0, False
         if self._before is not None and self._before[0] + self._scene.period_ns == time_ns:
             balance = ledger(system, self._before[1], state, inputs + self._before[2])
-            unexplained, alarm = balance.unexplained, balance.alarm
+            unexplained, alarm = float(balance.unexplained), bool(balance.alarm)
         self._before = time_ns, state, external
         level = energy(system, state, external)
         if alarm:
             self.count("alarms")
-            self.get_logger().error(
+            self.exit_code = 1  # `grasp run` and the plant that waits for this monitor end; the bag keeps this tick
+            self.state = (
                 f"V_c rose by {unexplained!r} J more than the held forces can explain, t = {time_ns / NANOSECONDS} s,"
-                f" mode {int(level.mode)}, state {state.tolist()}", throttle_duration_sec=PATIENCE_SECONDS,
+                f" mode {int(level.mode)}, state {state.tolist()}"
             )
+            self.get_logger().fatal(self.state)
         return [*(float(value) for value in level), unexplained, float(alarm)]
 
     def close(self) -> None:

@@ -65,41 +65,44 @@ def energy(system: System, state: Array, external: Array | None = None) -> Energ
 class Ledger(NamedTuple):
     """What became of the energy over one control period, in J of V."""
 
-    rise: float  # of twice the energy of the plant by itself
-    work: float  # twice the work of the forces that were held
-    rounding: float  # what rounding may add
+    rise: Array  # of twice the energy of the plant by itself
+    work: Array  # twice the work of the forces that were held
+    rounding: Array  # what rounding may add
 
     @property
-    def unexplained(self) -> float:
+    def unexplained(self) -> Array:
         """Rise that no work explains; dissipation makes it negative."""
         return self.rise - self.work
 
     @property
-    def alarm(self) -> bool:
+    def alarm(self) -> NDArray[np.bool_]:
         """Whether energy came from nowhere; also if it is not a number."""
-        return not self.unexplained <= self.rounding
+        return np.logical_not(self.unexplained <= self.rounding)
 
 
 def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger:
-    """Balance of the energy between two states (6,) under held forces (3,) in N, by body.
+    """Balance of the energy between states (..., 6) under held forces (..., 3) in N, by body.
 
     Along any motion E(after) - E(before) = sum f (x_after - x_before) - dissipation, with E from the plant's own k,
     its constant forces and the contacts. It holds for any delay, saturation or jitter of the commands, because the
     work of a held force needs no more than both ends.
     """
     levels = []
-    rounding = 0.0
+    rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):
         level = _own_energy(system, state)
         for side, u, _ in _pairs(system, state):
-            force = float(hertz_force(Contact(*system.pairs[side]), u))
-            level += 0.8 * force * float(u)
-            rounding += 8.0 * EPS * force * (abs(state[COLUMN[side]]) + abs(state[COLUMN[OBJECT]]))
+            force = hertz_force(Contact(*system.pairs[side]), u)
+            level = level + 0.8 * force * u
+            rounding = rounding + 8.0 * EPS * force * (
+                np.abs(state[..., COLUMN[side]]) + np.abs(state[..., COLUMN[OBJECT]])
+            )
         levels.append(level)
-        rounding += ROUNDING * _size(system, state)
-    moved = {body: float(after[COLUMN[body]] - before[COLUMN[body]]) for body in system.present}
-    work = sum(2.0 * float(forces[body]) * distance for body, distance in moved.items())
-    rounding += sum(8.0 * EPS * abs(float(forces[body])) * abs(float(after[COLUMN[body]])) for body in moved)
+        rounding = rounding + ROUNDING * _size(system, state)
+    work: Array = np.zeros(np.shape(before)[:-1])
+    for body in system.present:
+        work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
+        rounding = rounding + 8.0 * EPS * np.abs(forces[..., body] * after[..., COLUMN[body]])
     return Ledger(levels[1] - levels[0], work, rounding)
 
 
@@ -118,23 +121,23 @@ def _mechanical(system: System, bodies: Array, state: Array) -> Array:
     return kinetic + potential
 
 
-def _own_energy(system: System, state: Array) -> float:
+def _own_energy(system: System, state: Array) -> Array:
     """Twice the energy of the bodies by themselves; k x^2 - 2 f x, because (f / k)^2 may be large beside it."""
-    total = 0.0
+    total: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
-        x, v = float(state[COLUMN[body]]), float(state[COLUMN[body] + 1])
-        mass, stiffness, _, force = system.bodies[body].tolist()
-        total += mass * v * v + stiffness * x * x - 2.0 * force * x
+        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
+        mass, stiffness, _, force = system.bodies[body]
+        total = total + mass * v * v + stiffness * x * x - 2.0 * force * x
     return total
 
 
-def _size(system: System, state: Array) -> float:
+def _size(system: System, state: Array) -> Array:
     """Sum of the sizes of the terms of `_own_energy`."""
-    total = 0.0
+    total: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
-        x, v = float(state[COLUMN[body]]), float(state[COLUMN[body] + 1])
-        mass, stiffness, _, force = system.bodies[body].tolist()
-        total += mass * v * v + stiffness * x * x + 2.0 * abs(force * x)
+        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
+        mass, stiffness, _, force = system.bodies[body]
+        total = total + mass * v * v + stiffness * x * x + 2.0 * np.abs(force * x)
     return total
 
 

@@ -50,6 +50,16 @@ def add_to(
     sub = add("effects", _effects, "what each effect costs: time and size of the bag")
     add_scene(sub)
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
+    sub = add("certificate", _certificate, "where the paper's V jumps, from which p on, and limits of the period")
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put tables and figure into this text")
+    sub = add("hard", _hard, "hard cases: what decides, the figure reached, and other solvers beside it")
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
+    sub.add_argument("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten")
+    sub = add("fuzz", _fuzz, "random scenes against all properties")
+    sub.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
+    sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
+    sub.add_argument("-o", "--output", type=Path, default=Path("fuzz"), metavar="DIRECTORY",
+                     help="where scenes that fail are written (default fuzz)")
     sub = add("graph", _graph, "lockstep ticks per second, beside a bare rclpy graph")
     add_scene(sub)
 
@@ -164,6 +174,28 @@ def _effects(options: argparse.Namespace) -> int:
     options.prepare()
     effects.run(scenes.load(options.scene, options.settings), options.output)
     return 0
+
+
+def _certificate(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import certificate
+
+    options.prepare()
+    certificate.run(options.output)
+    return 0
+
+
+def _hard(options: argparse.Namespace) -> int:
+    from grasp_ros.hard import study
+
+    options.prepare()
+    return study.run(options.output, alone=options.alone)
+
+
+def _fuzz(options: argparse.Namespace) -> int:
+    from grasp_ros.hard import fuzz
+
+    options.prepare()
+    return 1 if fuzz.run(options.seconds, options.seed, options.output) else 0
 
 
 def _graph(options: argparse.Namespace) -> int:

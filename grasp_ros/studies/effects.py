@@ -25,6 +25,7 @@ from grasp_ros.graph import Graph
 from grasp_ros.physics.layout import Event
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
+from grasp_ros.studies.document import put
 from grasp_ros.versions import versions
 
 BARE = "bare"
@@ -61,8 +62,8 @@ def run(scene: Scene, document: Path | None) -> None:
     """
     text = None if document is None else document.read_text(encoding="utf-8")
     if text is not None:
-        text = _put(text, REGISTRY, registry_table())
-        _put(text, COSTS, "")  # refuses a text without marks before the work begins
+        text = put(text, REGISTRY, registry_table())
+        put(text, COSTS, "")  # refuses a text without marks before the work begins
     costs = measure(variants(scene), REPEATS, SAMPLED_REPEATS)
     table = _cost_table(scene, costs)
     print(table)
@@ -70,7 +71,7 @@ def run(scene: Scene, document: Path | None) -> None:
         figure = document.with_suffix(".png")
         plots.draw_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
         block = f"{table}\n\n![costs of the effects]({figure.name})"
-        document.write_text(_put(text, COSTS, block), encoding="utf-8")
+        document.write_text(put(text, COSTS, block), encoding="utf-8")
 
 
 def registry_table() -> str:
@@ -80,15 +81,6 @@ def registry_table() -> str:
         if not effect.section.startswith(("right_", "object_pulse", "object_sine", "object_table")):
             rows.append(f"| `{effect.section}` | {effect.text} | {effect.certificate} |")
     return "\n".join(rows)
-
-
-def _put(text: str, part: str, block: str) -> str:
-    """The text with a marked part replaced."""
-    begin, end = f"<!-- begin of {part} -->", f"<!-- end of {part} -->"
-    if not (begin in text and end in text.split(begin)[1]):
-        raise ValueError(f"the document has no marks; allowed: a text with {begin} and {end}")
-    before, rest = text.split(begin)
-    return f"{before}{begin}\n\n{block}\n\n{end}{rest.split(end)[1]}"
 
 
 def variants(scene: Scene) -> dict[str, Scene]:

@@ -1,0 +1,236 @@
+"""What must hold for every scene there is, and how to draw one from the whole space of parameters.
+
+A scene is drawn from numbers in [0, 1), so that a property test and a fuzzing run draw from the same space.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from grasp_ros.hard.case import Product
+from grasp_ros.hard.loops import unexplained
+from grasp_ros.hard.relations import mirrored, scaled, started
+from grasp_ros.hard.scenes import composed, horizon
+from grasp_ros.oracles import balance
+from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.physics.model import Array, Contact, impact_force, penetration
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory
+
+NUMBERS = 48  # of a draw
+POINTS = 201
+MOST_EVENTS = 2000
+RISE = 1e-12  # of the largest V_c so far: what rounding may add
+BALANCED = 1e-12, 1e-10  # momentum and energy at the default accuracy
+MOST_RELAXATIONS = 1e5  # p H u^(3/2) t / m: a squeezed contact relaxes that often, and each time takes a few steps
+FINEST = 128  # pieces between two events
+SPLIT = 1e-13  # per switch
+WORK_STEPS = 20_000  # contact steps beyond which the slow properties are left out
+
+
+class Failure(NamedTuple):
+    """A property that does not hold."""
+
+    name: str
+    figure: float
+    bound: float
+
+
+class Draw:
+    """Numbers in [0, 1) on their way into a scene."""
+
+    def __init__(self, numbers: Sequence[float]) -> None:
+        self._numbers = iter(numbers)
+
+    def between(self, low: float, high: float) -> float:
+        """A number in [low, high]."""
+        return low + (high - low) * next(self._numbers)
+
+    def decades(self, low: float, high: float, zero: float = 0.0) -> float:
+        """10 to a power in [low, high], or 0 for the part `zero` of all draws."""
+        number = next(self._numbers)
+        return 0.0 if number < zero else float(10.0 ** (low + (high - low) * (number - zero) / (1.0 - zero)))
+
+    def chance(self, part: float) -> bool:
+        """True for the part of all draws."""
+        return next(self._numbers) < part
+
+
+def draw_scene(numbers: Sequence[float]) -> Scene:
+    """A scene of the paper's kind with numbers over ten decades, with or without the loop and its effects.
+
+    Left out is what would take hours: contacts that are squeezed for longer than MOST_RELAXATIONS of their times.
+
+    Parameters
+    ----------
+    numbers : sequence of NUMBERS floats in [0, 1)
+    """
+    draw = Draw(numbers)
+    size, speed = draw.decades(-3.0, 1.0), draw.decades(-3.0, 2.0)
+    sections: dict[str, dict[str, Any]] = {}
+    slowest = 0.0
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        mass = draw.decades(-5.0, 5.0)
+        stiffness, gain = (mass * draw.decades(-4.0, 6.0, zero=0.15) for _ in range(2))
+        damping, velocity = (mass * draw.decades(-6.0, 4.0, zero=0.2) for _ in range(2))
+        place = 0.0 if draw.chance(0.1) else sign * size * draw.between(-0.02, 1.0)
+        sections[f"{side}_arm"] = {
+            "mass_kg": mass, "stiffness_N_per_m": stiffness, "damping_Ns_per_m": damping, "position_m": place,
+            "velocity_m_per_s": speed * draw.between(-1.0, 1.0),
+        }
+        sections[f"{side}_feedback"] = {"position_gain_N_per_m": gain, "velocity_gain_Ns_per_m": velocity}
+        sections[f"{side}_contact"] = {
+            "hertz_N_per_m1_5": draw.decades(0.0, 10.0), "dissipation_s_per_m": draw.decades(-4.0, 6.0, zero=0.2),
+        }
+        slowest = max(slowest, math.sqrt((stiffness + gain) / mass))
+    sections["object"] = {
+        "mass_kg": draw.decades(-5.0, 5.0), "position_m": 0.0, "velocity_m_per_s": speed * draw.between(-1.0, 1.0),
+    }
+    seconds = draw.decades(0.0, 1.3) * (1.0 / slowest if slowest > 0.0 else size / speed)
+    sections["time"] = horizon(min(max(seconds, 1e-6), 1e4))
+    lightest = min(sections[body]["mass_kg"] for body in ("left_arm", "object", "right_arm"))
+    for side in ("left", "right"):
+        contact = sections[f"{side}_contact"]
+        steps = contact["hertz_N_per_m1_5"] * size**1.5 * sections["time"]["duration_s"] / lightest
+        contact["dissipation_s_per_m"] = min(contact["dissipation_s_per_m"], MOST_RELAXATIONS / steps)
+    if draw.chance(0.3):
+        _add_loop(draw, sections, seconds)
+    return composed("drawn", sections)
+
+
+def _add_loop(draw: Draw, sections: dict[str, dict[str, Any]], seconds: float) -> None:
+    """Sampling with some of its effects, and gains for which the loop is stable or grows slowly."""
+    period = max(math.ceil(min(seconds, 1e3) / 200.0 * draw.decades(-0.5, 0.7) * 1e9), 1)
+    ticks = max(min(round(min(seconds, 1e3) * 1e9 / period), 300), 1)
+    sections["time"] = {"duration_s": period * ticks / 1e9, "control_period_s": period / 1e9}
+    sections["loop"] = {"delay_ticks": int(draw.between(0.0, 4.0))}
+    for side in ("left", "right"):
+        mass = sections[f"{side}_arm"]["mass_kg"]
+        rate = min(1e9 / period, math.sqrt(1e12 / mass))
+        sections[f"{side}_feedback"] = {
+            "position_gain_N_per_m": mass * rate**2 * draw.decades(-6.0, -1.5, zero=0.1),
+            "velocity_gain_Ns_per_m": mass * rate * draw.decades(-5.0, -1.0, zero=0.1),
+        }
+        if draw.chance(0.3):
+            sections[f"{side}_actuator"] = {"limit_N": draw.decades(-3.0, 3.0)}
+        if draw.chance(0.3):
+            sections[f"{side}_sensor"] = {"noise_seed": 1, "position_noise_m": draw.decades(-6.0, -2.0),
+                                          "velocity_step_m_per_s": draw.decades(-6.0, -2.0)}
+
+
+def failures(scene: Scene) -> list[Failure]:
+    """All properties that a scene violates.
+
+    Raises
+    ------
+    Unfinished
+        If the run ends with another status than DONE: that is an answer, not a failure.
+    """
+    product = Product(MOST_EVENTS)
+    if scene.sampled:
+        run = product.run(scene, sampled=True)
+        found = [*_states(run), Failure("work", unexplained(run), 1.0)]
+        return [failure for failure in found if not failure.figure <= failure.bound]
+    run = product.run(scene, np.linspace(0.0, scene.duration, POINTS))
+    found = [*_states(run), *_continuous(run)]
+    if run.work[Work.CONTACT_STEPS] < WORK_STEPS:
+        found += [*_relations(scene, run), *_balances(scene, run)]
+    return [failure for failure in found if not failure.figure <= failure.bound]
+
+
+def _states(run: Trajectory) -> list[Failure]:
+    """Finite, all there, forces never negative, events in order and alternating."""
+    u_l, d_l, u_r, d_r = penetration(run.state)
+    forces = [impact_force(Contact(*run.scene.system.pairs[side]), u, d)
+              for side, u, d in ((LEFT, u_l, d_l), (RIGHT, u_r, d_r))]
+    broken = 0
+    for side in (LEFT, RIGHT):
+        kinds = [event.kind for event in run.events if event.side == side]
+        broken += sum(not _may_follow(before, after) for before, after in pairwise(kinds))
+    times = run.switches[:, 0]
+    return [
+        Failure("finite", float(np.count_nonzero(~np.isfinite(run.state))), 0.0),
+        Failure("impact force", float(max(-force.min() for force in forces)), 0.0),
+        Failure("order of events", float(np.count_nonzero(np.diff(times) < 0.0) + broken), 0.0),
+    ]
+
+
+def _may_follow(before: Event, after: Event) -> bool:
+    """Whether one pair can switch like this."""
+    allowed = {
+        Event.TOUCH: (Event.RELEASE, Event.CLAMP), Event.REENTRY: (Event.RELEASE, Event.CLAMP),
+        Event.CLAMP: (Event.REENTRY, Event.RELEASE), Event.RELEASE: (Event.TOUCH,),
+    }
+    return after in allowed[before]
+
+
+def _continuous(run: Trajectory) -> list[Failure]:
+    """V_c never rises; V only at re-entries."""
+    V_c = run.energy.V_c
+    size = np.maximum.accumulate(V_c)[:-1]
+    rise = np.diff(V_c) / np.where(size > 0.0, size, 1.0)
+    return [Failure("V_c", float(rise.max()), RISE)]
+
+
+def sensitivity(scene: Scene, run: Trajectory) -> float:
+    """How much a change of the start by 1e-10 of its size has become at the end, at least 1."""
+    state = scene.initial_state
+    size = _sizes(run.state)
+    product = Product(MOST_EVENTS)
+    worst = 1.0
+    for sign in (1.0, -1.0):
+        moved = started(scene, state + sign * 1e-10 * size * np.array([1.0, -0.7, 0.4, 0.9, -1.0, 0.6]))
+        end = product.states(moved, [scene.duration])[0]
+        worst = max(worst, float((np.abs(end - run.state[-1]) / size).max() / 1e-10))
+    return worst
+
+
+def _sizes(states: Array) -> Array:
+    """Scale of each column: the largest position and the largest speed."""
+    place, speed = np.abs(states[:, ::2]).max(), np.abs(states[:, 1::2]).max()
+    return np.array([place or 1.0, speed or 1.0] * 3)
+
+
+def _relations(scene: Scene, run: Trajectory) -> list[Failure]:
+    """Mirror and units bit for bit; many horizons like one, as far as the scene forgets no more than that."""
+    product = Product(MOST_EVENTS)
+    end = [scene.duration]
+    last = run.state[-1]
+    image = product.states(mirrored(scene), end)[0]
+    units = product.states(scaled(scene, 4.0, 2.0, 0.5), [2.0 * scene.duration])[0]
+    found = [
+        Failure("mirror", float(np.abs(last + image[[4, 5, 2, 3, 0, 1]]).max()), 0.0),
+        Failure("units", float(np.abs(last * np.array([4.0, 2.0] * 3) - units).max()), 0.0),
+    ]
+    half = round(scene.duration / 2.0, 9)
+    if 1e-8 < half < 500.0:
+        first, rest = (scene.changed({"time.duration_s": part, "time.control_period_s": part})
+                       for part in (half, round(scene.duration - half, 9)))
+        middle = product.states(first, [half])[0]
+        again = product.states(started(rest, middle), [rest.duration])[0]
+        figure = float((np.abs(again - last) / _sizes(run.state)).max())
+        found.append(Failure("splitting", figure, SPLIT * (1 + len(run.switches)) * sensitivity(scene, run)))
+    return found
+
+
+def _balances(scene: Scene, run: Trajectory) -> list[Failure]:
+    """Momentum and energy, where the quadrature between the events converges: that of fast swings does not."""
+    times = run.switches[:, 0].tolist()
+    before: Array | None = None
+    for pieces in (8, 32, FINEST):
+        if len(times) * pieces > 10_000:
+            return []
+        product = Product(MOST_EVENTS)
+        book = balance(scene.system, scene.duration, times, partial(product.states, scene), pieces)
+        now = np.array([np.abs(book.momentum).max(), np.abs(book.energy).max()])
+        agreed = before is not None and bool((np.abs(now - before) <= 0.1 * np.array(BALANCED)).all())
+        if (now <= BALANCED).all() or (pieces == FINEST and agreed):
+            return [Failure("momentum", float(now[0]), BALANCED[0]), Failure("energy", float(now[1]), BALANCED[1])]
+        before = now
+    return []

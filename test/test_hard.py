@@ -1,0 +1,73 @@
+"""Every hard case within its bound, or with the status that it announces; the study shows the same figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from grasp_ros import scene as scenes
+from grasp_ros.hard.case import Case, Product, judge
+from grasp_ros.hard.registry import cases
+from grasp_ros.physics.integrator import Integrator, Status
+from grasp_ros.physics.model import Array
+from grasp_ros.simulation import simulate
+
+PARAMETERS = [pytest.param(case, id=f"{case.family}: {case.name}") for case in cases()]
+
+
+def test_names_are_unique_and_families_are_many() -> None:
+    names = [(case.family, case.name) for case in cases()]
+    assert len(names) == len(set(names)) >= 60
+    assert {family for family, _ in names} >= {
+        "impact", "touch", "graze", "clamp", "start", "extreme", "flight", "horizon", "tail", "balance", "loop",
+        "relation",
+    }
+
+
+@pytest.mark.parametrize("case", PARAMETERS)
+def test_hard_case(case: Case) -> None:
+    outcome = judge(case, Product(case.max_events))
+    assert outcome.right(case), outcome
+
+
+@pytest.mark.parametrize("status", [Status.EVENT_BUDGET, Status.NOT_FINITE])
+def test_announced_ends_do_come(status: Status) -> None:
+    """A limit that is never met would let a case pass for nothing."""
+    case = next(case for case in cases() if case.limit is status)
+    product = Product(case.max_events)
+    assert judge(case, product).status == status.value
+    assert len(product.runs[-1].t) < len(product.runs[-1].scene.system.state) * 10**6
+    assert len(product.runs[-1].state) == len(product.runs[-1].t)
+
+
+def test_oracles_notice_a_coarse_solver() -> None:
+    """With an accuracy of 1e-3 nearly all the cases with contacts fail."""
+    families = ("touch", "clamp", "start", "extreme")
+    found = [case for case in cases() if case.family in families and case.bound > 0.0][::4]
+    failed = [case for case in found if not judge(case, Product(accuracy=1e-3)).right(case)]
+    assert len(failed) > 0.7 * len(found)
+
+
+def test_a_figure_that_is_not_a_number_is_no_success() -> None:
+    case = replace(cases()[0], figure=lambda _: float("nan"))
+    assert not judge(case, Product()).right(case)
+
+
+def test_sampled_runs_are_cut_where_energy_comes_from_nowhere(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A controller that pushes harder than its commands say."""
+    scene = scenes.load("case_01").changed({"time.duration_s": 1.0})
+    whole = simulate(scene, sampled=True)
+    hold = Integrator.hold
+
+    def stronger(self: Integrator, forces: Array) -> None:
+        hold(self, forces * (1.5 if np.abs(forces).max() > 2.0 else 1.0))
+
+    monkeypatch.setattr(Integrator, "hold", stronger)
+    cut = simulate(scene, sampled=True)
+    assert "the energy rose by" in cut.alarm
+    assert ", mode " in cut.alarm
+    assert f"t = {cut.t[-1]} s" in cut.alarm
+    assert 0 < len(cut.t) == len(cut.state) == len(cut.command) < len(whole.t)
+    assert whole.alarm == ""

@@ -1,0 +1,81 @@
+"""Properties of all scenes, searched by hypothesis with a fixed seed; `grasp study fuzz` searches for longer."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from functools import partial
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from grasp_ros.hard import properties
+from grasp_ros.hard.case import Product, Unfinished
+from grasp_ros.hard.impacts import impact_error
+from grasp_ros.hard.properties import NUMBERS, Failure, draw_scene, failures
+from grasp_ros.hard.relations import reversal
+from grasp_ros.hard.scenes import ELASTIC, distance, grasp, reference
+from grasp_ros.physics.model import Arm, Contact
+
+FIXED = settings(
+    derandomize=True, database=None, deadline=None, max_examples=100, phases=(Phase.explicit, Phase.generate),
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
+)
+PART = st.floats(0.0, 1.0, exclude_max=True)
+NUMBERS_OF_A_SCENE = st.lists(PART, min_size=NUMBERS, max_size=NUMBERS)
+
+
+@FIXED
+@given(NUMBERS_OF_A_SCENE)
+def test_every_scene_keeps_all_properties_or_ends_with_a_status(numbers: list[float]) -> None:
+    with suppress(Unfinished):
+        assert failures(draw_scene(numbers)) == []
+
+
+def test_random_scenes_cover_what_they_should() -> None:
+    rng = np.random.default_rng(0)
+    drawn = [draw_scene(rng.random(NUMBERS)) for _ in range(300)]
+    assert 50 < sum(scene.sampled for scene in drawn) < 150
+    masses = [scene.values["object"]["mass_kg"] for scene in drawn]
+    assert max(masses) / min(masses) > 1e9
+    stiffness = [scene.values["left_contact"]["hertz_N_per_m1_5"] for scene in drawn]
+    assert max(stiffness) / min(stiffness) > 1e9
+    assert {"left_actuator", "left_sensor", "loop"} <= {section for scene in drawn for section in scene.values}
+
+
+def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scenes of the same kind at the coarsest accuracy."""
+    rng = np.random.default_rng(1)
+    monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
+    found: list[Failure] = []
+    for _ in range(60):
+        try:
+            found += failures(draw_scene(rng.random(NUMBERS)))
+        except Unfinished:
+            continue
+    assert {failure.name for failure in found} >= {"energy"}
+
+
+@settings(FIXED, max_examples=40)
+@given(st.floats(0.0, 12.0), st.floats(-6.0, 3.0), st.just(0.0) | st.floats(1e-3, 100.0), st.floats(-3.0, 3.0))
+def test_isolated_impacts_of_any_kind(hertz: float, speed: float, loss: float, mass: float) -> None:
+    """Restitution and duration to 1e-11 over H = 1 to 1e12, v = 1e-6 to 1e3 m/s, p v = 0 to 100."""
+    assert impact_error(1.0, 10.0**mass, 10.0**hertz, (loss,), 10.0**speed, Product()) <= 1e-11
+
+
+@settings(FIXED, max_examples=25)
+@given(st.floats(2.0, 8.0), st.floats(-2.0, 1.3), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5), st.floats(0.0, 6.0))
+def test_agreement_with_an_independent_method(hertz: float, p: float, mass: float, v: float, damping: float) -> None:
+    scene = grasp([-0.3, v, 0.0, 0.0, 0.4, 0.0], 1.0, left=Arm(1.0, 10.0, 0.2, 20.0, damping),
+                  contact=Contact(10.0**hertz, 10.0**p), mass=10.0**mass)
+    times = [0.0, 0.5, scene.duration]
+    assert distance(Product().states(scene, times), reference(scene, times)) < 1e-10
+
+
+@settings(FIXED, max_examples=60)
+@given(st.floats(0.0, 8.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+def test_elastic_motion_runs_backwards(hertz: float, mass: float, v_l: float, v_o: float) -> None:
+    scene = grasp([-0.3, v_l, 0.05, v_o, 0.3, 0.2], 1.0, left=ELASTIC, contact=Contact(10.0**hertz, 0.0),
+                  mass=10.0**mass)
+    assert reversal(scene, Product()) < 1e-9
