@@ -144,7 +144,8 @@ def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: flo
     """End the hold of a pair, unless it is still so shallow that its force is below rounding."""
     w, _ = scales(bodies, pairs, y, mode, side)
     d, _ = relative_motion(bodies, y, side)
-    if d <= 0.0 or y[U_L + side] > 1e-3 * sliver(tolerance) * w * w:
+    u = y[U_L + side]
+    if d <= 0.0 or u < 0.0 or u > 1e-3 * sliver(tolerance) * w * w:
         mode[side] = judge(bodies, pairs, y, side, mode[1 - side] == CONTACT)
 
 
