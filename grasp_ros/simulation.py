@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from zipfile import BadZipFile
 
 import numpy as np
 
+from grasp_ros import pieces
 from grasp_ros import scene as scenes
-from grasp_ros.effects.base import NANOSECONDS
 from grasp_ros.methods import equations, registry
 from grasp_ros.methods.registry import EXACT
-from grasp_ros.physics.certificate import Energy, energy, ledger
-from grasp_ros.physics.control import DelayLine
+from grasp_ros.physics.certificate import Energy, energy
 from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array
@@ -24,8 +21,6 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 
 GRID_POINTS = 2001
-Progress = Callable[[float], object] | None
-Changes = Mapping[int, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -149,8 +144,8 @@ def simulate(
     method: str = EXACT,
     setting: float | None = None,
     max_events: int = 10**7,
-    changes: Changes = MappingProxyType({}),
-    progress: Progress = None,
+    changes: pieces.Changes = MappingProxyType({}),
+    progress: pieces.Progress = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
 
@@ -184,10 +179,10 @@ def simulate(
         of a running graph, or the method cannot do what is asked, see `methods.registry.check`.
     """
     sampled = sampled or scene.sampled
-    check_changes(scene, sampled, changes)
+    pieces.check_changes(scene, sampled, changes)
     setting = registry.check(method, scene, accuracy if method == EXACT and setting is None else setting, sampled)
     if grid is None:
-        grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
+        grid = pieces.tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = np.asarray(grid, dtype=float)
     if not ((grid[1:] >= grid[:-1]).all() and np.isfinite(grid[[0, -1]] if len(grid) else grid).all()):
         raise ValueError("grid: allowed: ascending finite times")
@@ -202,114 +197,12 @@ def simulate(
     integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events)
     alarm = ""
     if sampled:
-        states, answers, alarm = _sampled(scene, integrator, grid, changes, progress)
+        states, answers, alarm = pieces.sampled(scene, integrator, grid, changes, progress)
     else:
-        states, answers = _continuous(scene, integrator, grid), None
+        states, answers = pieces.continuous(scene, integrator, grid), None
     for body in scene.system.absent:
         states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return Trajectory(
         scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
         integrator.status, EXACT, setting, alarm,
     )
-
-
-def check_changes(scene: Scene, sampled: bool, changes: Changes) -> None:
-    """Refuse changes that a running graph would refuse.
-
-    Raises
-    ------
-    ValueError
-        Names the first of them.
-    """
-    if changes and not sampled:
-        raise ValueError("changes: not allowed under continuous feedback; allowed: sampled=True")
-    live = scene.live
-    for tick, numbers in changes.items():
-        for name in numbers:
-            if name not in live or not 0 <= tick <= scene.ticks:
-                raise ValueError(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
-
-
-def tick_times(scene: Scene) -> Array:
-    """Times in s of all control periods of a scene, shape (ticks + 1,)."""
-    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
-
-
-def _continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:
-    system = scene.system
-    if not system.external:
-        return integrator.advance(scene.duration, grid)
-    changes = {tick for force in system.external for tick in force.changes(scene.ticks)}
-
-    def forces(tick: int) -> Array:
-        return system.external_at(tick)
-
-    return _piecewise(scene, integrator, grid, sorted({0, *changes, scene.ticks}), forces)
-
-
-def _sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress) -> tuple[
-    Array, Array, str
-]:
-    """States (n, 6), the commands (n, 2) that the controllers gave last, and the alarm that cut them, if any."""
-    system = scene.system
-    line = DelayLine(system.delay)
-    commands = np.empty((scene.ticks + 1, 2))
-    states_of_ticks, held = np.zeros((scene.ticks + 1, 6)), np.zeros((scene.ticks + 1, 3))
-    last = 0
-
-    def forces(tick: int) -> Array:
-        nonlocal scene, system, last
-        if tick in changes:
-            scene = scene.changed(changes[tick])
-            system = scene.system
-        with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
-            answers = system.commands(tick, integrator.state)
-        commands[tick] = answers[LEFT], answers[RIGHT]
-        if progress is not None and tick % 100 == 0:
-            progress(scene.time_of(tick))
-        last, states_of_ticks[tick] = tick, integrator.state
-        held[tick] = line.pass_on(answers) + system.external_at(tick)
-        acting: Array = held[tick]
-        return acting
-
-    states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
-    if integrator.status is Status.DONE:
-        forces(scene.ticks)
-    states, alarm = _cut(scene, grid, states, states_of_ticks[: last + 1], held[:last])
-    latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
-    return states, commands[latest], alarm
-
-
-def _cut(scene: Scene, grid: Array, states: Array, ticks: Array, held: Array) -> tuple[Array, str]:
-    """Output states up to the first tick (n, 6) whose energy the held forces (n - 1, 3) do not explain, and why."""
-    system = scene.system
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has a status of its own
-        book = ledger(system, ticks[:-1], ticks[1:], held)
-        found = np.flatnonzero(book.alarm & np.isfinite(book.rounding) & np.isfinite(book.rise))
-    if not len(found):
-        return states, ""
-    first = int(found[0])
-    reason = (f"stopped: the energy rose by {float(book.unexplained[first])!r} J more than the held forces explain,"
-              f" t = {scene.time_of(first + 1)} s, mode {int(energy(system, ticks[first + 1]).mode)},"
-              f" state {ticks[first + 1].tolist()}")
-    return states[: np.searchsorted(grid, scene.time_of(first + 1), side="right")], reason
-
-
-def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],
-               forces: Callable[[int], Array]) -> Array:
-    """Integrate from tick to tick under forces (3,) that are held; each piece [t, t') delivers its own outputs."""
-    ends = np.asarray(ticks) * scene.period_ns / NANOSECONDS
-    lengths = np.diff(ticks) * scene.period_ns / NANOSECONDS
-    bounds = np.searchsorted(grid, ends, side="left")
-    last = bounds[-1]
-    piece_of = np.searchsorted(ends, grid[:last], side="right") - 1
-    offsets = np.clip(grid[:last] - ends[piece_of], 0.0, lengths[piece_of])
-    rows = [np.empty((0, 6))]
-    pieces = zip(ticks, ends.tolist(), lengths.tolist(), pairwise(bounds.tolist()), strict=False)
-    for tick, begin, length, (first, end) in pieces:
-        integrator.hold(forces(tick))
-        rows.append(integrator.advance(length, offsets[first:end], begin))
-        if integrator.status is not Status.DONE:
-            return np.concatenate(rows)
-    rows.append(np.repeat(integrator.state[None], len(grid) - last, axis=0))
-    return np.concatenate(rows)

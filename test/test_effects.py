@@ -16,8 +16,9 @@ from grasp_ros.physics.certificate import ledger
 from grasp_ros.physics.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.model import Array
+from grasp_ros.pieces import tick_times
 from grasp_ros.scene import PAPER, Scene
-from grasp_ros.simulation import Trajectory, simulate, tick_times
+from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.studies.effects import registry_table, variants
 from grasp_ros.topics import JOINT_STATES, LYAPUNOV
 
