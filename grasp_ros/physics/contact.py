@@ -3,6 +3,8 @@
 import math
 from typing import Any
 
+import numpy as np
+
 from grasp_ros.physics.flight import EPS
 from grasp_ros.physics.friction import FREE, contact_slide, fire_slide
 from grasp_ros.physics.jit import inlined, kernel
@@ -43,6 +45,7 @@ from grasp_ros.physics.switching import (
     tick,
 )
 
+ALONE = np.int64(-1)  # no second lane
 LONGEST = 2.0**500  # step in units of an impact
 
 
@@ -74,10 +77,10 @@ def contact_switch(tables: Any, pairs: Any, mode: Any, side: int, n: int, h: flo
     if mode[side] == OPEN:
         if c[z] <= 0.0 and high < 0.0:
             return math.inf, TOUCH
-        return rise_of_lanes(tables, n, h, 1.0, z, -1, 0.0, work), TOUCH
+        return rise_of_lanes(tables, n, h, 1.0, z, ALONE, 0.0, work), TOUCH
     released = math.inf
     if not (c[z] >= 0.0 and low > 0.0):
-        released = rise_of_lanes(tables, n, h, -1.0, z, -1, 0.0, work)
+        released = rise_of_lanes(tables, n, h, -1.0, z, ALONE, 0.0, work)
     front, back = (V_L, V_O) if side == LEFT else (V_O, V_R)
     if loss > 0.0 and mode[side] == CONTACT:
         slowest = lane_range(c, front, h, at, size)[0] - lane_range(c, back, h, at, size)[1]

@@ -13,6 +13,8 @@ allows a longer step, or proves that no root exists.
 import math
 from typing import Any
 
+import numpy as np
+
 from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.layout import DAMPING, FORCE, LANES, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, X_L, X_O, X_R
 
@@ -20,7 +22,8 @@ EPS = 2.220446049250313e-16
 DRIFT, UNDER, NEAR, OVER = 0.0, 1.0, 2.0, 3.0  # regimes of the closed form
 MAX_ITERATIONS = 10_000_000
 FLIGHT_ORDER = 16  # (1/2)^16 / 16! is below rounding, see `expand_flight`
-TOUCH_ROOT, RELEASE_ROOT, REENTRY_ROOT = 0, 1, 2
+# Typed integers: numba would compile the search once per literal kind.
+TOUCH_ROOT, RELEASE_ROOT, REENTRY_ROOT = np.int64(0), np.int64(1), np.int64(2)
 
 
 @kernel

@@ -8,6 +8,8 @@ force without friction are kept beside it.
 import math
 from typing import Any
 
+import numpy as np
+
 from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -29,7 +31,7 @@ from grasp_ros.physics.layout import (
 from grasp_ros.physics.polynomial import first_rise
 from grasp_ros.physics.switching import CONTACT, SLIP, STICK, record
 
-FREE, RIGHTWARD, LEFTWARD, STUCK = (int(s) for s in Slide)
+FREE, RIGHTWARD, LEFTWARD, STUCK = (np.int64(s) for s in Slide)  # typed, see `layout`
 COULOMB, TRUE_MASS, PUSH = 0, 1, 2  # entries of `friction`: N, kg, and the force on the object without friction, N
 
 
@@ -89,7 +91,7 @@ def impact_series(tables: Any, pairs: Any, mode: Any, n: int, row: Any) -> None:
     The table of factors is free after the expansion and holds the series on the way.
     """
     f = tables.f
-    w, e, square, cube = 0, n + 1, 2 * (n + 1), 3 * (n + 1)
+    w, e, square, cube = np.int64(0), n + 1, 2 * (n + 1), 3 * (n + 1)
     for k in range(n + 1):
         row[k] = 0.0
     for side in (LEFT, RIGHT):
