@@ -69,8 +69,7 @@ def sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes,
         if tick in changes:
             scene = scene.changed(changes[tick])
             system = scene.system
-        with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
-            answers = system.commands(tick, integrator.state)
+        answers = system.commands(tick, integrator.state)
         commands[tick] = answers[LEFT], answers[RIGHT]
         if progress is not None and tick % 100 == 0:
             progress(scene.time_of(tick))
@@ -79,9 +78,10 @@ def sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes,
         acting: Array = held[tick]
         return acting
 
-    states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
-    if integrator.status is Status.DONE:
-        forces(scene.ticks)
+    with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
+        states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
+        if integrator.status is Status.DONE:
+            forces(scene.ticks)
     states, alarm = _cut(scene, grid, states, states_of_ticks[: last + 1], held[:last])
     latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
     return states, commands[latest], alarm
