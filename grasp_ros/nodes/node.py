@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -126,9 +127,10 @@ class GraspNode(Node):
         self.counters[counter] = int(self.counters[counter]) + 1
 
     def flush(self, *publishers: Publisher) -> None:
-        """Let every reader have the last messages before the process ends."""
+        """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
+        deadline = time.monotonic() + ACKNOWLEDGE_SECONDS
         for publisher in publishers:
-            publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 1e-3)))
 
     def report(self) -> None:
         """Publish the counters."""
