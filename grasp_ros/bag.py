@@ -25,10 +25,9 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.effects.base import NANOSECONDS
 from grasp_ros.physics.certificate import Energy, energy
-from grasp_ros.physics.layout import OBJECT
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic
+from grasp_ros.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic, state_of
 
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
@@ -158,6 +157,11 @@ class Recording:
         return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
     @property
+    def alarms(self) -> int:
+        """Ticks at which the monitor found energy that the held forces do not explain."""
+        return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
+
+    @property
     def missing(self) -> dict[str, int]:
         """Ticks up to the last one recorded that have no message, by topic."""
         ticks = int(self.tick.max(initial=-1)) + 1
@@ -218,20 +222,9 @@ def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarr
 
 def _values(topic: Topic, message: Any) -> Array:
     if topic == JOINT_STATES:
-        return _joints(message)
+        state, inputs = state_of(message)
+        return np.concatenate([state, inputs[[LEFT, RIGHT]]])
     return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
-
-
-def _joints(message: Any) -> Array:
-    """State (6,) and the input forces of both arms of a `joint_states` message."""
-    row = np.concatenate([np.full(6, np.nan), np.zeros(2)])
-    for body, name in NAMES.items():
-        if name in message.name:
-            index = message.name.index(name)
-            row[COLUMN[body] : COLUMN[body] + 2] = message.position[index], message.velocity[index]
-            if body != OBJECT:
-                row[6 + body] = message.effort[index]
-    return row
 
 
 def _changes(reader: Reader, scene: scenes.Scene) -> dict[int, dict[str, float]]:

@@ -47,11 +47,7 @@ def continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:
     if not system.external:
         return integrator.advance(scene.duration, grid)
     changes = {tick for force in system.external for tick in force.changes(scene.ticks)}
-
-    def forces(tick: int) -> Array:
-        return system.external_at(tick)
-
-    return _piecewise(scene, integrator, grid, sorted({0, *changes, scene.ticks}), forces)
+    return _piecewise(scene, integrator, grid, sorted({0, *changes, scene.ticks}), system.external_at)
 
 
 def sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress) -> tuple[
@@ -69,11 +65,12 @@ def sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes,
         if tick in changes:
             scene = scene.changed(changes[tick])
             system = scene.system
-        answers = system.commands(tick, integrator.state)
+        state = integrator.state
+        answers = system.commands(tick, state)
         commands[tick] = answers[LEFT], answers[RIGHT]
         if progress is not None and tick % 100 == 0:
             progress(scene.time_of(tick))
-        last, states_of_ticks[tick] = tick, integrator.state
+        last, states_of_ticks[tick] = tick, state
         held[tick] = line.pass_on(answers) + system.external_at(tick)
         acting: Array = held[tick]
         return acting

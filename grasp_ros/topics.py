@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, NAMES
 
 DEPTH = 1000  # samples that a publisher keeps for a reader that is behind
 WINDOW = 500  # ticks that the plant may be ahead of a monitor it waits for; below DEPTH, so that nothing is lost
@@ -34,3 +39,14 @@ CONTACTS = {"left": LEFT_CONTACT, "right": RIGHT_CONTACT}
 EXTERNAL_FORCES = {name: Topic(f"external_force/{name}", FORCE) for name in ("left_arm", "object", "right_arm")}
 CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True) for side in ("left", "right")}
 LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm"]
+
+
+def state_of(message: Any) -> tuple[Array, Array]:
+    """State (6,) and input forces (3,) of a `joint_states` message; NaN and 0 for a body that it does not name."""
+    state, inputs = np.full(6, np.nan), np.zeros(3)
+    for body, name in NAMES.items():
+        if name in message.name:
+            row = message.name.index(name)
+            state[COLUMN[body] : COLUMN[body] + 2] = message.position[row], message.velocity[row]
+            inputs[body] = message.effort[row]
+    return state, inputs

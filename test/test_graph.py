@@ -31,7 +31,7 @@ from grasp_ros.physics.integrator import ACCURACY
 from grasp_ros.physics.model import impact_forces
 from grasp_ros.report import compare_recording
 from grasp_ros.simulation import simulate
-from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
+from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
 
 DEADLINE = 60.0
 START = [sys.executable, "-m", "grasp_ros.nodes.start"]
@@ -293,7 +293,7 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(node: tuple[Any, Singl
     scenes: list[str] = []
 
     def answer(message: JointState) -> None:
-        states.append(messages.state_of(message)[0])
+        states.append(state_of(message)[0])
         now = messages.to_ns(message.header.stamp)
         forces = expected.scene.system.commands(now // 1_000_000, states[-1])
         for publisher in publishers:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import signal
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -20,6 +18,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.studies.document import put
+from grasp_ros.studies.measure import Deadline, deadline
 from grasp_ros.versions import versions
 
 PART = "the hard cases"  # marked part of the document
@@ -55,21 +54,6 @@ class Other:
         return simulate(scene, method=self.name, setting=min(self._setting, scene.duration)).events
 
 
-@contextmanager
-def deadline(seconds: float) -> Iterator[None]:
-    """Raise Unfinished in the body after some seconds of wall time."""
-    def give_up(*_: Any) -> None:
-        raise Unfinished(f"not done in {seconds:g} s")
-
-    before = signal.signal(signal.SIGALRM, give_up)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
-
-
 def run(document: Path | None, *, alone: bool) -> int:
     """Print the table; with a document, put it and a figure into it. Returns 1 if a case is wrong.
 
@@ -99,8 +83,8 @@ def _other(case: Case, other: Other) -> Outcome:
     try:
         with deadline(SECONDS), np.errstate(all="ignore"):
             return judge(case, other)
-    except Unfinished as reason:
-        return Outcome(None, str(reason))
+    except Deadline:
+        return Outcome(None, f"not done in {SECONDS:g} s")
     except (ValueError, ArithmeticError, IndexError) as error:  # what it raises is its answer
         return Outcome(None, f"{type(error).__name__}: {error}")
 

@@ -43,7 +43,7 @@ from grasp_ros.methods.equations import (
     relative,
 )
 from grasp_ros.physics.integrator import Status
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.jit import allocating, kernel
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Grasp
 
@@ -208,7 +208,7 @@ def judge_again(q: Any, y: Any, t: float, mode: Any, switched: Any, switches: An
     return found
 
 
-@kernel
+@allocating
 def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, switches: Any, work: Any) -> Any:
     """All steps; returns the outcome and how many rows of `out` and of `switches` are filled."""
     row, found, number, t = 0, 0, 0, 0.0

@@ -24,7 +24,7 @@ from grasp_ros.methods.equations import (
     relative,
 )
 from grasp_ros.physics.integrator import Status
-from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.jit import allocating
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Grasp
 
@@ -34,14 +34,14 @@ IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
 SIDES = (int(LEFT), int(RIGHT))
 
 
-@kernel
+@allocating
 def slopes(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
     """Right-hand side as an array (6,)."""
     f = rates(q, push_l, push_r, (y[0], y[1], y[2], y[3], y[4], y[5]))
     return np.array(f)
 
 
-@kernel
+@allocating
 def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
     """Derivative of `slopes` by y, shape (6, 6)."""
     j = np.zeros((6, 6))

@@ -10,7 +10,6 @@ import struct
 from array import array
 from collections.abc import Mapping, Sequence
 
-import numpy as np
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
@@ -77,17 +76,6 @@ def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array
     message.velocity = array("d", [state[COLUMN[body] + 1] for body in bodies])
     message.effort = array("d", [inputs[body] for body in bodies])
     return message
-
-
-def state_of(message: JointState) -> tuple[Array, Array]:
-    """State (6,) and input forces (3,) by body of a `joint_state`; NaN and 0 for bodies that it does not name."""
-    state, inputs = np.full(6, np.nan), np.zeros(3)
-    for body, name in NAMES.items():
-        if name in message.name:
-            row = message.name.index(name)
-            state[COLUMN[body] : COLUMN[body] + 2] = message.position[row], message.velocity[row]
-            inputs[body] = message.effort[row]
-    return state, inputs
 
 
 def wrench(time_ns: int, force: float, frame_id: str = "") -> WrenchStamped:

@@ -20,7 +20,7 @@ from grasp_ros.nodes.node import GraspNode, run
 from grasp_ros.physics.certificate import energy, ledger
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE, Topic
+from grasp_ros.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE, Topic, state_of
 from grasp_ros.versions import versions
 
 
@@ -122,7 +122,7 @@ class Monitor(GraspNode):
         """What `lyapunov` publishes, see `topics.LYAPUNOV_NAMES`."""
         assert self._scene is not None
         system = self._scene.system
-        state, inputs = messages.state_of(message)
+        state, inputs = state_of(message)
         external = system.external_at(time_ns // self._scene.period_ns)
         unexplained, alarm = 0.0, False
         if self._before is not None and self._before[0] + self._scene.period_ns == time_ns:

@@ -11,6 +11,7 @@ import numpy as np
 
 from grasp_ros.physics import hybrid
 from grasp_ros.physics.friction import PUSH
+from grasp_ros.physics.jit import with_deep_stack
 from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Event, Outcome, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.series import Tables, new_tables, series_order
@@ -178,6 +179,7 @@ class Integrator:
         return out[: filled[0]]
 
 
+@with_deep_stack
 def compile_kernels() -> None:
     """Compile the kernels, or load them from disk, by integrating over no time at all."""
     arm = Arm(1.0, 1.0, 0.0, 0.0, 0.0)

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numba
@@ -16,6 +17,8 @@ import numba
 # Off by default in numba; it turns the eight independent sums of `series.convolve` into vector instructions, which
 # makes a contact several times faster. It never reorders a floating-point sum.
 numba.config.SLP_VECTORIZE = 1
+
+DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
 def sources_digest(room: Path) -> str:
@@ -47,20 +50,39 @@ CACHE_DIRECTORY = _cache_directory(Path(__file__).parent)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function to machine code at its first call and keep the result on disk."""
-    return _compiled(function, False)
+    """Compile a function to machine code at its first call and keep the result on disk.
+
+    It may not make arrays: without them nothing counts references, which makes a kernel a quarter faster.
+    """
+    return _compiled(function, counts=False, inline=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
     """A kernel that becomes part of its callers: handing over many arrays can cost as much as a short function."""
-    return _compiled(function, True)
+    return _compiled(function, counts=False, inline=True)
 
 
-def _compiled(function: Callable[..., Any], inline: bool) -> Any:
+def allocating(function: Callable[..., Any]) -> Any:
+    """A kernel that may make arrays."""
+    return _compiled(function, counts=True, inline=False)
+
+
+def with_deep_stack(function: Callable[[], None]) -> Callable[[], None]:
+    """A function that compiles kernels, with room on CPython's stack for all the compiler's frames.
+
+    CPython asks the system for 16 kB more whenever a call does not fit, and gives it back when that call returns.
+    Compiling makes millions of calls; where they go back and forth over such an edge, this took seconds.
+    """
+    code = function.__code__.replace(co_stacksize=DEEP_STACK)
+    return FunctionType(code, function.__globals__, function.__name__)
+
+
+def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> Any:
+    """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
-        return numba.njit(cache=True, error_model="numpy", forceinline=inline)(function)
+        return numba.njit(cache=True, error_model="numpy", _nrt=counts, forceinline=inline)(function)
     finally:
         numba.config.CACHE_DIR = before
 
