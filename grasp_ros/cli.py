@@ -147,7 +147,7 @@ def _simulate(options: argparse.Namespace) -> int:
     if options.output is not None:
         trajectory.save(options.output)
         print(f"written to {options.output}")
-    return 0 if trajectory.status is Status.DONE and not trajectory.alarm else 1
+    return 0 if trajectory.status is Status.DONE else 1
 
 
 def _run(options: argparse.Namespace) -> int:

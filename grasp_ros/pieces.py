@@ -8,7 +8,6 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_ros.effects.base import NANOSECONDS
-from grasp_ros.physics.certificate import energy, ledger
 from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT
@@ -50,53 +49,32 @@ def continuous(scene: Scene, integrator: Integrator, grid: Array) -> Array:
     return _piecewise(scene, integrator, grid, sorted({0, *changes, scene.ticks}), system.external_at)
 
 
-def sampled(scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress) -> tuple[
-    Array, Array, str
-]:
-    """States (n, 6), the commands (n, 2) that the controllers gave last, and the alarm that cut them, if any."""
+def sampled(
+    scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress
+) -> tuple[Array, Array]:
+    """States (n, 6), and the commands (n, 2) that the controllers gave last."""
     system = scene.system
     line = DelayLine(system.delay)
     commands = np.empty((scene.ticks + 1, 2))
-    states_of_ticks, held = np.zeros((scene.ticks + 1, 6)), np.zeros((scene.ticks + 1, 3))
-    last = 0
 
     def forces(tick: int) -> Array:
-        nonlocal scene, system, last
+        nonlocal scene, system
         if tick in changes:
             scene = scene.changed(changes[tick])
             system = scene.system
-        state = integrator.state
-        answers = system.commands(tick, state)
+        answers = system.commands(tick, integrator.state)
         commands[tick] = answers[LEFT], answers[RIGHT]
         if progress is not None and tick % 100 == 0:
             progress(scene.time_of(tick))
-        last, states_of_ticks[tick] = tick, state
-        held[tick] = line.pass_on(answers) + system.external_at(tick)
-        acting: Array = held[tick]
+        acting: Array = line.pass_on(answers) + system.external_at(tick)
         return acting
 
     with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
         states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
         if integrator.status is Status.DONE:
             forces(scene.ticks)
-    states, alarm = _cut(scene, grid, states, states_of_ticks[: last + 1], held[:last])
     latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
-    return states, commands[latest], alarm
-
-
-def _cut(scene: Scene, grid: Array, states: Array, ticks: Array, held: Array) -> tuple[Array, str]:
-    """Output states up to the first tick (n, 6) whose energy the held forces (n - 1, 3) do not explain, and why."""
-    system = scene.system
-    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite has a status of its own
-        book = ledger(system, ticks[:-1], ticks[1:], held)
-        found = np.flatnonzero(book.alarm & np.isfinite(book.rounding) & np.isfinite(book.rise))
-    if not len(found):
-        return states, ""
-    first = int(found[0])
-    reason = (f"stopped: the energy rose by {float(book.unexplained[first])!r} J more than the held forces explain,"
-              f" t = {scene.time_of(first + 1)} s, mode {int(energy(system, ticks[first + 1]).mode)},"
-              f" state {ticks[first + 1].tolist()}")
-    return states[: np.searchsorted(grid, scene.time_of(first + 1), side="right")], reason
+    return states, commands[latest]
 
 
 def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],

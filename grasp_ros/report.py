@@ -31,7 +31,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     rows = [
         ("scene", trajectory.scene.title),
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
-        ("status", trajectory.alarm or trajectory.status.value),
+        ("status", trajectory.stop or trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
         ("touches left, right", _touches(trajectory) if method.finds_contacts else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),

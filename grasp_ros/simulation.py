@@ -14,7 +14,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.methods import equations, registry
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.certificate import Energy, energy
-from grasp_ros.physics.integrator import ACCURACY, Integrator, Status, SwitchEvent, to_events
+from grasp_ros.physics.integrator import ACCURACY, MAX_EVENTS, MAX_STEPS, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -46,8 +46,8 @@ class Trajectory:
         A key of `methods.registry.METHODS`.
     setting : float
         Its accuracy, step in s, or tolerance.
-    alarm : str
-        Why the run was cut: energy that no work explains, with time, mode and state; empty if there was none.
+    stop : str
+        Why and where a run of `exact` stopped, with time, contact mode and state; empty if it did not.
     """
 
     scene: Scene
@@ -60,7 +60,7 @@ class Trajectory:
     status: Status
     method: str = EXACT
     setting: float = ACCURACY
-    alarm: str = ""
+    stop: str = ""
 
     @property
     def counters(self) -> dict[str, int]:
@@ -110,7 +110,7 @@ class Trajectory:
                 release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
                 events=self.switches, work=self.work,
                 work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
-                method=self.method, setting=self.setting, sampled=self.sampled, alarm=self.alarm,
+                method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
                 scene_name=self.scene.name, scene=self.scene.to_yaml(),
             )
 
@@ -129,7 +129,7 @@ def load(path: Path) -> Trajectory:
             answers = data["command"] if data["sampled"] else None
             return Trajectory(
                 scene, bool(data["sampled"]), data["t"], data["state"], answers, data["events"], data["work"],
-                Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["alarm"]),
+                Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["stop"]),
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
         raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
@@ -143,7 +143,8 @@ def simulate(
     accuracy: float = ACCURACY,
     method: str = EXACT,
     setting: float | None = None,
-    max_events: int = 10**7,
+    max_events: int = MAX_EVENTS,
+    max_steps: int = MAX_STEPS,
     changes: pieces.Changes = MappingProxyType({}),
     progress: pieces.Progress = None,
 ) -> Trajectory:
@@ -166,6 +167,8 @@ def simulate(
         Accuracy, step in s, or tolerance of the method. Default: `accuracy` for `exact`, otherwise the method's own.
     max_events : int
         Budget of contact switches.
+    max_steps : int
+        Budget of flights and Taylor steps, for `exact`.
     changes : mapping of int to mapping of str to float
         Numbers of the scene by "section.key" that were set while it ran, by the tick from which they act; only for
         sampled feedback.
@@ -194,15 +197,15 @@ def simulate(
             scene, False, grid[: len(found.state)], found.state, None, found.switches, found.work, found.status, method,
             setting,
         )
-    integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events)
-    alarm = ""
+    integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events,
+                            max_steps=max_steps)
     if sampled:
-        states, answers, alarm = pieces.sampled(scene, integrator, grid, changes, progress)
+        states, answers = pieces.sampled(scene, integrator, grid, changes, progress)
     else:
         states, answers = pieces.continuous(scene, integrator, grid), None
     for body in scene.system.absent:
         states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return Trajectory(
         scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
-        integrator.status, EXACT, setting, alarm,
+        integrator.status, EXACT, setting, integrator.stop,
     )

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from grasp_ros.physics.integrator import ACCURACY, Status, SwitchEvent
+from grasp_ros.physics.integrator import ACCURACY, MAX_EVENTS, MAX_STEPS, Status, SwitchEvent
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
@@ -34,14 +34,15 @@ class Product:
 
     Attributes
     ----------
-    max_events : int
+    max_events, max_steps : int
     accuracy : float
         See `physics.integrator.Integrator`.
     runs : list of Trajectory
         All runs so far; what was reached is in them even if a run was stopped.
     """
 
-    max_events: int = 10**7
+    max_events: int = MAX_EVENTS
+    max_steps: int = MAX_STEPS
     accuracy: float = ACCURACY
     runs: list[Trajectory] = field(default_factory=list)
 
@@ -54,11 +55,11 @@ class Product:
             If it ends with another status than DONE.
         """
         grid = None if times is None else np.array(list(times))
-        result = simulate(scene, grid=grid, sampled=sampled, accuracy=self.accuracy,
-                          max_events=self.max_events)
+        result = simulate(scene, grid=grid, sampled=sampled, accuracy=self.accuracy, max_events=self.max_events,
+                          max_steps=self.max_steps)
         self.runs.append(result)
-        if result.alarm or result.status is not Status.DONE:
-            raise Unfinished(result.alarm or result.status.value)
+        if result.status is not Status.DONE:
+            raise Unfinished(result.status.value)
         return result
 
     def states(self, scene: Scene, times: Iterable[float]) -> Array:
@@ -101,7 +102,7 @@ class Case:
     bound: float
     limit: Status = Status.DONE
     product_only: bool = False
-    max_events: int = 10**7
+    max_events: int = MAX_EVENTS
 
 
 @dataclass(frozen=True)

@@ -74,6 +74,18 @@ def _during(seconds: float, right: Arm, mass: float, touches: int, solver: Solve
     return error
 
 
+def _turning(sides: int, solver: Solver) -> float:
+    """State of arms that turn after 1.6 ms in a contact so soft that it does nothing within that time."""
+    speed, rate = 1e-13, 1e3
+    arm = Arm(1.0, rate**2, 0.0, 0.0, 0.0)
+    scene = grasp([0.0, speed, 0.0, 0.0, 0.0 if sides == 2 else AWAY, -speed if sides == 2 else 0.0], 0.003, left=arm,
+                  right=arm if sides == 2 else FREE, contact=Contact(1.0, 0.1))
+    times = part(scene, 31)
+    states = solver.states(scene, times)
+    errors = states[:, 0] * rate - speed * np.sin(rate * times), states[:, 1] - speed * np.cos(rate * times)
+    return float(np.abs(errors).max() / speed)
+
+
 def cases() -> Iterator[Case]:
     """All touches."""
     for name, damping in (("case_01", 0.7), ("case_02", 0.0), ("case_03", 0.0)):
@@ -96,6 +108,9 @@ def cases() -> Iterator[Case]:
                    partial(_graze, overshoot), 1e-20)
     yield Case("graze", "two crossings within one control period", "the command is held for 0.8 s", REFERENCE,
                _within_one_period, 1e-11, product_only=True)
+    for sides, text in ((1, "one arm"), (2, "both arms")):
+        yield Case("touch", f"{text} in a contact that is much too slow", "the impact alone would last for minutes",
+                   "the free swing; the impact force is 1e-15 of the spring's", partial(_turning, sides), 1e-13)
     light = Arm(0.01, 400.0, 0.0, 0.0, 0.0)
     for touches, seconds, right, mass in ((1, 0.25, FREE, 1.0), (2, 0.4, FREE, 1.0), (3, 0.1, light, 0.5)):
         yield Case("touch", f"second side {touches} times during one contact", "all four modes, in turn", REFERENCE,

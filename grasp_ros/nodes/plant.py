@@ -128,8 +128,7 @@ class Plant(GraspNode):
         self._integrator.hold(self._inputs + self._system.external_at(self._tick))
         self._integrator.advance(self._scene.period_ns / NANOSECONDS, start=self._scene.time_of(self._tick))
         if self._integrator.status is not Status.DONE:
-            state = self._integrator.state.tolist()
-            self._fail(f"{self._integrator.status.value}, t = {self._scene.time_of(self._tick)} s, state {state}")
+            self._fail(self._integrator.stop)
             return
         self._tick += 1
         self.counters["tick"] = self._tick

@@ -132,10 +132,10 @@ def contact_step(tables: Any, bodies: Any, pairs: Any, y: Any, mode: Any, pace: 
     w_l, v_l, w_r, v_r = 1.0, 0.0, 1.0, 0.0
     if left:
         c[Z_L] = math.sqrt(y[U_L])
-        w_l, v_l = scales(bodies, pairs, y, mode, LEFT)
+        w_l, v_l = scales(bodies, pairs, y, mode, LEFT, pace)
     if right:
         c[Z_R] = math.sqrt(y[U_L + 1])
-        w_r, v_r = scales(bodies, pairs, y, mode, RIGHT)
+        w_r, v_r = scales(bodies, pairs, y, mode, RIGHT, pace)
     # The unit of s makes the radius of convergence about 1: coefficients must not leave the range of numbers.
     unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * pace)
     if left and right:

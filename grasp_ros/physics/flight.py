@@ -61,7 +61,8 @@ def fly(flight: Any, t: float) -> Any:
     if regime == DRIFT:
         return x + t * (v + 0.5 * t * push), v + t * push
     if t * (2.0 * sigma + math.sqrt(omega0_2)) < 0.25:
-        return short_flight(x, v, push, sigma, omega0_2, t)
+        away, v = short_flight(v, push, sigma, omega0_2, t)
+        return x + away, v
     if regime == UNDER:
         decay = math.exp(-sigma * t)
         response = decay * math.sin(rate * t) / rate
@@ -83,8 +84,8 @@ def fly(flight: Any, t: float) -> Any:
 
 
 @kernel
-def short_flight(x: float, v: float, push: float, sigma: float, omega0_2: float, t: float) -> Any:
-    """Power series of the flight, for a time well below both of its time constants."""
+def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float) -> Any:
+    """Displacement and velocity after a time below both time constants: the power series of the flight."""
     before = v  # (n+1) y_(n+1) t^n
     term = (push - 2.0 * sigma * v) * t
     position = v * t
@@ -98,7 +99,14 @@ def short_flight(x: float, v: float, push: float, sigma: float, omega0_2: float,
         n += 1
         if abs(term) <= 1e-18 * abs(velocity) and abs(before) <= 1e-18 * abs(velocity):
             break
-    return x + position, velocity
+    return position, velocity
+
+
+@kernel
+def displacement(flight: Any, t: float) -> float:
+    """x(t) - x without their common digits, for a time below both time constants."""
+    _, _, v, _, _, push, sigma, _, omega0_2 = flight
+    return short_flight(v, push, sigma, omega0_2, t)[0]
 
 
 @kernel

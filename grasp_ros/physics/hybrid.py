@@ -13,12 +13,14 @@ from grasp_ros.physics.flight import (
     REENTRY_ROOT,
     RELEASE_ROOT,
     TOUCH_ROOT,
+    displacement,
     expand_flight,
     flight_root,
     fly,
     launch,
 )
 from grasp_ros.physics.friction import FREE, STUCK, TRUE_MASS, fire_slide, flight_stop, judge_slide
+from grasp_ros.physics.guard import energy_level, may_rise
 from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -62,7 +64,7 @@ from grasp_ros.physics.switching import (
     tick,
 )
 
-DONE, EVENTS_FULL, NOT_FINITE, STALLED = (int(o) for o in Outcome)
+DONE, EVENTS_FULL, NOT_FINITE, STALLED, ENERGY_RISES, STEPS_USED = (int(o) for o in Outcome)
 MAX_IDLE = 1000  # segments without progress in time
 
 
@@ -139,13 +141,16 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, 
     t_o = flight_stop(bodies, y, mode)
     t = min(span, t_l, t_r, t_o)
     deliver_flight(tables, bodies, flights, pace, t, clock, grid, out, filled)
-    first_l, first_r = relative_motion(bodies, y, LEFT), relative_motion(bodies, y, RIGHT)
     depth_l, depth_r = y[U_L], y[U_L + 1]
+    if mode[LEFT] == HELD or mode[RIGHT] == HELD:  # much shallower than the positions are exact
+        away = displacement(flights[OBJECT], t)
+        depth_l += displacement(flights[LEFT], t) - away
+        depth_r += away - displacement(flights[RIGHT], t)
     fly_all(flights, t, y)
     if mode[LEFT] == HELD:
-        y[U_L] = depth_l + t * (first_l[0] + 0.5 * t * first_l[1])
+        y[U_L] = depth_l
     if mode[RIGHT] == HELD:
-        y[U_L + 1] = depth_r + t * (first_r[0] + 0.5 * t * first_r[1])
+        y[U_L + 1] = depth_r
     tick(clock, t)
     if t_l <= t * TOGETHER:
         fire(y, mode, LEFT, kind_l, clock[0], events, filled)
@@ -158,7 +163,7 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, 
 
 @kernel
 def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, clock: Any, span: float,
-            tolerance: float, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
+            tolerance: float, max_steps: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
     """Integrate y in place from the clock to `span` with constant forces; returns a `layout.Outcome`.
 
     Parameters
@@ -173,6 +178,8 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
         State, modes of the pairs and of the object, and compensated time, updated in place.
     span : float, s
         End of the integration on the clock.
+    max_steps : int
+        Budget of segments, flights and contact steps together.
     grid, out : arrays (n,) and (n, 6)
         Ascending output times on the clock, and the states at them.
     events : array (m, 5)
@@ -181,6 +188,8 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
         Rows of `out` and of `events` in use, updated in place.
     work : int array (4,)
         Counters, see `layout.Work`.
+
+    If it ends otherwise than DONE or with EVENTS_FULL, `out` holds nothing of the segment that failed.
     """
     n = tables.row.shape[0] - 1
     bodies[OBJECT, MASS] = friction[TRUE_MASS]
@@ -195,6 +204,7 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
     if stuck and mode[OBJECT] != STUCK:  # other forces act from here on
         record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
     idle = 0
+    level, size = energy_level(bodies, pairs, friction, y, mode, 0.0)
     while True:
         limit = (span - clock[0]) - clock[1]
         row = filled[GRID]
@@ -207,12 +217,14 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             return DONE
         if filled[EVENTS] + SPARE > events.shape[0]:
             return EVENTS_FULL
-        settle(bodies, pairs, y, mode, tolerance)
+        if work[0] + work[1] >= max_steps:
+            return STEPS_USED
+        settle(bodies, pairs, y, mode, pace, tolerance)
         held_l, held_r = mode[LEFT] == HELD, mode[RIGHT] == HELD
         if held_l:
-            limit = min(limit, hold_time(bodies, pairs, y, mode, LEFT, tolerance))
+            limit = min(limit, hold_time(bodies, pairs, y, mode, LEFT, pace, tolerance))
         if held_r:
-            limit = min(limit, hold_time(bodies, pairs, y, mode, RIGHT, tolerance))
+            limit = min(limit, hold_time(bodies, pairs, y, mode, RIGHT, pace, tolerance))
         if mode[LEFT] == CONTACT or mode[RIGHT] == CONTACT:
             t = contact_segment(tables, bodies, pairs, friction, y, mode, pace, clock, limit, tolerance, n, grid, out,
                                 events, filled, work)
@@ -220,11 +232,19 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             t = flight_segment(tables, bodies, pairs, friction, y, mode, pace, clock, limit, grid, out, events,
                                filled, work)
         if held_l:
-            resume(bodies, pairs, y, mode, LEFT, tolerance)
+            resume(bodies, pairs, y, mode, LEFT, pace, tolerance)
         if held_r:
-            resume(bodies, pairs, y, mode, RIGHT, tolerance)
+            resume(bodies, pairs, y, mode, RIGHT, pace, tolerance)
         idle = 0 if t > 0.0 else idle + 1
+        before, size_before = level, size
+        level, size = energy_level(bodies, pairs, friction, y, mode, t)
+        outcome = DONE
         if not math.isfinite(y.sum()):
-            return NOT_FINITE
-        if math.isnan(t) or idle > MAX_IDLE:
-            return STALLED
+            outcome = NOT_FINITE
+        elif math.isnan(t) or idle > MAX_IDLE:
+            outcome = STALLED
+        elif level - before > may_rise(bodies, max(size, size_before), tolerance):
+            outcome = ENERGY_RISES
+        if outcome != DONE:
+            filled[GRID] = row
+            return outcome

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics import hybrid
+from grasp_ros.physics.certificate import energy
 from grasp_ros.physics.friction import PUSH
 from grasp_ros.physics.jit import with_deep_stack
 from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Event, Outcome, Work
@@ -20,6 +21,7 @@ from grasp_ros.physics.system import System
 
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
+MAX_EVENTS, MAX_STEPS = 10**7, 10**8  # budgets; the second lasts for about two minutes
 EVENT_ROWS = 1024
 
 
@@ -29,6 +31,8 @@ class Status(Enum):
     DONE = "reached the end of the horizon"
     EVENT_BUDGET = "stopped: the event budget is used up before the end of the horizon"
     NOT_FINITE = "stopped: a state is not finite any more"
+    STEP_BUDGET = "stopped: the budget of steps is used up before the end of the horizon"
+    ENERGY_RISES = "stopped: the energy rose by more than rounding explains"
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
@@ -53,6 +57,8 @@ _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
     Outcome.STALLED: Status.STALLED,
+    Outcome.ENERGY_RISES: Status.ENERGY_RISES,
+    Outcome.STEPS_USED: Status.STEP_BUDGET,
 }
 
 
@@ -77,6 +83,8 @@ class Integrator:
         Size of the first neglected Taylor term of a contact relative to the impact, in [1e-16, 1e-3].
     max_events : int
         Budget of switches; the integration stops with `Status.EVENT_BUDGET` beyond it.
+    max_steps : int
+        Budget of flights and Taylor steps; the integration stops with `Status.STEP_BUDGET` when it is used up.
 
     Raises
     ------
@@ -85,7 +93,8 @@ class Integrator:
     """
 
     def __init__(
-        self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = 10**7
+        self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = MAX_EVENTS,
+        max_steps: int = MAX_STEPS,
     ) -> None:
         if not FINEST <= accuracy <= COARSEST:
             raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
@@ -94,8 +103,9 @@ class Integrator:
             raise ValueError(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
-        self._accuracy = accuracy
-        self._max_events = max_events
+        self._system, self._accuracy = system, accuracy
+        self._max_events, self._max_steps = max_events, max_steps
+        self._time = 0.0
         self._bodies = system.closed_loop if continuous else system.bodies.copy()
         self._bodies[self._bodies[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._bodies[:, FORCE].copy()
@@ -116,6 +126,15 @@ class Integrator:
     def penetration(self) -> Array:
         """Copy of (u_l, u_r) in m, exact where the difference of the positions is not."""
         return self._y[[U_L, U_R]]
+
+    @property
+    def stop(self) -> str:
+        """Why and where the integration stopped, with time, contact mode and state; empty if it did not."""
+        if self.status is Status.DONE:
+            return ""
+        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not finite any more
+            mode = int(energy(self._system, self.state).mode)
+        return f"{self.status.value}: t = {self._time!r} s, mode {mode}, state {self.state.tolist()}"
 
     @property
     def switches(self) -> Array:
@@ -163,7 +182,7 @@ class Integrator:
             allowed = self._event_rows[: self._max_events - self._switch_count + SPARE]
             outcome = hybrid.advance(
                 self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
-                self._accuracy, times, out, allowed, filled, self.work,
+                self._accuracy, self._max_steps, times, out, allowed, filled, self.work,
             )
             if filled[1]:
                 rows = self._event_rows[: filled[1]].copy()
@@ -176,6 +195,7 @@ class Integrator:
                 break
             if self._switch_count > self._max_events:
                 self.status = Status.EVENT_BUDGET
+        self._time = start + float(clock[0] + clock[1])
         return out[: filled[0]]
 
 

@@ -60,6 +60,8 @@ class Outcome(IntEnum):
     EVENTS_FULL = 1
     NOT_FINITE = 2
     STALLED = 3
+    ENERGY_RISES = 4
+    STEPS_USED = 5
 
 
 class Work(IntEnum):

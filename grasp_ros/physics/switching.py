@@ -90,8 +90,11 @@ def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
 
 
 @inlined
-def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int) -> Any:
-    """Scales of w and u' of one pair's impact; the other pair's impact may push it."""
+def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float) -> Any:
+    """Scales of w and u' of one pair's impact; the other pair's impact may push it.
+
+    An impact that would last longer than the bodies take to turn by themselves gets no deeper than they let it.
+    """
     d, a = relative_motion(bodies, y, side)
     other = 1 - side
     if mode[other] in (CONTACT, HELD):
@@ -99,7 +102,11 @@ def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int) -> Any:
                              relative_motion(bodies, y, other)[0], 0.0)
         if w > 0.0:
             a = max(a, 0.0) + v * v / (w * w)
-    return impact_scales(pairs[side, HERTZ], reduced_mass(bodies, side), y[U_L + side], d, a)
+    w, v = impact_scales(pairs[side, HERTZ], reduced_mass(bodies, side), y[U_L + side], d, a)
+    if pace > 0.0:
+        reach = root_of_two(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / pace) / pace), 2)
+        w = min(w, reach) if w > 0.0 else reach  # 0 where the energy of a motion that died out underflows
+    return w, max(v, root_of_two(abs(d), 1))
 
 
 @kernel
@@ -126,23 +133,25 @@ def sliver(tolerance: float) -> float:
 
 
 @kernel
-def hold_time(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: float) -> float:
+def hold_time(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, tolerance: float) -> float:
     """How long a pair that starts at u = 0 may stay without force: a sliver of its impact.
+
+    At most half a time constant of the bodies, for `flight.displacement`; then it is held again.
 
     The impulse lost relative to the impact's is of order (time)^2.5 if the pair approaches, and (time)^4 if it
     starts at rest and is pushed together.
     """
     d, _ = relative_motion(bodies, y, side)
-    w, v = scales(bodies, pairs, y, mode, side)
+    w, v = scales(bodies, pairs, y, mode, side, pace)
     if w == 0.0 or v == 0.0:  # nothing presses it together
         return 0.0
-    return (sliver(tolerance) if d > 0.0 else 0.3 * tolerance**0.25) * w * w / v
+    return min((sliver(tolerance) if d > 0.0 else 0.3 * tolerance**0.25) * w * w / v, 0.5 / pace)
 
 
 @kernel
-def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: float) -> None:
+def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, tolerance: float) -> None:
     """End the hold of a pair, unless it is still so shallow that its force is below rounding."""
-    w, _ = scales(bodies, pairs, y, mode, side)
+    w, _ = scales(bodies, pairs, y, mode, side, pace)
     d, _ = relative_motion(bodies, y, side)
     u = y[U_L + side]
     if d <= 0.0 or u < 0.0 or u > 1e-3 * sliver(tolerance) * w * w:
@@ -150,7 +159,7 @@ def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, tolerance: flo
 
 
 @inlined
-def settle(bodies: Any, pairs: Any, y: Any, mode: Any, tolerance: float) -> None:
+def settle(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, tolerance: float) -> None:
     """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time.
 
     At a simultaneous touch both are held for a sliver; at a simultaneous release both leave a sliver early. A pair
@@ -166,7 +175,7 @@ def settle(bodies: Any, pairs: Any, y: Any, mode: Any, tolerance: float) -> None
     leaving = 0
     for side in (LEFT, RIGHT):
         d, a = relative_motion(bodies, y, side)
-        w, _ = scales(bodies, pairs, y, mode, side)
+        w, _ = scales(bodies, pairs, y, mode, side, pace)
         u = y[U_L + side]
         if d >= 0.0 and u < 0.3 * shallow * w * w:
             approaching += 1

@@ -1,0 +1,69 @@
+"""The numerical guard: under constant forces the energy of a segment cannot rise, whatever the contacts do."""
+
+import math
+from typing import Any
+
+from grasp_ros.physics.flight import EPS
+from grasp_ros.physics.friction import PUSH, TRUE_MASS
+from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.layout import (
+    DAMPING,
+    FORCE,
+    HERTZ,
+    LEFT,
+    MASS,
+    RIGHT,
+    STIFFNESS,
+    U_L,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
+)
+from grasp_ros.physics.switching import ABSENT
+
+UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
+ROUNDINGS = 32.0  # of the sum of all terms: flights, impacts and differences of positions
+NEGLECTED = 200.0  # of it times the accuracy: a contact step may be off by 100 of its first neglected terms
+
+
+@kernel
+def body_energy(mass: float, stiffness: float, force: float, x: float, v: float, t: float) -> Any:
+    """m v^2 + k x^2 - 2 f x, J, and the sum of the sizes of its terms, at the end of a segment of t s.
+
+    A force that carries the body away and a weak spring that brings it back leave small terms at both ends.
+    """
+    kinetic, spring, work = mass * v * v, stiffness * x * x, 2.0 * force * x
+    size = kinetic + abs(spring) + abs(work)
+    if force != 0.0:
+        away = t * (abs(v) + 0.5 * t * abs(force) / mass)
+        size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
+    return kinetic + spring - work, size
+
+
+@kernel
+def energy_level(bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, t: float) -> Any:
+    """V_c - 2 sum f x, J, and the sum of the sizes of its terms, at the end of a segment of t s.
+
+    Dry friction is left out, because it only takes.
+    """
+    own, size_o = body_energy(friction[TRUE_MASS], 0.0, friction[PUSH], y[X_O], y[V_O], t)
+    arm_l, arm_r = bodies[LEFT], bodies[RIGHT]
+    left, size_l = body_energy(arm_l[MASS], arm_l[STIFFNESS], arm_l[FORCE], y[X_L], y[V_L], t)
+    right, size_r = body_energy(arm_r[MASS], arm_r[STIFFNESS], arm_r[FORCE], y[X_R], y[V_R], t)
+    impact = 0.0
+    for side in (LEFT, RIGHT):
+        u = y[U_L + side]
+        if u > 0.0 and mode[side] != ABSENT:
+            impact += 0.8 * pairs[side, HERTZ] * u * u * math.sqrt(u)
+    return left + right + own + impact, size_l + size_r + size_o + impact
+
+
+@kernel
+def may_rise(bodies: Any, size: float, tolerance: float) -> float:
+    """By how much the level may rise in one segment; without limit where a feedback drives an arm, c + Kv < 0."""
+    if bodies[LEFT, DAMPING] < 0.0 or bodies[RIGHT, DAMPING] < 0.0:
+        return math.inf
+    return (ROUNDINGS * EPS + NEGLECTED * tolerance) * size + UNDERFLOW
