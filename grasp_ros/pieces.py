@@ -26,7 +26,9 @@ def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
     ValueError
         Names the first of them.
     """
-    if changes and not held:
+    if not changes:
+        return
+    if not held:
         raise ValueError("changes: not allowed under continuous feedback; allowed: sampled=True")
     live = scene.live
     for tick, numbers in changes.items():

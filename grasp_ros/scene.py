@@ -132,8 +132,9 @@ class Scene:
     @property
     def live(self) -> list[str]:
         """Numbers, as "section.key", that belong to controllers: what they may be given in place of the scene's."""
+        controllers = self.controllers
         return [
-            f"{effect.section}.{key}" for effect in self.effects if effect.node in self.controllers
+            f"{effect.section}.{key}" for effect in self.effects if effect.node in controllers
             for key in self.values[effect.section]
         ]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -31,7 +32,7 @@ from grasp_ros.physics.integrator import ACCURACY
 from grasp_ros.physics.model import impact_forces
 from grasp_ros.report import compare_recording
 from grasp_ros.simulation import simulate
-from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
+from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV_NAMES, RIGHT_COMMAND, SCENE, state_of
 
 DEADLINE = 60.0
 START = [sys.executable, "-m", "grasp_ros.nodes.start"]
@@ -279,6 +280,40 @@ def test_run_notices_a_plant_that_was_stopped(tmp_path: Path) -> None:
     assert process.returncode == 1
     assert "monitor: still runs although its counterpart has ended" in err
     assert bag.read(recorded.parent).counts[JOINT_STATES.name] > 100
+
+
+WRONG_PLANT = """
+import sys
+from grasp_ros.nodes import start
+from grasp_ros.physics.integrator import Integrator
+hold = Integrator.hold
+Integrator.hold = lambda self, forces: hold(self, 1.5 * forces)
+sys.exit(start.main("plant"))
+"""
+
+
+def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Path) -> None:
+    """A plant that pushes its arms harder than the commands say."""
+    options = ["--ros-args", "-p", "wait_for_monitor:=true"]
+    recording = [*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
+    monitor = subprocess.Popen(recording, stderr=subprocess.PIPE, text=True)
+    others = [
+        subprocess.Popen([sys.executable, "-c", WRONG_PLANT, *options], stderr=subprocess.PIPE),
+        *(subprocess.Popen([*START, f"{side}_controller", *options], stderr=subprocess.PIPE)
+          for side in ("left", "right")),
+    ]
+    _, err = monitor.communicate(timeout=DEADLINE)
+    _, last_words = others[0].communicate(timeout=DEADLINE)
+    for controller in others[1:]:
+        controller.terminate()
+        controller.communicate(timeout=DEADLINE)
+    assert (monitor.returncode, others[0].returncode) == (1, 1)
+    assert b"the monitor that this run waits for has ended" in last_words
+    assert re.search(r"V_c rose by \S+ J more than the held forces can explain, t = \S+ s, mode 0, state \[", err)
+    found = bag.read(tmp_path / "bag")
+    assert found.alarms == 1
+    assert found.lyapunov[-1, LYAPUNOV_NAMES.index("alarm")] == 1.0
+    assert not any(found.missing.values())
 
 
 def test_plant_drops_what_is_stale_repeated_or_not_finite(node: tuple[Any, SingleThreadedExecutor]) -> None:

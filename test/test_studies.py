@@ -280,8 +280,9 @@ def test_page_quick_has_all_sections_and_figures(tmp_path: Path) -> None:
     result = grasp("study", "page", "--quick", "--docs", "docs", "-o", "journal", cwd=tmp_path)
     assert result.returncode == 0, result.stderr
     text = (tmp_path / "docs" / "accuracy.md").read_text()
-    for title in ("Which method", "What the paper's method costs", "Energy in the elastic case", "over topics"):
-        assert f"{title}" in text
+    for title in ("Which method", "What the paper's method costs", "Energy in the elastic case", "over topics",
+                  "Where the time goes", "How many times as long others take"):
+        assert title in text
     shown = [part.split(")")[0] for part in text.split("](accuracy/")[1:]]
     assert len(shown) == 7
     assert all((tmp_path / "docs" / "accuracy" / name).stat().st_size > 1000 for name in shown)

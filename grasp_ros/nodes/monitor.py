@@ -132,7 +132,7 @@ class Monitor(GraspNode):
         level = energy(system, state, external)
         if alarm:
             self.count("alarms")
-            self.exit_code = 1  # `grasp run` and the plant that waits for this monitor end; the bag keeps this tick
+            self.exit_code = 1  # `grasp run` and a plant that waits for this monitor end; the bag keeps this tick
             self.state = (
                 f"V_c rose by {unexplained!r} J more than the held forces can explain, t = {time_ns / NANOSECONDS} s,"
                 f" mode {int(level.mode)}, state {state.tolist()}"

@@ -61,6 +61,7 @@ class Plant(GraspNode):
         self._description.publish(messages.text(self._scene.to_yaml()))
         for side, topic in zip(self._system.laws, self._scene.controllers.values(), strict=True):
             self.subscribe(topic, partial(self._on_command, side))
+        self._unwatched = 0  # reports in a row without a monitor
         if self._monitored:
             self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         if progress:
@@ -68,9 +69,13 @@ class Plant(GraspNode):
         self.when(self._ready, self._start)
 
     def report(self) -> None:
-        """Publish the counters, and see to it that nobody else plays the plant."""
+        """Publish the counters, and see to it that nobody else plays the plant and that the monitor is still there."""
         super().report()
         self._insist()
+        watched = not self._monitored or math.isnan(self._begin) or self.count_publishers(LYAPUNOV.name) > 0
+        self._unwatched = 0 if watched else self._unwatched + 1
+        if self._unwatched > 1 and not self.finished:  # at first its last value may still be on the way
+            self._fail(f"{LYAPUNOV.name}: the monitor that this run waits for has ended")
 
     def _insist(self) -> None:
         if self.count_publishers(self._states.topic_name) > 1:

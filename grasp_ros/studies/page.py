@@ -12,9 +12,21 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
-from grasp_ros.studies import accuracy, drift, figures, loop, measure, predictability, sections, speed, stability
+from grasp_ros.studies import (
+    accuracy,
+    drift,
+    figures,
+    loop,
+    measure,
+    predictability,
+    profile,
+    sections,
+    speed,
+    stability,
+    time_sections,
+)
 from grasp_ros.studies.contenders import all_contenders, own_contenders
-from grasp_ros.studies.records import Journal, write_csv
+from grasp_ros.studies.records import Journal, Record, write_csv
 
 COMMAND = "grasp study page"
 LOOP_SCENE = "case_01"
@@ -62,19 +74,29 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     text = [
         sections.head(COMMAND), sections.choice(records), sections.paper(records), sections.tolerance(records),
         sections.missed(records), sections.energy(drifts), sections.prediction(predictions),
-        sections.topics(case.title, points, limits), sections.output(_output(subjects)),
-        *([] if quick else [sections.final_state(_final_states(subjects, directory))]),
+        sections.topics(case.title, points, limits), time_sections.ahead(records),
+        time_sections.time_spent(records, _profiles(subjects, records)), time_sections.output(_output(subjects)),
+        *([] if quick else [time_sections.final_state(_final_states(subjects, directory))]),
         sections.methods(), sections.details(records),
     ]
     page.write_text("\n\n".join(text) + "\n", encoding="utf-8")
     return page
 
 
+def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[profile.Profile]:
+    """Where the time of `exact` goes, at its fastest setting for the error; its finest where that is not reached."""
+    found = []
+    for scene in subjects:
+        own = [record for record in records if (record.scene, record.method) == (scene.name, EXACT)]
+        fastest = accuracy.fastest(own, time_sections.FINAL_ERROR)
+        found.append(profile.profile(scene, METHODS[EXACT].default if fastest is None else fastest.setting))
+    return found
+
+
 def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
     journal = Journal(directory)
-    return {
-        scene.name: speed.final_state(scene, measure.truth(scene, journal), sections.FINAL_ERROR) for scene in subjects
-    }
+    error = time_sections.FINAL_ERROR
+    return {scene.name: speed.final_state(scene, measure.truth(scene, journal), error) for scene in subjects}
 
 
 def _output(subjects: Sequence[Scene]) -> dict[str, tuple[float, float]]:

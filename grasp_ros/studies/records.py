@@ -153,3 +153,16 @@ def write_csv(records: Iterable[Record], path: Path) -> None:
 
 def _pair(pair: tuple[int, int] | None) -> str | None:
     return None if pair is None else f"{pair[0]}/{pair[1]}"
+
+
+def by_scene(records: Iterable[Record]) -> dict[str, list[Record]]:
+    """Records of each scene."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record.scene, []).append(record)
+    return groups
+
+
+def milliseconds(record: Record) -> str:
+    """The time of a record, to print."""
+    return f"{1e3 * record.time:.3g} ms"

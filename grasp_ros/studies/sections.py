@@ -6,24 +6,20 @@ written either way.
 
 from __future__ import annotations
 
-import textwrap
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from grasp_ros.methods.registry import EXACT, METHODS, TOLERANCE
-from grasp_ros.simulation import GRID_POINTS
 from grasp_ros.studies import accuracy, predictability
+from grasp_ros.studies.document import prose, table
 from grasp_ros.studies.drift import Drift
 from grasp_ros.studies.loop import Point
-from grasp_ros.studies.records import Record, describe_machine
-from grasp_ros.studies.speed import Timing
+from grasp_ros.studies.records import Record, by_scene, describe_machine, milliseconds
 from grasp_ros.studies.stability import Limit
 
-WIDTH = 118
 SAME_TOLERANCE = 1e-8
-FINAL_ERROR = 1e-9
 
 
 def head(command: str) -> str:
@@ -31,10 +27,10 @@ def head(command: str) -> str:
     machine = "\n".join(f"    {name:15}{version}" for name, version in describe_machine().items())
     return "\n\n".join([
         "# What accuracy costs",
-        _prose(f"""Written by `{command}` on {time.strftime('%Y-%m-%d')}. The command measures again what its journal
+        prose(f"""Written by `{command}` on {time.strftime('%Y-%m-%d')}. The command measures again what its journal
         does not have from this machine, these versions and these sources. Ratios travel better than milliseconds."""),
         machine,
-        _prose(f"""Error means: {accuracy.METRIC}. Time is the fastest warm run with all these outputs; the first run,
+        prose(f"""Error means: {accuracy.METRIC}. Time is the fastest warm run with all these outputs; the first run,
         with what it compiles, and the median stand in [records.csv](accuracy/records.csv)."""),
     ])
 
@@ -61,8 +57,8 @@ def choice(records: Sequence[Record]) -> str:
     return "\n\n".join([
         "## Which method",
         f"The fastest setting of `{EXACT}`; the fastest of all other methods:",
-        _table(["scene", *(f"error <= {target:.0e}" for target in accuracy.TARGETS)], rows),
-        _prose(f"""{verdict}. Its finest setting costs {min(finest, default=1.0):.2g} to {max(finest, default=1.0):.2g}
+        table(["scene", *(f"error <= {target:.0e}" for target in accuracy.TARGETS)], rows),
+        prose(f"""{verdict}. Its finest setting costs {min(finest, default=1.0):.2g} to {max(finest, default=1.0):.2g}
         times as much as an error of 1e-3, so there is little reason to ask it for less. Use another method if that is
         what you want to study; `grasp study advise SCENE --error E` answers for your scene and your machine."""),
         "![error against time](accuracy/error_against_time.png)",
@@ -78,14 +74,14 @@ def paper(records: Sequence[Record]) -> str:
         own = accuracy.fastest([record for record in here if record.method == EXACT], 1e-3)
         best = min((record for record in runs if record.good), key=lambda record: record.error or 0.0, default=None)
         rows.append([
-            name, "not reached" if found is None else f"step {found.setting:g} s, {_ms(found)}",
+            name, "not reached" if found is None else f"step {found.setting:g} s, {milliseconds(found)}",
             "-" if found is None or own is None else f"{found.time / own.time:.3g}",
-            "-" if best is None else f"{best.error:.1e} with steps of {best.setting:g} s in {_ms(best)}",
+            "-" if best is None else f"{best.error:.1e} with steps of {best.setting:g} s in {milliseconds(best)}",
         ])
     return "\n\n".join([
         "## What the paper's method costs",
-        _table(["scene", "error <= 1e-3", f"as many times `{EXACT}`", "best error tried"], rows),
-        _prose("""It judges contact at both ends of a step and interpolates time and state linearly, which makes every
+        table(["scene", "error <= 1e-3", f"as many times `{EXACT}`", "best error tried"], rows),
+        prose("""It judges contact at both ends of a step and interpolates time and state linearly, which makes every
         touch an error of second order, whatever the order of the Runge-Kutta method around it. Locating the
         switch to rounding instead (`rk4_events`) costs nothing in time. Order 4 is still not reached, because
         u^(3/2) has no second derivative at u = 0. For motions as in the paper's figures its method is good
@@ -107,8 +103,8 @@ def tolerance(records: Sequence[Record]) -> str:
         rows.append([method, *(_error(there.get(name)) for name in names)])
     low, high = min(errors) / SAME_TOLERANCE, max(errors) / SAME_TOLERANCE
     return "\n\n".join([
-        title, _table(["method", *names], rows),
-        _prose(f"""The error is {low:.0e} to {high:.0e} times the tolerance: a tolerance bounds one step, and the scene
+        title, table(["method", *names], rows),
+        prose(f"""The error is {low:.0e} to {high:.0e} times the tolerance: a tolerance bounds one step, and the scene
         amplifies what a step leaves. Only a reference, or a second run with another setting, tells the error."""),
     ])
 
@@ -120,14 +116,14 @@ def missed(records: Sequence[Record]) -> str:
     failed = [record for record in records if not record.good]
     blocks = [
         "## Contacts missed",
-        _prose(f"""{len(wrong)} of {len(records)} runs count touches wrongly, and {len(silent)} of these report success.
+        prose(f"""{len(wrong)} of {len(records)} runs count touches wrongly, and {len(silent)} of these report success.
         Looking at the ends of a step misses two crossings within it, and from a wrong contact on the motion is
         another one."""),
         "![contacts missed](accuracy/contacts_missed.png)",
     ]
     if failed:
         rows = [[r.scene, r.method, f"{r.knob} {r.setting:.0e}", r.status] for r in failed]
-        blocks += ["Runs without a result:", _table(["scene", "method", "setting", "status"], rows)]
+        blocks += ["Runs without a result:", table(["scene", "method", "setting", "status"], rows)]
     return "\n\n".join(blocks)
 
 
@@ -140,8 +136,8 @@ def energy(drifts: Sequence[Drift]) -> str:
     seconds = max((row.t[-1] for row in drifts if row.t), default=0.0)
     return "\n\n".join([
         "## Energy in the elastic case",
-        _table(["method", "setting", "worst relative drift", "wall time", "status"], rows),
-        _prose(f"""Case 2 over {seconds:g} s: nothing dissipates, so V_c must stay what it is. The motion itself cannot
+        table(["method", "setting", "worst relative drift", "wall time", "status"], rows),
+        prose(f"""Case 2 over {seconds:g} s: nothing dissipates, so V_c must stay what it is. The motion itself cannot
         be predicted that far, see below; energy is what a long run can be judged by. `discrete_gradient` keeps it
         with any step, through every contact, but follows the motion to second order only."""),
         "![energy drift](accuracy/energy_drift.png)",
@@ -158,8 +154,8 @@ def prediction(predictions: Sequence[predictability.Prediction]) -> str:
     levels = [f"below {level:.0e} until" for level in predictability.LEVELS]
     return "\n\n".join([
         "## How far ahead a scene can be predicted",
-        _table(["scene", "growth of a perturbation over the scene", *levels], rows),
-        _prose(f"""Motions that begin {predictability.ROUNDINGS:g} roundings apart, the worst of {predictability.RUNS}.
+        table(["scene", "growth of a perturbation over the scene", *levels], rows),
+        prose(f"""Motions that begin {predictability.ROUNDINGS:g} roundings apart, the worst of {predictability.RUNS}.
         Where they have parted further than the error you want, no method in double precision has it for sale."""),
         "![prediction](accuracy/prediction.png)",
     ])
@@ -180,45 +176,14 @@ def topics(name: str, points: Sequence[Point], limits: Sequence[Limit]) -> str:
     return "\n\n".join([
         "## What accuracy costs over topics",
         f"{name}; wall seconds per simulated second in one process, in four, and of bare rclpy:",
-        _table(["control period", "deviation", "one process", "four processes", "bare rclpy"], rows),
-        _prose(f"""The deviation is that of positions from the paper's continuous feedback. It is the same in one
+        table(["control period", "deviation", "one process", "four processes", "bare rclpy"], rows),
+        prose(f"""The deviation is that of positions from the paper's continuous feedback. It is the same in one
         process and in four, bit for bit, and falls with the power {order:.2f} of the period. In four processes
         the messages are the price, not the physics: halving the period doubles the time."""),
         "![control period](accuracy/control_period.png)",
         "Where the sampled loop of a free arm loses stability (spectral radius 1), and what the simulation does there:",
-        _table(["delay", "largest stable period", "simulated growth per period just below, just above"], edges),
+        table(["delay", "largest stable period", "simulated growth per period just below, just above"], edges),
         "![stability](accuracy/stability.png)",
-    ])
-
-
-def output(costs: dict[str, tuple[float, float]]) -> str:
-    """What output costs: by scene, seconds with all output times and with the last alone."""
-    rows = [
-        [name, f"{1e3 * both:.3g} ms", f"{1e3 * last:.3g} ms", f"{both / last:.2f}"]
-        for name, (both, last) in costs.items()
-    ]
-    return "\n\n".join([
-        "## What output costs", _table(["scene", f"{GRID_POINTS} output times", "the last alone", "ratio"], rows),
-        f"`{EXACT}` at its default accuracy, medians, in turn.",
-    ])
-
-
-def final_state(timings: dict[str, list[Timing]]) -> str:
-    """The last state alone, where a rival has less to do."""
-    rows, ratios = [], []
-    for name, row in timings.items():
-        times = {timing.record.method == EXACT: timing for timing in row}
-        own, other = times.get(True), times.get(False)
-        if own is not None and other is not None:
-            ratios.append(other.median / own.median)
-        cells = [f"{1e3 * t.median:.3g} ms, error {t.record.error:.0e}" if t else "not reached" for t in (own, other)]
-        rows.append([name, *cells, f"{ratios[-1]:.2f}" if own and other else "-"])
-    return "\n\n".join([
-        f"## The last state alone, to an error of {FINAL_ERROR:g}",
-        _table(["scene", EXACT, "heyoka_fast_math", "ratio"], rows),
-        _prose(f"""Medians, in turn; `{EXACT}` is ahead on {sum(ratio > 1.0 for ratio in ratios)} of {len(rows)}
-        scenes. Where {GRID_POINTS} output times are wanted the ratios are those of the first table: a rival pays more
-        for its outputs."""),
     ])
 
 
@@ -226,8 +191,8 @@ def methods() -> str:
     """The methods and the peers."""
     rows = [[f"`{m.name}`", m.order, m.at_touch, m.source] for m in METHODS.values()]
     return "\n\n".join([
-        "## The methods", _table(["name", "order", "at a touch", "source"], rows),
-        _prose("""Outside peers, only in the studies: `odeint` (LSODA, its loop over the steps outside Python),
+        "## The methods", table(["name", "order", "at a touch", "source"], rows),
+        prose("""Outside peers, only in the studies: `odeint` (LSODA, its loop over the steps outside Python),
         `cvode_*` (SUNDIALS by scikit-sundae) and `heyoka*` (Taylor series by LLVM, given the same regularisation
         w = sqrt(u) and a terminal event per switch). All have compiled right-hand sides. Tried besides: the other
         ways of heyoka to generate code, which differ by some percent (`grasp study speed` has them all);
@@ -243,16 +208,8 @@ def details(records: Sequence[Record]) -> str:
     return "\n\n".join(blocks)
 
 
-def by_scene(records: Iterable[Record]) -> dict[str, list[Record]]:
-    """Records of each scene."""
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        groups.setdefault(record.scene, []).append(record)
-    return groups
-
-
 def _cell(record: Record | None) -> str:
-    return "not reached" if record is None else f"{record.method} {_ms(record)}"
+    return "not reached" if record is None else f"{record.method} {milliseconds(record)}"
 
 
 def _error(record: Record | None) -> str:
@@ -261,13 +218,3 @@ def _error(record: Record | None) -> str:
     return f"{record.error:.0e}" + (f" ({record.missed} touches wrong)" if record.missed else "")
 
 
-def _ms(record: Record) -> str:
-    return f"{1e3 * record.time:.3g} ms"
-
-
-def _prose(text: str) -> str:
-    return textwrap.fill(" ".join(text.split()), WIDTH)
-
-
-def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ["---"] * len(heads), *rows))

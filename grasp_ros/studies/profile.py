@@ -1,0 +1,82 @@
+"""Where the time of `exact` goes: the call, its outputs, its Taylor expansions, and the rest of the integration."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from grasp_ros import simulation
+from grasp_ros.physics.integrator import Integrator
+from grasp_ros.physics.jit import kernel
+from grasp_ros.physics.layout import LANES, LEFT, V_L, Z_L, Z_R, Work
+from grasp_ros.physics.series import expand_one, new_tables, series_order
+from grasp_ros.scene import Scene
+
+RUNS = 100
+EXPANSIONS = 1000
+
+
+class Profile(NamedTuple):
+    """Medians of one scene at one accuracy; all times in s."""
+
+    scene: str
+    accuracy: float
+    order: int  # of the series
+    flights: int
+    contact_steps: int
+    call: float  # `simulation.simulate` with all outputs
+    outputs: float  # the integrator alone, with all outputs
+    end: float  # the integrator alone, last state only
+    expansion: float  # of one Taylor step
+
+    @property
+    def expansions(self) -> float:
+        """Time of all expansions in s."""
+        return self.contact_steps * self.expansion
+
+
+def profile(scene: Scene, accuracy: float) -> Profile:
+    """Time the parts of a run in turn, warm."""
+    grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
+    order = series_order(accuracy)
+    tables, system = new_tables(order), scene.system
+    bodies = system.closed_loop
+
+    def integrate(times: np.ndarray) -> Integrator:
+        integrator = Integrator(system, continuous=True, accuracy=accuracy)
+        integrator.advance(scene.duration, times)
+        return integrator
+
+    parts: list[Callable[[], Any]] = [
+        lambda: simulation.simulate(scene, grid=grid, accuracy=accuracy),
+        lambda: integrate(grid),
+        lambda: integrate(grid[-1:]),
+        lambda: expand_often(tables.c, tables.f, bodies, system.pairs, order, EXPANSIONS),
+    ]
+    times: list[list[float]] = [[] for _ in parts]
+    for _ in range(RUNS):
+        for part, column in zip(parts, times, strict=True):
+            part()
+            begin = time.perf_counter()
+            part()
+            column.append(time.perf_counter() - begin)
+    call, outputs, end, expansions = (statistics.median(column) for column in times)
+    work = integrate(grid[-1:]).work
+    return Profile(
+        scene.name, accuracy, order, int(work[Work.FLIGHTS]), int(work[Work.CONTACT_STEPS]), call, outputs, end,
+        expansions / EXPANSIONS,
+    )
+
+
+@kernel
+def expand_often(c: Any, f: Any, bodies: Any, pairs: Any, order: int, times: int) -> None:
+    """Taylor expansions with the left side 1 mm deep at 1 m/s, in its own unit of time."""
+    for _ in range(times):
+        for lane in range(LANES):
+            c[lane] = 0.0
+        c[Z_L], c[V_L], c[Z_R] = 0.03, 1.0, -0.1
+        expand_one(c, f, bodies, pairs, LEFT, 0.03, order)
