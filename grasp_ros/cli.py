@@ -16,7 +16,16 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.methods.registry import ACCURACY_KNOB, EXACT, METHODS, STEP, TOLERANCE, UNITS
-from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST, Integrator, Status, compile_kernels
+from grasp_ros.physics.integrator import (
+    ACCURACY,
+    COARSEST,
+    FINEST,
+    MAX_EVENTS,
+    MAX_STEPS,
+    Integrator,
+    Status,
+    compile_kernels,
+)
 from grasp_ros.physics.jit import COMPILING, kernels_on_disk
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
 from grasp_ros.studies import commands as studies
@@ -54,9 +63,13 @@ def _parser() -> argparse.ArgumentParser:
     add("methods", _methods, "list the methods of integration: order, source, what each does at a touch")
     sub = add("simulate", _simulate, "simulate a scene without ROS")
     _add_scene(sub)
-    sub.add_argument("--grid", type=_grid, metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
+    sub.add_argument("--grid", type=_whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     _add_method(sub)
+    sub.add_argument("--max-events", type=_whole(1), default=MAX_EVENTS, metavar="N",
+                     help=f"budget of contact switches (default {MAX_EVENTS})")
+    sub.add_argument("--max-steps", type=_whole(1), default=MAX_STEPS, metavar="N",
+                     help=f"budget of flights and Taylor steps of exact (default {MAX_STEPS})")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
     sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
     _add_scene(sub)
@@ -105,11 +118,14 @@ def _setting(options: argparse.Namespace) -> float | None:
     return None if given[knob] is None else float(given[knob])
 
 
-def _grid(word: str) -> int:
-    number = int(word)
-    if number < 2:
-        raise argparse.ArgumentTypeError(f"{word} is not allowed; allowed: a whole number >= 2")
-    return number
+def _whole(least: int) -> Callable[[str], int]:
+    """Reads a whole number from a command line."""
+    def read(word: str) -> int:
+        if not word.isdecimal() or int(word) < least:
+            raise argparse.ArgumentTypeError(f"{word} is not allowed; allowed: a whole number >= {least}")
+        return int(word)
+
+    return read
 
 
 def _prepare() -> None:
@@ -141,6 +157,7 @@ def _simulate(options: argparse.Namespace) -> int:
     with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
         trajectory = simulate(
             scene, grid=grid, sampled=options.sampled, method=options.method, setting=_setting(options),
+            max_events=options.max_events, max_steps=options.max_steps,
             progress=lambda reached: bar.update(reached - bar.n),
         )
     print(table(describe_trajectory(trajectory)))

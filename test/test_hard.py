@@ -11,6 +11,7 @@ import pytest
 from grasp_ros import scene as scenes
 from grasp_ros.hard.case import Case, Product, judge
 from grasp_ros.hard.registry import cases
+from grasp_ros.physics import integrator
 from grasp_ros.physics.integrator import Status
 from grasp_ros.physics.layout import DAMPING, OBJECT, Work
 from grasp_ros.simulation import simulate
@@ -73,9 +74,20 @@ def test_runs_stop_where_energy_comes_from_nowhere(sampled: bool) -> None:
     np.testing.assert_allclose(cut.state, whole.state[: len(cut.t)], atol=1e-2)
 
 
-def test_the_budget_of_steps_ends_a_run() -> None:
+@pytest.mark.parametrize("breath", [10**6, 30])
+def test_the_budget_of_steps_ends_a_run(monkeypatch: pytest.MonkeyPatch, breath: int) -> None:
+    monkeypatch.setattr(integrator, "BREATH", breath)
     run = simulate(scenes.load("case_02"), max_steps=100)
     assert run.status is Status.STEP_BUDGET
     assert run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] == 100
     assert run.stop.startswith(f"{run.status.value}: t = ")
     assert 0 < len(run.t) < 2001
+
+
+def test_a_run_that_takes_breath_gives_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = simulate(scenes.load("case_02"))
+    monkeypatch.setattr(integrator, "BREATH", 7)
+    pieces = simulate(scenes.load("case_02"))
+    assert np.array_equal(pieces.state, whole.state)
+    assert np.array_equal(pieces.switches, whole.switches)
+    assert np.array_equal(pieces.work, whole.work)

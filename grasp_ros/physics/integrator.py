@@ -22,6 +22,7 @@ from grasp_ros.physics.system import System
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
 MAX_EVENTS, MAX_STEPS = 10**7, 10**8  # budgets; the second lasts for about two minutes
+BREATH = 10**6  # steps, about a second, after which a kernel lets Python see a Ctrl-C
 EVENT_ROWS = 1024
 
 
@@ -128,6 +129,10 @@ class Integrator:
         return self._y[[U_L, U_R]]
 
     @property
+    def _steps(self) -> int:
+        return int(self.work[Work.FLIGHTS] + self.work[Work.CONTACT_STEPS])
+
+    @property
     def stop(self) -> str:
         """Why and where the integration stopped, with time, contact mode and state; empty if it did not."""
         if self.status is Status.DONE:
@@ -182,7 +187,7 @@ class Integrator:
             allowed = self._event_rows[: self._max_events - self._switch_count + SPARE]
             outcome = hybrid.advance(
                 self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
-                self._accuracy, self._max_steps, times, out, allowed, filled, self.work,
+                self._accuracy, min(self._steps + BREATH, self._max_steps), times, out, allowed, filled, self.work,
             )
             if filled[1]:
                 rows = self._event_rows[: filled[1]].copy()
@@ -190,11 +195,12 @@ class Integrator:
                 self._switches.append(rows)
                 self._switch_count += len(rows)
                 filled[1] = 0
-            if outcome != Outcome.EVENTS_FULL:
+            if outcome == Outcome.EVENTS_FULL:
+                if self._switch_count > self._max_events:
+                    self.status = Status.EVENT_BUDGET
+            elif outcome != Outcome.STEPS_USED or self._steps >= self._max_steps:
                 self.status = _STATUS[Outcome(outcome)]
                 break
-            if self._switch_count > self._max_events:
-                self.status = Status.EVENT_BUDGET
         self._time = start + float(clock[0] + clock[1])
         return out[: filled[0]]
 
