@@ -21,7 +21,7 @@ from grasp_ros.physics.integrator import (
     COARSEST,
     FINEST,
     MAX_EVENTS,
-    MAX_STEPS,
+    MAX_WORK,
     Integrator,
     Status,
     compile_kernels,
@@ -68,8 +68,8 @@ def _parser() -> argparse.ArgumentParser:
     _add_method(sub)
     sub.add_argument("--max-events", type=_whole(1), default=MAX_EVENTS, metavar="N",
                      help=f"budget of contact switches (default {MAX_EVENTS})")
-    sub.add_argument("--max-steps", type=_whole(1), default=MAX_STEPS, metavar="N",
-                     help=f"budget of flights and Taylor steps of exact (default {MAX_STEPS})")
+    sub.add_argument("--max-work", type=_whole(1), default=MAX_WORK, metavar="N",
+                     help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
     sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
     _add_scene(sub)
@@ -157,7 +157,7 @@ def _simulate(options: argparse.Namespace) -> int:
     with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
         trajectory = simulate(
             scene, grid=grid, sampled=options.sampled, method=options.method, setting=_setting(options),
-            max_events=options.max_events, max_steps=options.max_steps,
+            max_events=options.max_events, max_work=options.max_work,
             progress=lambda reached: bar.update(reached - bar.n),
         )
     print(table(describe_trajectory(trajectory)))

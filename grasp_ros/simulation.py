@@ -14,7 +14,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.methods import equations, registry
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.certificate import Energy, energy
-from grasp_ros.physics.integrator import ACCURACY, MAX_EVENTS, MAX_STEPS, Integrator, Status, SwitchEvent, to_events
+from grasp_ros.physics.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Integrator, Status, SwitchEvent, to_events
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -144,7 +144,7 @@ def simulate(
     method: str = EXACT,
     setting: float | None = None,
     max_events: int = MAX_EVENTS,
-    max_steps: int = MAX_STEPS,
+    max_work: int = MAX_WORK,
     changes: pieces.Changes = MappingProxyType({}),
     progress: pieces.Progress = None,
 ) -> Trajectory:
@@ -167,8 +167,8 @@ def simulate(
         Accuracy, step in s, or tolerance of the method. Default: `accuracy` for `exact`, otherwise the method's own.
     max_events : int
         Budget of contact switches.
-    max_steps : int
-        Budget of flights and Taylor steps, for `exact`.
+    max_work : int
+        Budget of work, for `exact`: flights, Taylor steps, and evaluations of event functions.
     changes : mapping of int to mapping of str to float
         Numbers of the scene by "section.key" that were set while it ran, by the tick from which they act; only for
         sampled feedback.
@@ -198,7 +198,7 @@ def simulate(
             setting,
         )
     integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events,
-                            max_steps=max_steps)
+                            max_work=max_work)
     if sampled:
         states, answers = pieces.sampled(scene, integrator, grid, changes, progress)
     else:

@@ -74,12 +74,13 @@ def test_runs_stop_where_energy_comes_from_nowhere(sampled: bool) -> None:
     np.testing.assert_allclose(cut.state, whole.state[: len(cut.t)], atol=1e-2)
 
 
-@pytest.mark.parametrize("breath", [10**6, 30])
-def test_the_budget_of_steps_ends_a_run(monkeypatch: pytest.MonkeyPatch, breath: int) -> None:
+@pytest.mark.parametrize("breath", [10**6, 50])
+def test_the_budget_of_work_ends_a_run(monkeypatch: pytest.MonkeyPatch, breath: int) -> None:
     monkeypatch.setattr(integrator, "BREATH", breath)
-    run = simulate(scenes.load("case_02"), max_steps=100)
-    assert run.status is Status.STEP_BUDGET
-    assert run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] == 100
+    run = simulate(scenes.load("case_02"), max_work=300)
+    assert run.status is Status.WORK_BUDGET
+    spent = int(run.work.sum() - run.work[Work.REJECTED_STEPS])
+    assert 300 <= spent < 400
     assert run.stop.startswith(f"{run.status.value}: t = ")
     assert 0 < len(run.t) < 2001
 

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from grasp_ros.physics.integrator import ACCURACY, MAX_EVENTS, MAX_STEPS, Status, SwitchEvent
+from grasp_ros.physics.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status, SwitchEvent
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
@@ -34,7 +34,7 @@ class Product:
 
     Attributes
     ----------
-    max_events, max_steps : int
+    max_events, max_work : int
     accuracy : float
         See `physics.integrator.Integrator`.
     runs : list of Trajectory
@@ -42,7 +42,7 @@ class Product:
     """
 
     max_events: int = MAX_EVENTS
-    max_steps: int = MAX_STEPS
+    max_work: int = MAX_WORK
     accuracy: float = ACCURACY
     runs: list[Trajectory] = field(default_factory=list)
 
@@ -56,7 +56,7 @@ class Product:
         """
         grid = None if times is None else np.array(list(times))
         result = simulate(scene, grid=grid, sampled=sampled, accuracy=self.accuracy, max_events=self.max_events,
-                          max_steps=self.max_steps)
+                          max_work=self.max_work)
         self.runs.append(result)
         if result.status is not Status.DONE:
             raise Unfinished(result.status.value)

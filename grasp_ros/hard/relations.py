@@ -15,6 +15,7 @@ from grasp_ros.scene import Scene
 
 SWAPPED = [4, 5, 2, 3, 0, 1]
 FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
+DIRECTED = ("position_m", "velocity_m_per_s", "set_point_m", "feed_forward_N", "force_N", "angle_rad")
 PAIRED = {"left": "right", "right": "left"}
 
 
@@ -24,18 +25,22 @@ def mirrored(scene: Scene) -> Scene:
     for section, numbers in scene.values.items():
         side, _, rest = section.partition("_")
         values[f"{PAIRED[side]}_{rest}" if side in PAIRED else section] = {
-            key: -value if key in ("position_m", "velocity_m_per_s") else value for key, value in numbers.items()
+            key: -value if key in DIRECTED else value for key, value in numbers.items()
         }
     return composed(scene.name, values)
 
 
 def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
     """The scene in other units, O7; exact for powers of 4, 2 and 2."""
+    force = mass * length / time**2
     factors = {
         "mass_kg": mass, "stiffness_N_per_m": mass / time**2, "damping_Ns_per_m": mass / time,
         "position_gain_N_per_m": mass / time**2, "velocity_gain_Ns_per_m": mass / time, "position_m": length,
         "velocity_m_per_s": length / time, "hertz_N_per_m1_5": mass / (time**2 * math.sqrt(length)),
         "dissipation_s_per_m": time / length, "duration_s": time, "control_period_s": time,
+        "set_point_m": length, "feed_forward_N": force, "force_N": force, "coulomb_N": force,
+        "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
+        "gravity_m_per_s2": length / time**2,
     }
     return composed(scene.name, {
         section: {key: value * factors[key] for key, value in numbers.items()}

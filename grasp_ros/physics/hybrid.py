@@ -64,7 +64,7 @@ from grasp_ros.physics.switching import (
     tick,
 )
 
-DONE, EVENTS_FULL, NOT_FINITE, STALLED, ENERGY_RISES, STEPS_USED = (int(o) for o in Outcome)
+DONE, EVENTS_FULL, NOT_FINITE, STALLED, ENERGY_RISES, WORK_USED = (int(o) for o in Outcome)
 MAX_IDLE = 1000  # segments without progress in time
 
 
@@ -163,7 +163,7 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, 
 
 @kernel
 def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, clock: Any, span: float,
-            tolerance: float, max_steps: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
+            tolerance: float, max_work: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
     """Integrate y in place from the clock to `span` with constant forces; returns a `layout.Outcome`.
 
     Parameters
@@ -178,8 +178,8 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
         State, modes of the pairs and of the object, and compensated time, updated in place.
     span : float, s
         End of the integration on the clock.
-    max_steps : int
-        Budget of segments, flights and contact steps together.
+    max_work : int
+        Budget of flights, contact steps and evaluations of event functions together.
     grid, out : arrays (n,) and (n, 6)
         Ascending output times on the clock, and the states at them.
     events : array (m, 5)
@@ -217,8 +217,8 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             return DONE
         if filled[EVENTS] + SPARE > events.shape[0]:
             return EVENTS_FULL
-        if work[0] + work[1] >= max_steps:
-            return STEPS_USED
+        if work[0] + work[1] + work[3] >= max_work:
+            return WORK_USED
         settle(bodies, pairs, y, mode, pace, tolerance)
         held_l, held_r = mode[LEFT] == HELD, mode[RIGHT] == HELD
         if held_l:

@@ -21,8 +21,8 @@ from grasp_ros.physics.system import System
 
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
-MAX_EVENTS, MAX_STEPS = 10**7, 10**8  # budgets; the second lasts for about two minutes
-BREATH = 10**6  # steps, about a second, after which a kernel lets Python see a Ctrl-C
+MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for about a minute
+BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
 EVENT_ROWS = 1024
 
 
@@ -32,7 +32,7 @@ class Status(Enum):
     DONE = "reached the end of the horizon"
     EVENT_BUDGET = "stopped: the event budget is used up before the end of the horizon"
     NOT_FINITE = "stopped: a state is not finite any more"
-    STEP_BUDGET = "stopped: the budget of steps is used up before the end of the horizon"
+    WORK_BUDGET = "stopped: the budget of work is used up before the end of the horizon"
     ENERGY_RISES = "stopped: the energy rose by more than rounding explains"
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
@@ -59,7 +59,7 @@ _STATUS = {
     Outcome.NOT_FINITE: Status.NOT_FINITE,
     Outcome.STALLED: Status.STALLED,
     Outcome.ENERGY_RISES: Status.ENERGY_RISES,
-    Outcome.STEPS_USED: Status.STEP_BUDGET,
+    Outcome.WORK_USED: Status.WORK_BUDGET,
 }
 
 
@@ -84,8 +84,9 @@ class Integrator:
         Size of the first neglected Taylor term of a contact relative to the impact, in [1e-16, 1e-3].
     max_events : int
         Budget of switches; the integration stops with `Status.EVENT_BUDGET` beyond it.
-    max_steps : int
-        Budget of flights and Taylor steps; the integration stops with `Status.STEP_BUDGET` when it is used up.
+    max_work : int
+        Budget of flights, Taylor steps and evaluations of event functions together; the integration stops with
+        `Status.WORK_BUDGET` when it is used up.
 
     Raises
     ------
@@ -95,7 +96,7 @@ class Integrator:
 
     def __init__(
         self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = MAX_EVENTS,
-        max_steps: int = MAX_STEPS,
+        max_work: int = MAX_WORK,
     ) -> None:
         if not FINEST <= accuracy <= COARSEST:
             raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
@@ -105,7 +106,7 @@ class Integrator:
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._accuracy = system, accuracy
-        self._max_events, self._max_steps = max_events, max_steps
+        self._max_events, self._max_work = max_events, max_work
         self._time = 0.0
         self._bodies = system.closed_loop if continuous else system.bodies.copy()
         self._bodies[self._bodies[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
@@ -129,8 +130,8 @@ class Integrator:
         return self._y[[U_L, U_R]]
 
     @property
-    def _steps(self) -> int:
-        return int(self.work[Work.FLIGHTS] + self.work[Work.CONTACT_STEPS])
+    def _spent(self) -> int:
+        return int(self.work[Work.FLIGHTS] + self.work[Work.CONTACT_STEPS] + self.work[Work.ROOT_ITERATIONS])
 
     @property
     def stop(self) -> str:
@@ -187,7 +188,7 @@ class Integrator:
             allowed = self._event_rows[: self._max_events - self._switch_count + SPARE]
             outcome = hybrid.advance(
                 self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
-                self._accuracy, min(self._steps + BREATH, self._max_steps), times, out, allowed, filled, self.work,
+                self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled, self.work,
             )
             if filled[1]:
                 rows = self._event_rows[: filled[1]].copy()
@@ -198,7 +199,7 @@ class Integrator:
             if outcome == Outcome.EVENTS_FULL:
                 if self._switch_count > self._max_events:
                     self.status = Status.EVENT_BUDGET
-            elif outcome != Outcome.STEPS_USED or self._steps >= self._max_steps:
+            elif outcome != Outcome.WORK_USED or self._spent >= self._max_work:
                 self.status = _STATUS[Outcome(outcome)]
                 break
         self._time = start + float(clock[0] + clock[1])

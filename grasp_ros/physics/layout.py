@@ -61,7 +61,7 @@ class Outcome(IntEnum):
     NOT_FINITE = 2
     STALLED = 3
     ENERGY_RISES = 4
-    STEPS_USED = 5
+    WORK_USED = 5
 
 
 class Work(IntEnum):
