@@ -30,15 +30,15 @@ def test_names_are_unique_and_families_are_many() -> None:
 
 @pytest.mark.parametrize("case", PARAMETERS)
 def test_hard_case(case: Case) -> None:
-    outcome = judge(case, Product(case.max_events))
+    outcome = judge(case, Product(case.max_events, case.max_work))
     assert outcome.right(case), outcome
 
 
-@pytest.mark.parametrize("status", [Status.EVENT_BUDGET, Status.NOT_FINITE])
+@pytest.mark.parametrize("status", [Status.EVENT_BUDGET, Status.WORK_BUDGET, Status.NOT_FINITE])
 def test_announced_ends_do_come(status: Status) -> None:
     """A limit that is never met would let a case pass for nothing."""
     case = next(case for case in cases() if case.limit is status)
-    product = Product(case.max_events)
+    product = Product(case.max_events, case.max_work)
     assert judge(case, product).status == status.value
     assert len(product.runs[-1].t) < len(product.runs[-1].scene.system.state) * 10**6
     assert len(product.runs[-1].state) == len(product.runs[-1].t)

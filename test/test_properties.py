@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 from grasp_ros.hard import properties
 from grasp_ros.hard.case import Product, Unfinished
+from grasp_ros.hard.draw import NUMBERS, draw_scene
 from grasp_ros.hard.impacts import impact_error
-from grasp_ros.hard.properties import NUMBERS, Check, checks, draw_scene
+from grasp_ros.hard.properties import Check, checks
 from grasp_ros.hard.relations import reversal
 from grasp_ros.hard.scenes import ELASTIC, distance, grasp, reference
+from grasp_ros.physics.layout import DAMPING
 from grasp_ros.physics.model import Arm, Contact
 
 FIXED = settings(
@@ -39,9 +41,13 @@ def test_random_scenes_cover_what_they_should() -> None:
     assert 50 < sum(scene.sampled for scene in drawn) < 150
     masses = [scene.values["object"]["mass_kg"] for scene in drawn]
     assert max(masses) / min(masses) > 1e9
-    stiffness = [scene.values["left_contact"]["hertz_N_per_m1_5"] for scene in drawn]
+    contacts = [scene.values["left_contact"] for scene in drawn if "left_contact" in scene.values]
+    stiffness = [contact["hertz_N_per_m1_5"] for contact in contacts]
     assert max(stiffness) / min(stiffness) > 1e9
-    assert {"left_actuator", "left_sensor", "loop"} <= {section for scene in drawn for section in scene.values}
+    assert sum("right_arm" not in scene.values for scene in drawn) > 5
+    assert sum(not scene.system.closed_loop[:, DAMPING].any() for scene in drawn) > 5
+    effects = {"left_actuator", "left_sensor", "loop", "object_friction", "tilt", "object_pulse"}
+    assert effects <= {section for scene in drawn for section in scene.values}
 
 
 def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -90,8 +90,8 @@ class Case:
         A status with which the product may end instead; DONE: none.
     product_only : bool
         Whether the figure needs more than states and events, which other solvers do not have.
-    max_events : int
-        Budget of contact switches.
+    max_events, max_work : int
+        Budgets of contact switches and of work.
     """
 
     family: str
@@ -103,6 +103,7 @@ class Case:
     limit: Status = Status.DONE
     product_only: bool = False
     max_events: int = MAX_EVENTS
+    max_work: int = MAX_WORK
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros.hard.case import Unfinished
-from grasp_ros.hard.properties import NUMBERS, Check, checks, draw_scene
+from grasp_ros.hard.draw import NUMBERS, draw_scene
+from grasp_ros.hard.properties import Check, checks
 
 COMPARED = 200  # every how many scenes one is compared with the reference
 

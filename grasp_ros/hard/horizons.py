@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from grasp_ros.hard.case import Case, Product, Solver
-from grasp_ros.hard.scenes import ELASTIC, STANDARD, grasp, library
+from grasp_ros.hard.scenes import AWAY, ELASTIC, FREE, STANDARD, grasp, library
 from grasp_ros.oracles import balance
 from grasp_ros.physics.certificate import energy
 from grasp_ros.physics.integrator import Status
@@ -65,6 +65,13 @@ def _budget(product: Product) -> float:
     return float(len(product.run(library("case_01", 20.0)).events))
 
 
+def _creeps(product: Product) -> float:
+    """A light arm that begins deep in a stiff contact: it would take 1e10 steps to get out."""
+    product.run(grasp([0.04, 0.6, 0.0, 0.0, AWAY, 0.0], 1.0, left=Arm(1e-4, 0.0, 0.0, 0.0, 0.0), right=FREE,
+                      contact=Contact(1e8, 100.0), mass=1e-3))
+    return np.inf
+
+
 def cases() -> Iterator[Case]:
     """All long runs and balances."""
     yield Case("horizon", "elastic marginal case, 2000 s", "the motion is unpredictable after 50 s; the energy is not",
@@ -95,3 +102,5 @@ def cases() -> Iterator[Case]:
                    partial(_balances, scene, 128 if "1e-6" in text else 16), 1.0, product_only=True)
     yield Case("horizon", "more contacts than the budget", "a run must not go on for ever", "the status says so",
                _budget, 0.0, limit=Status.EVENT_BUDGET, product_only=True, max_events=30)
+    yield Case("horizon", "more work than the budget", "stiff: the squeezed contact creeps out at 1/p",
+               "the status says so", _creeps, 0.0, limit=Status.WORK_BUDGET, product_only=True, max_work=10**5)

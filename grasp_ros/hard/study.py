@@ -66,7 +66,7 @@ def run(document: Path | None, *, alone: bool) -> int:
     rows: list[Row] = []
     others = [] if alone else [Other(name, setting) for name, setting in OTHERS]
     for case in tqdm(cases(), desc="hard", file=sys.stderr):
-        own = judge(case, Product(case.max_events))
+        own = judge(case, Product(case.max_events, case.max_work))
         rows.append(Row(case, own, [] if case.product_only else [_other(case, other) for other in others]))
     table = _table(rows)
     print(table)
