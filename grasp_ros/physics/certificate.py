@@ -102,7 +102,8 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     work: Array = np.zeros(np.shape(before)[:-1])
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
-        rounding = rounding + 8.0 * EPS * np.abs(forces[..., body] * after[..., COLUMN[body]])
+        # in contact an arm is where the object is and the gap ends, with the roundings of some hundred steps
+        rounding = rounding + 64.0 * EPS * np.abs(forces[..., body]) * _place(system, body, after)
     return Ledger(levels[1] - levels[0], work, rounding)
 
 
@@ -137,8 +138,14 @@ def _size(system: System, state: Array) -> Array:
     for body in system.present:
         x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
         mass, stiffness, _, force = system.bodies[body]
-        total = total + mass * v * v + stiffness * x * x + 2.0 * np.abs(force * x)
+        total = total + mass * v * v + (stiffness * np.abs(x) + 2.0 * np.abs(force)) * _place(system, body, state)
     return total
+
+
+def _place(system: System, body: int, state: Array) -> Array:
+    """What the digits of a body's position are relative to: also the object, from which that of an arm follows."""
+    place: Array = np.abs(state[..., COLUMN[body]])
+    return place + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else place
 
 
 def _power(system: System, bodies: Array, state: Array, external: Array | None) -> Array:

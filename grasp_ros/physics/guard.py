@@ -30,13 +30,14 @@ NEGLECTED = 200.0  # of it times the accuracy: a contact step may be off by 100 
 
 
 @kernel
-def body_energy(mass: float, stiffness: float, force: float, x: float, v: float, t: float) -> Any:
+def body_energy(mass: float, stiffness: float, force: float, x: float, v: float, x_o: float, t: float) -> Any:
     """m v^2 + k x^2 - 2 f x, J, and the sum of the sizes of its terms, at the end of a segment of t s.
 
-    A force that carries the body away and a weak spring that brings it back leave small terms at both ends.
+    The position of an arm in contact follows from that of the object, x_o, and has its digits. A force that carries
+    the body away and a weak spring that brings it back leave small terms at both ends.
     """
     kinetic, spring, work = mass * v * v, stiffness * x * x, 2.0 * force * x
-    size = kinetic + abs(spring) + abs(work)
+    size = kinetic + (abs(stiffness * x) + 2.0 * abs(force)) * (abs(x) + abs(x_o))
     if force != 0.0:
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
@@ -49,10 +50,10 @@ def energy_level(bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, t: f
 
     Dry friction is left out, because it only takes.
     """
-    own, size_o = body_energy(friction[TRUE_MASS], 0.0, friction[PUSH], y[X_O], y[V_O], t)
+    own, size_o = body_energy(friction[TRUE_MASS], 0.0, friction[PUSH], y[X_O], y[V_O], 0.0, t)
     arm_l, arm_r = bodies[LEFT], bodies[RIGHT]
-    left, size_l = body_energy(arm_l[MASS], arm_l[STIFFNESS], arm_l[FORCE], y[X_L], y[V_L], t)
-    right, size_r = body_energy(arm_r[MASS], arm_r[STIFFNESS], arm_r[FORCE], y[X_R], y[V_R], t)
+    left, size_l = body_energy(arm_l[MASS], arm_l[STIFFNESS], arm_l[FORCE], y[X_L], y[V_L], y[X_O], t)
+    right, size_r = body_energy(arm_r[MASS], arm_r[STIFFNESS], arm_r[FORCE], y[X_R], y[V_R], y[X_O], t)
     impact = 0.0
     for side in (LEFT, RIGHT):
         u = y[U_L + side]
