@@ -26,6 +26,7 @@ from grasp_ros.physics.flight import (
     safe_step,
 )
 from grasp_ros.physics.layout import Work
+from grasp_ros.physics.switching import fastest_rate
 
 Body = tuple[float, float, float, float]  # m, k, c, f
 CRITICAL = 2.0 * math.sqrt(15.0)
@@ -77,7 +78,9 @@ def root(
     work = np.zeros(len(Work), dtype=np.int64)
     flights = launch(rows[0], x, v), launch(rows[1], x_o, v_o)
     start = sign * (x - x_o), sign * (v - v_o)
-    return flight_root(kind, *rows, *flights, start, sign, inverse_p, span, work), int(work[Work.ROOT_ITERATIONS])
+    pace = fastest_rate(np.array([*rows, rows[1]]))
+    found = flight_root(kind, *rows, *flights, start, sign, inverse_p, pace, span, work)
+    return found, int(work[Work.ROOT_ITERATIONS])
 
 
 @pytest.mark.parametrize("t", [0.0, 0.4])

@@ -17,7 +17,7 @@ from grasp_ros.physics.system import COLUMN, System
 
 FLAGS = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
 EPS = 2.220446049250313e-16
-ROUNDING = 1e-12  # part of the energy that rounding may add in one control period
+ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
 
 class Energy(NamedTuple):
@@ -102,8 +102,7 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     work: Array = np.zeros(np.shape(before)[:-1])
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
-        # in contact an arm is where the object is and the gap ends, with the roundings of some hundred steps
-        rounding = rounding + 64.0 * EPS * np.abs(forces[..., body]) * _place(system, body, after)
+        rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _place(system, body, after)
     return Ledger(levels[1] - levels[0], work, rounding)
 
 

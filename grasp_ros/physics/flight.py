@@ -21,6 +21,7 @@ from grasp_ros.physics.layout import DAMPING, FORCE, LANES, LEFT, MASS, OBJECT, 
 EPS = 2.220446049250313e-16
 DRIFT, UNDER, NEAR, OVER = 0.0, 1.0, 2.0, 3.0  # regimes of the closed form
 MAX_ITERATIONS = 10_000_000
+PROBE = 1e-3  # part of the time constants within which the first derivative that differs decides
 FLIGHT_ORDER = 16  # (1/2)^16 / 16! is below rounding, see `expand_flight`
 # Typed integers: numba would compile the search once per literal kind.
 TOUCH_ROOT, RELEASE_ROOT, REENTRY_ROOT = np.int64(0), np.int64(1), np.int64(2)
@@ -110,6 +111,13 @@ def displacement(flight: Any, t: float) -> float:
 
 
 @kernel
+def parting(arm: Any, x: float, v: float, body: Any, x_o: float, v_o: float, t: float) -> float:
+    """By how much an arm and the object part within t, at most PROBE time constants; 0 where rounding decides."""
+    far, far_o = displacement(launch(arm, x, v), t), displacement(launch(body, x_o, v_o), t)
+    return far - far_o if abs(far - far_o) > 4.0 * EPS * (abs(far) + abs(far_o)) else 0.0
+
+
+@kernel
 def expand_flight(bodies: Any, flights: Any, t: float, c: Any) -> None:
     """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
 
@@ -181,7 +189,7 @@ def envelope_step(arm: Any, body: Any, x: float, v: float, x_o: float, v_o: floa
 
 @kernel
 def flight_root(kind: int, arm: Any, body: Any, arm_flight: Any, object_flight: Any, start: Any, sign: float,
-                inverse_p: float, span: float, work: Any) -> float:
+                inverse_p: float, pace: float, span: float, work: Any) -> float:
     """First time in (0, span] at which a pair in free flight switches; inf if there is none.
 
     Parameters
@@ -194,11 +202,20 @@ def flight_root(kind: int, arm: Any, body: Any, arm_flight: Any, object_flight: 
         u and u' at the start, exact where the positions are not.
     inverse_p : float
         1/p, only used by REENTRY_ROOT.
+    pace : float, 1/s
+        See `switching.fastest_rate`. A pair that parts from rest at u = 0 does not come back within a part of it.
     """
     t = 0.0
     u, d = start
     x, v = arm_flight[1], arm_flight[2]
     x_o, v_o = object_flight[1], object_flight[2]
+    if kind == TOUCH_ROOT and u == 0.0 and d == 0.0:
+        t = PROBE / pace if pace > 0.0 else span
+        if t >= span or parting(arm, x, v, body, x_o, v_o, t) == 0.0:
+            return math.inf
+        x, v = fly(arm_flight, t)
+        x_o, v_o = fly(object_flight, t)
+        u, d = sign * (x - x_o), sign * (v - v_o)
     for _ in range(MAX_ITERATIONS):
         work[3] += 1
         a = (arm[FORCE] - arm[STIFFNESS] * x - arm[DAMPING] * v) / arm[MASS]

@@ -22,11 +22,11 @@ from grasp_ros.physics.layout import (
     X_O,
     X_R,
 )
-from grasp_ros.physics.switching import ABSENT
+from grasp_ros.physics.switching import ABSENT, CONTACT, reduced_mass, scales
 
 UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
-ROUNDINGS = 32.0  # of the sum of all terms: flights, impacts and differences of positions
-NEGLECTED = 200.0  # of it times the accuracy: a contact step may be off by 100 of its first neglected terms
+ROUNDINGS = 128.0  # of the sum of all terms: flights, impacts and differences of positions
+NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
 
 
 @kernel
@@ -63,8 +63,17 @@ def energy_level(bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, t: f
 
 
 @kernel
-def may_rise(bodies: Any, size: float, tolerance: float) -> float:
-    """By how much the level may rise in one segment; without limit where a feedback drives an arm, c + Kv < 0."""
-    if bodies[LEFT, DAMPING] < 0.0 or bodies[RIGHT, DAMPING] < 0.0:
-        return math.inf
-    return (ROUNDINGS * EPS + NEGLECTED * tolerance) * size + UNDERFLOW
+def rises(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, rise: float, size: float, tolerance: float) -> bool:
+    """Whether a rise of the level in one segment is more than rounding and the accuracy explain.
+
+    Steps in contact are as accurate as the impact is large that they are part of, which is looked at if need be.
+    Where a feedback drives an arm (c + Kv < 0) energy may come.
+    """
+    allowed = ROUNDINGS * EPS + NEGLECTED * tolerance
+    if not rise > allowed * size + UNDERFLOW or bodies[LEFT, DAMPING] < 0.0 or bodies[RIGHT, DAMPING] < 0.0:
+        return False
+    for side in (LEFT, RIGHT):
+        if mode[side] == CONTACT:
+            _, v = scales(bodies, pairs, y, mode, side, pace)
+            size += 2.0 * reduced_mass(bodies, side) * v * v
+    return rise > allowed * size

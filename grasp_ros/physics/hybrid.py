@@ -20,7 +20,7 @@ from grasp_ros.physics.flight import (
     launch,
 )
 from grasp_ros.physics.friction import FREE, STUCK, TRUE_MASS, fire_slide, flight_stop, judge_slide
-from grasp_ros.physics.guard import energy_level, may_rise
+from grasp_ros.physics.guard import energy_level, rises
 from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -57,6 +57,7 @@ from grasp_ros.physics.switching import (
     fastest_rate,
     fire,
     hold_time,
+    press,
     record,
     relative_motion,
     resume,
@@ -69,8 +70,8 @@ MAX_IDLE = 1000  # segments without progress in time
 
 
 @kernel
-def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: Any, body: Any, span: float,
-                  work: Any) -> Any:
+def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: Any, body: Any, pace: float,
+                  span: float, work: Any) -> Any:
     """Time and kind of one pair's first event in a flight of at most `span`."""
     sign = 1.0 if side == LEFT else -1.0
     d, _ = relative_motion(bodies, y, side)
@@ -78,11 +79,12 @@ def flight_switch(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, arm: An
     if mode[side] == HELD or mode[side] == ABSENT:
         return math.inf, TOUCH
     if mode[side] == OPEN:
-        return flight_root(TOUCH_ROOT, bodies[side], bodies[OBJECT], arm, body, start, sign, 0.0, span, work), TOUCH
-    released = flight_root(RELEASE_ROOT, bodies[side], bodies[OBJECT], arm, body, start, sign, 0.0, span, work)
+        touched = flight_root(TOUCH_ROOT, bodies[side], bodies[OBJECT], arm, body, start, sign, 0.0, pace, span, work)
+        return touched, TOUCH
+    released = flight_root(RELEASE_ROOT, bodies[side], bodies[OBJECT], arm, body, start, sign, 0.0, pace, span, work)
     if mode[side] == CLAMPED:
         back = flight_root(REENTRY_ROOT, bodies[side], bodies[OBJECT], arm, body, start, sign,
-                           1.0 / pairs[side, DISSIPATION], min(span, released), work)
+                           1.0 / pairs[side, DISSIPATION], pace, min(span, released), work)
         if not back >= released:
             return back, REENTRY
     return released, RELEASE
@@ -134,8 +136,8 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, 
         launch(bodies[RIGHT], y[X_R], y[V_R]),
         launch(bodies[OBJECT], y[X_O], y[V_O]),
     )
-    t_l, kind_l = flight_switch(bodies, pairs, y, mode, LEFT, flights[LEFT], flights[OBJECT], span, work)
-    t_r, kind_r = flight_switch(bodies, pairs, y, mode, RIGHT, flights[RIGHT], flights[OBJECT], span, work)
+    t_l, kind_l = flight_switch(bodies, pairs, y, mode, LEFT, flights[LEFT], flights[OBJECT], pace, span, work)
+    t_r, kind_r = flight_switch(bodies, pairs, y, mode, RIGHT, flights[RIGHT], flights[OBJECT], pace, span, work)
     if math.isnan(t_l) or math.isnan(t_r):
         return math.nan
     t_o = flight_stop(bodies, y, mode)
@@ -196,13 +198,15 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
     pace = fastest_rate(bodies)
     if mode[LEFT] == UNKNOWN:
         mode[OBJECT] = FREE
-        classify(bodies, pairs, y, mode)
+        classify(bodies, pairs, y, mode, pace)
         judge_slide(bodies, pairs, friction, y, mode)
-        classify(bodies, pairs, y, mode)  # a pair at rest at u = 0 moves as friction lets it
+        classify(bodies, pairs, y, mode, pace)  # a pair at rest at u = 0 moves as friction lets it
     stuck = mode[OBJECT] == STUCK
     judge_slide(bodies, pairs, friction, y, mode)
     if stuck and mode[OBJECT] != STUCK:  # other forces act from here on
         record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
+    for side in (LEFT, RIGHT):
+        press(bodies, pairs, y, mode, side, pace, clock[0], events, filled)
     idle = 0
     level, size = energy_level(bodies, pairs, friction, y, mode, 0.0)
     while True:
@@ -219,7 +223,7 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             return EVENTS_FULL
         if work[0] + work[1] + work[3] >= max_work:
             return WORK_USED
-        settle(bodies, pairs, y, mode, pace, tolerance)
+        settle(bodies, pairs, y, mode, pace, tolerance, clock[0], events, filled)
         held_l, held_r = mode[LEFT] == HELD, mode[RIGHT] == HELD
         if held_l:
             limit = min(limit, hold_time(bodies, pairs, y, mode, LEFT, pace, tolerance))
@@ -232,9 +236,9 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             t = flight_segment(tables, bodies, pairs, friction, y, mode, pace, clock, limit, grid, out, events,
                                filled, work)
         if held_l:
-            resume(bodies, pairs, y, mode, LEFT, pace, tolerance)
+            resume(bodies, pairs, y, mode, LEFT, pace, tolerance, clock[0], events, filled)
         if held_r:
-            resume(bodies, pairs, y, mode, RIGHT, pace, tolerance)
+            resume(bodies, pairs, y, mode, RIGHT, pace, tolerance, clock[0], events, filled)
         idle = 0 if t > 0.0 else idle + 1
         before, size_before = level, size
         level, size = energy_level(bodies, pairs, friction, y, mode, t)
@@ -243,8 +247,10 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             outcome = NOT_FINITE
         elif math.isnan(t) or idle > MAX_IDLE:
             outcome = STALLED
-        elif level - before > may_rise(bodies, max(size, size_before), tolerance):
-            outcome = ENERGY_RISES
+        elif not (held_l or held_r):  # what a held pair has not paid yet comes at once
+            size_before = max(size, size_before)
+            if rises(bodies, pairs, y, mode, pace, level - before, size_before, tolerance):
+                outcome = ENERGY_RISES
         if outcome != DONE:
             filled[GRID] = row
             return outcome

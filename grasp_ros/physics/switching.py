@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from grasp_ros.physics.flight import EPS
+from grasp_ros.physics.flight import EPS, PROBE, parting
 from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -29,7 +29,7 @@ from grasp_ros.physics.layout import (
 OPEN, CONTACT, CLAMPED, LEAVING, HELD, ABSENT = (int(p) for p in Pair)
 TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = (int(e) for e in Event)
 GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
-SPARE = 3  # events that one segment can have: one per pair, and one of the object
+SPARE = 8  # events that one segment can have: three per pair, and two of the object
 UNKNOWN = -1  # mode of a pair before the first call
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
 
@@ -46,28 +46,49 @@ def relative_motion(bodies: Any, y: Any, side: int) -> Any:
 
 
 @kernel
-def judge(bodies: Any, pairs: Any, y: Any, side: int, other_in_contact: bool) -> int:
-    """Mode of a pair from its state alone: condition (10), and at u = 0 the direction of the motion."""
+def judge(bodies: Any, pairs: Any, y: Any, side: int, pace: float, other_in_contact: bool) -> int:
+    """Mode of a pair from its state alone: condition (10), and at u = 0 the direction of the motion.
+
+    At rest there the first derivative that differs decides. Gravity, for one, pulls both bodies alike.
+    """
     if pairs[side, HERTZ] == 0.0:
         return ABSENT
     u = y[U_L + side]
-    d, a = relative_motion(bodies, y, side)
+    d, _ = relative_motion(bodies, y, side)
     if u < 0.0:
         return OPEN
     if u > 0.0:
         return CONTACT if 1.0 + pairs[side, DISSIPATION] * d >= 0.0 else CLAMPED
     if d == 0.0:
-        return HELD if a > 0.0 or (a == 0.0 and other_in_contact) else OPEN
+        lean = leaning(bodies, y, side, pace)
+        return HELD if lean > 0.0 or (lean == 0.0 and other_in_contact) else OPEN
     return CONTACT if d > 0.0 else OPEN
 
 
 @kernel
-def classify(bodies: Any, pairs: Any, y: Any, mode: Any) -> None:
+def leaning(bodies: Any, y: Any, side: int, pace: float) -> float:
+    """u of a pair at rest at u = 0 a little later, in any unit: its sign tells whether it is pressed together."""
+    x, v, sign = (y[X_L], y[V_L], 1.0) if side == LEFT else (y[X_R], y[V_R], -1.0)
+    return sign * parting(bodies[side], x, v, bodies[OBJECT], y[X_O], y[V_O], PROBE / pace if pace > 0.0 else 1.0)
+
+
+@kernel
+def classify(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float) -> None:
     """Modes of both pairs for a run that starts at y."""
-    mode[LEFT] = judge(bodies, pairs, y, LEFT, False)
-    mode[RIGHT] = judge(bodies, pairs, y, RIGHT, mode[LEFT] == CONTACT)
+    mode[LEFT] = judge(bodies, pairs, y, LEFT, pace, False)
+    mode[RIGHT] = judge(bodies, pairs, y, RIGHT, pace, mode[LEFT] == CONTACT)
     if mode[LEFT] == OPEN and mode[RIGHT] == CONTACT:
-        mode[LEFT] = judge(bodies, pairs, y, LEFT, True)
+        mode[LEFT] = judge(bodies, pairs, y, LEFT, pace, True)
+
+
+@kernel
+def press(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, now: float, events: Any,
+          filled: Any) -> None:
+    """A pair that rests at u = 0 touches if what acts now presses it together."""
+    if mode[side] == OPEN and y[U_L + side] == 0.0 and relative_motion(bodies, y, side)[0] == 0.0:
+        mode[side] = judge(bodies, pairs, y, side, pace, mode[1 - side] == CONTACT)
+        if mode[side] != OPEN:
+            record(now, side, TOUCH, 0.0, 0.0, events, filled)
 
 
 @kernel
@@ -101,7 +122,7 @@ def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float) -
         w, v = impact_scales(pairs[other, HERTZ], reduced_mass(bodies, other), y[U_L + other],
                              relative_motion(bodies, y, other)[0], 0.0)
         if w > 0.0:
-            a = max(a, 0.0) + v * v / (w * w)
+            a = max(a, 0.0) + v * v / (w * w) * (reduced_mass(bodies, other) / bodies[OBJECT, MASS])
     w, v = impact_scales(pairs[side, HERTZ], reduced_mass(bodies, side), y[U_L + side], d, a)
     if pace > 0.0:
         reach = root_of_two(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / pace) / pace), 2)
@@ -143,31 +164,35 @@ def hold_time(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float
     """
     d, _ = relative_motion(bodies, y, side)
     w, v = scales(bodies, pairs, y, mode, side, pace)
-    if w == 0.0 or v == 0.0:  # nothing presses it together
-        return 0.0
+    if w == 0.0 or v == 0.0:  # only a higher derivative presses it together
+        return PROBE / pace if pace > 0.0 else 0.0
     return min((sliver(tolerance) if d > 0.0 else 0.3 * tolerance**0.25) * w * w / v, 0.5 / pace)
 
 
 @kernel
-def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, tolerance: float) -> None:
+def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, tolerance: float, now: float,
+           events: Any, filled: Any) -> None:
     """End the hold of a pair, unless it is still so shallow that its force is below rounding."""
     w, _ = scales(bodies, pairs, y, mode, side, pace)
     d, _ = relative_motion(bodies, y, side)
     u = y[U_L + side]
     if d <= 0.0 or u < 0.0 or u > 1e-3 * sliver(tolerance) * w * w:
-        mode[side] = judge(bodies, pairs, y, side, mode[1 - side] == CONTACT)
+        mode[side] = judge(bodies, pairs, y, side, pace, mode[1 - side] == CONTACT)
+        if mode[side] == OPEN:
+            record(now, side, RELEASE, y[U_L + side], d, events, filled)
 
 
 @inlined
-def settle(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, tolerance: float) -> None:
+def settle(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, tolerance: float, now: float, events: Any,
+           filled: Any) -> None:
     """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time.
 
     At a simultaneous touch both are held for a sliver; at a simultaneous release both leave a sliver early. A pair
     that rests at u = 0 is held when the other one begins to push.
     """
     for side in (LEFT, RIGHT):
-        if mode[side] == OPEN and y[U_L + side] == 0.0 and mode[1 - side] == CONTACT:
-            mode[side] = judge(bodies, pairs, y, side, True)
+        if mode[1 - side] == CONTACT:
+            press(bodies, pairs, y, mode, side, pace, now, events, filled)
     if mode[LEFT] != CONTACT or mode[RIGHT] != CONTACT:
         return
     shallow = sliver(tolerance)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -128,11 +129,12 @@ def _loop(options: argparse.Namespace) -> int:
 
     options.prepare()
     scene = scenes.load(options.scene, options.settings)
+    left, right = scene.grasp.left, scene.grasp.right
     periods = () if options.no_graph else loop.GRAPH_PERIODS_MS
     points = loop.run(scene, options.output, periods)
     print(loop.report(points))
     figures.control_period(points, scene.name, options.output / "control_period.png")
-    for name, arm in (("left", scene.grasp.left), ("right", scene.grasp.right)):
+    for name, arm in (("left", left), ("right", right)):
         found = stability.limits(arm)
         print("\n" + stability.report(f"{name} arm", found))
         figures.stability(*stability.curves(arm, found), options.output / f"stability_{name}.png")
@@ -194,6 +196,10 @@ def _hard(options: argparse.Namespace) -> int:
 def _fuzz(options: argparse.Namespace) -> int:
     from grasp_ros.hard import fuzz
 
+    if not (math.isfinite(options.seconds) and options.seconds > 0.0):
+        raise ValueError(f"--seconds {options.seconds!r} is not allowed; allowed: a number > 0")
+    if options.seed < 0:
+        raise ValueError(f"--seed {options.seed} is not allowed; allowed: a whole number >= 0")
     options.prepare()
     return 1 if fuzz.run(options.seconds, options.seed, options.output) else 0
 
