@@ -85,10 +85,11 @@ def test_the_budget_of_work_ends_a_run(monkeypatch: pytest.MonkeyPatch, breath: 
     assert 0 < len(run.t) < 2001
 
 
-def test_a_run_that_takes_breath_gives_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = simulate(scenes.load("case_02"))
+@pytest.mark.parametrize("name", ["case_02", "friction", "friction_slide"])
+def test_a_run_that_takes_breath_gives_the_same_bits(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    whole = simulate(scenes.load(name))
     monkeypatch.setattr(integrator, "BREATH", 7)
-    pieces = simulate(scenes.load("case_02"))
-    assert np.array_equal(pieces.state, whole.state)
-    assert np.array_equal(pieces.switches, whole.switches)
-    assert np.array_equal(pieces.work, whole.work)
+    pieces = simulate(scenes.load(name))
+    np.testing.assert_array_equal(pieces.state, whole.state)
+    np.testing.assert_array_equal(pieces.switches, whole.switches)
+    np.testing.assert_array_equal(pieces.work, whole.work)

@@ -19,7 +19,7 @@ from grasp_ros.physics.flight import (
     fly,
     launch,
 )
-from grasp_ros.physics.friction import FREE, STUCK, TRUE_MASS, fire_slide, flight_stop, judge_slide
+from grasp_ros.physics.friction import FREE, STUCK, TRUE_MASS, fire_slide, flight_stop, judge_slide, rub
 from grasp_ros.physics.guard import energy_level, rises
 from grasp_ros.physics.jit import inlined, kernel
 from grasp_ros.physics.layout import (
@@ -201,12 +201,15 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
         classify(bodies, pairs, y, mode, pace)
         judge_slide(bodies, pairs, friction, y, mode)
         classify(bodies, pairs, y, mode, pace)  # a pair at rest at u = 0 moves as friction lets it
-    stuck = mode[OBJECT] == STUCK
-    judge_slide(bodies, pairs, friction, y, mode)
-    if stuck and mode[OBJECT] != STUCK:  # other forces act from here on
-        record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
-    for side in (LEFT, RIGHT):
-        press(bodies, pairs, y, mode, side, pace, clock[0], events, filled)
+    if clock[0] == 0.0:  # other forces may act from here on
+        stuck = mode[OBJECT] == STUCK
+        judge_slide(bodies, pairs, friction, y, mode)
+        if stuck and mode[OBJECT] != STUCK:
+            record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
+        for side in (LEFT, RIGHT):
+            press(bodies, pairs, y, mode, side, pace, clock[0], events, filled)
+    else:
+        rub(bodies, friction, mode)
     idle = 0
     level, size = energy_level(bodies, pairs, friction, y, mode, 0.0)
     while True:
