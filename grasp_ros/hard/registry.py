@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from grasp_ros.hard import flights, horizons, impacts, loops, relations, rest, switching, touches
+from grasp_ros.hard import flights, found, horizons, impacts, loops, relations, rest, switching, touches
 from grasp_ros.hard.case import Case
 
 
 @lru_cache(maxsize=1)
 def cases() -> tuple[Case, ...]:
     """Every case, family by family."""
-    files = (impacts, touches, switching, rest, flights, horizons, loops, relations)
-    found = [case for file in files for case in file.cases()]
-    families = list(dict.fromkeys(case.family for case in found))
-    return tuple(sorted(found, key=lambda case: families.index(case.family)))
+    files = (impacts, touches, switching, rest, flights, horizons, loops, relations, found)
+    every = [case for file in files for case in file.cases()]
+    families = list(dict.fromkeys(case.family for case in every))
+    return tuple(sorted(every, key=lambda case: families.index(case.family)))
