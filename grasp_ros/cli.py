@@ -63,6 +63,7 @@ def _parser() -> argparse.ArgumentParser:
     add("methods", _methods, "list the methods of integration: order, source, what each does at a touch")
     sub = add("simulate", _simulate, "simulate a scene without ROS")
     _add_scene(sub)
+    _add_accuracy(sub)
     sub.add_argument("--grid", type=_whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     _add_method(sub)
@@ -73,6 +74,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")
     sub = add("run", _run, "run a scene in four ROS 2 processes and record a bag")
     _add_scene(sub)
+    _add_accuracy(sub)
     sub.add_argument("-o", "--output", type=Path, metavar="DIRECTORY", help="new directory for the scene and the bag")
     sub = add("inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
@@ -91,7 +93,6 @@ def _add_scene(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--set", dest="settings", action="append", default=[], metavar="section.key=value", help="replace a number"
     )
-    _add_accuracy(sub)
 
 
 def _add_accuracy(sub: argparse.ArgumentParser) -> None:

@@ -208,5 +208,5 @@ def _graph(options: argparse.Namespace) -> int:
     from grasp_ros.studies import graph
 
     options.prepare()
-    graph.run(scenes.load(options.scene, options.settings), options.accuracy)
+    graph.run(scenes.load(options.scene, options.settings))
     return 0

@@ -17,6 +17,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from grasp_ros.graph import Graph
+from grasp_ros.physics.integrator import ACCURACY
 from grasp_ros.scene import Scene
 from grasp_ros.versions import versions
 
@@ -25,7 +26,7 @@ RUN_SECONDS = 300.0
 SPEED = re.compile(r"(\d+(?:\.\d+)?) ticks/s")
 
 
-def run(scene: Scene, accuracy: float) -> None:
+def run(scene: Scene) -> None:
     """Print ticks per second of both graphs and their ratio.
 
     Raises
@@ -36,7 +37,7 @@ def run(scene: Scene, accuracy: float) -> None:
     bare, ours = [], []
     for _ in tqdm(range(REPEATS), desc="pairs of runs", unit="pair"):
         bare.append(bare_speed(scene.ticks))
-        ours.append(our_speed(scene, accuracy))
+        ours.append(our_speed(scene))
     ratios = [mine / theirs for mine, theirs in zip(ours, bare, strict=True)]
     print(f"{scene.title}, {scene.ticks} ticks in lockstep, {REPEATS} pairs of runs, {os.cpu_count()} processors")
     print(", ".join(f"{name} {version}" for name, version in versions().items()))
@@ -49,10 +50,10 @@ def run(scene: Scene, accuracy: float) -> None:
         print(f"{name:<34} median {median:.4g}{unit}, {low:.4g} to {high:.4g}")
 
 
-def our_speed(scene: Scene, accuracy: float) -> float:
+def our_speed(scene: Scene) -> float:
     """Ticks per second of the whole graph with physics, monitor and bag."""
     with tempfile.TemporaryDirectory() as directory:
-        graph = Graph(scene, Path(directory) / "run", accuracy, errors=subprocess.PIPE)
+        graph = Graph(scene, Path(directory) / "run", ACCURACY, errors=subprocess.PIPE)
         graph.start()
         try:
             graph.wait([])

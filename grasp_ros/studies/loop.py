@@ -16,7 +16,6 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.physics.integrator import ACCURACY
 from grasp_ros.scene import Scene
 from grasp_ros.studies import graph
 from grasp_ros.studies.records import Journal, origin, scene_key
@@ -73,7 +72,7 @@ def _measure(scene: Scene, period_ms: float, grid: Any, ideal: Any, with_graph: 
         ticks = f"time.duration_s={TICKS * round(period_ms * 1e6) / 1e9!r}"
         short = scenes.parse(sampled.to_yaml(), scene.name, scene.name, [ticks])
         per_tick = 1e3 / period_ms  # ticks per simulated second
-        pairs = [(graph.bare_speed(TICKS), graph.our_speed(short, ACCURACY)) for _ in range(PAIRS)]
+        pairs = [(graph.bare_speed(TICKS), graph.our_speed(short)) for _ in range(PAIRS)]
         bare, four = (per_tick / max(speeds) for speeds in zip(*pairs, strict=True))
     return Point(period_ms, float(np.abs(state - ideal)[:, ::2].max()), one, four, bare)
 
