@@ -164,6 +164,31 @@ def flight_segment(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, 
 
 
 @kernel
+def enter(bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, clock: Any, events: Any, filled: Any) -> float:
+    """Judge all modes by the state and the forces at the begin of a piece of time; returns the bodies' `fastest_rate`.
+
+    A piece that goes on after it has handed over its events keeps its modes.
+    """
+    bodies[OBJECT, MASS] = friction[TRUE_MASS]
+    pace = fastest_rate(bodies)
+    if mode[LEFT] == UNKNOWN:
+        mode[OBJECT] = FREE
+        classify(bodies, pairs, y, mode, pace)
+        judge_slide(bodies, pairs, friction, y, mode)
+        classify(bodies, pairs, y, mode, pace)  # a pair at rest at u = 0 moves as friction lets it
+    if clock[0] > 0.0:
+        rub(bodies, friction, mode)
+        return pace
+    stuck = mode[OBJECT] == STUCK
+    judge_slide(bodies, pairs, friction, y, mode)
+    if stuck and mode[OBJECT] != STUCK:
+        record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
+    for side in (LEFT, RIGHT):
+        press(bodies, pairs, y, mode, side, pace, clock[0], events, filled)
+    return pace
+
+
+@kernel
 def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, clock: Any, span: float,
             tolerance: float, max_work: int, grid: Any, out: Any, events: Any, filled: Any, work: Any) -> int:
     """Integrate y in place from the clock to `span` with constant forces; returns a `layout.Outcome`.
@@ -194,22 +219,7 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
     If it ends otherwise than DONE or with EVENTS_FULL, `out` holds nothing of the segment that failed.
     """
     n = tables.row.shape[0] - 1
-    bodies[OBJECT, MASS] = friction[TRUE_MASS]
-    pace = fastest_rate(bodies)
-    if mode[LEFT] == UNKNOWN:
-        mode[OBJECT] = FREE
-        classify(bodies, pairs, y, mode, pace)
-        judge_slide(bodies, pairs, friction, y, mode)
-        classify(bodies, pairs, y, mode, pace)  # a pair at rest at u = 0 moves as friction lets it
-    if clock[0] == 0.0:  # other forces may act from here on
-        stuck = mode[OBJECT] == STUCK
-        judge_slide(bodies, pairs, friction, y, mode)
-        if stuck and mode[OBJECT] != STUCK:
-            record(clock[0], OBJECT, SLIP, 0.0, 0.0, events, filled)
-        for side in (LEFT, RIGHT):
-            press(bodies, pairs, y, mode, side, pace, clock[0], events, filled)
-    else:
-        rub(bodies, friction, mode)
+    pace = enter(bodies, pairs, friction, y, mode, clock, events, filled)
     idle = 0
     level, size = energy_level(bodies, pairs, friction, y, mode, 0.0)
     while True:
@@ -243,6 +253,7 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
         if held_r:
             resume(bodies, pairs, y, mode, RIGHT, pace, tolerance, clock[0], events, filled)
         idle = 0 if t > 0.0 else idle + 1
+        held = held_l or held_r  # what a held pair has not paid yet comes at once
         before, size_before = level, size
         level, size = energy_level(bodies, pairs, friction, y, mode, t)
         outcome = DONE
@@ -250,10 +261,8 @@ def advance(tables: Any, bodies: Any, pairs: Any, friction: Any, y: Any, mode: A
             outcome = NOT_FINITE
         elif math.isnan(t) or idle > MAX_IDLE:
             outcome = STALLED
-        elif not (held_l or held_r):  # what a held pair has not paid yet comes at once
-            size_before = max(size, size_before)
-            if rises(bodies, pairs, y, mode, pace, level - before, size_before, tolerance):
-                outcome = ENERGY_RISES
+        elif not held and rises(bodies, pairs, y, mode, pace, level - before, max(size, size_before), tolerance):
+            outcome = ENERGY_RISES
         if outcome != DONE:
             filled[GRID] = row
             return outcome
