@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from grasp_ros.hard import properties
+from grasp_ros import scene as scenes
+from grasp_ros.hard import fuzz, properties
 from grasp_ros.hard.case import Product, Unfinished
 from grasp_ros.hard.draw import NUMBERS, draw_scene
 from grasp_ros.hard.impacts import impact_error
@@ -85,3 +87,19 @@ def test_elastic_motion_runs_backwards(hertz: float, mass: float, v_l: float, v_
     scene = grasp([-0.3, v_l, 0.05, v_o, 0.3, 0.2], 1.0, left=ELASTIC, contact=Contact(10.0**hertz, 0.0),
                   mass=10.0**mass)
     assert reversal(scene, Product()) < 1e-9
+
+
+def test_fuzzing_counts_failures_and_writes_their_scenes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The same scene over and over, first as it is, then at the coarsest accuracy."""
+    scene = scenes.load("case_03", ["time.duration_s=5", "time.control_period_s=5"])
+    monkeypatch.setattr(fuzz, "draw_scene", lambda numbers: scene)
+    assert fuzz.run(0.5, 0, tmp_path) == 0
+    monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
+    failures = fuzz.run(0.5, 0, tmp_path)
+    assert failures > 0
+    assert capsys.readouterr().out.endswith(f"failures: {failures}\n")
+    files = list(tmp_path.glob("*.yaml"))
+    assert len(files) == failures
+    assert all(scenes.load(str(file)).values == scene.values for file in files)
