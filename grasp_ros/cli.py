@@ -200,8 +200,7 @@ def _run(options: argparse.Namespace) -> int:
     whole = True
     if not received:
         comparison = report.compare_recording(recording, options.accuracy)
-        alarmed = recording.alarms > 0
-        whole = comparison.equal and not alarmed and not any(recording.missing.values())
+        whole = comparison.equal and not recording.alarms and not any(recording.missing.values())
         figure = directory / "figure.png"
         plots.draw(recording, figure, scene.feedback_in_words(sampled=True))
         rows += [*comparison.rows, ("figure", str(figure))]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import partial
+from collections.abc import Callable
+from functools import cache, partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -70,10 +71,11 @@ def checks(scene: Scene, compare: bool = False) -> list[Check]:
         found += _relations(scene, run)
     if scene.values.keys() != PAPER or _pushed(scene):
         return found
+    growth = cache(partial(sensitivity, scene, run))  # two more runs, for up to three properties
     if run.work[Work.CONTACT_STEPS] < WORK_STEPS:
-        found += [*_splitting(scene, run), *_backwards(scene, run), *_balances(scene, run)]
+        found += [*_splitting(scene, run, growth), *_backwards(scene, run, growth), *_balances(scene, run)]
     if compare and run.work[Work.CONTACT_STEPS] < REFERENCE_STEPS:
-        found += _reference(scene, run)
+        found += _reference(scene, run, growth)
     return found
 
 
@@ -158,7 +160,12 @@ def _relations(scene: Scene, run: Trajectory) -> list[Check]:
     return found
 
 
-def _splitting(scene: Scene, run: Trajectory) -> list[Check]:
+def _divergence(run: Trajectory) -> float:
+    """What rounding at every switch may come to before the scene amplifies it."""
+    return SPLIT * (1 + len(run.switches))
+
+
+def _splitting(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
     """Two horizons like one, as far as neither the start nor the middle is forgotten."""
     half = round(scene.duration / 2.0, 9)
     if not 1e-8 < half < 500.0:
@@ -169,11 +176,10 @@ def _splitting(scene: Scene, run: Trajectory) -> list[Check]:
     rest = started(rest, product.states(first, [half])[0])
     again = product.run(rest, [rest.duration])
     figure = float((np.abs(again.state[-1] - run.state[-1]) / _sizes(run.state)).max())
-    growth = max(sensitivity(scene, run), sensitivity(rest, again))
-    return [Check("splitting", figure, SPLIT * (1 + len(run.switches)) * growth)]
+    return [Check("splitting", figure, _divergence(run) * max(growth(), sensitivity(rest, again)))]
 
 
-def _backwards(scene: Scene, run: Trajectory) -> list[Check]:
+def _backwards(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
     """A motion without losses, run backwards, ends where it began."""
     bodies, pairs = scene.system.closed_loop, scene.system.pairs
     if bodies[:, DAMPING].any() or pairs[:, DISSIPATION].any():
@@ -181,11 +187,10 @@ def _backwards(scene: Scene, run: Trajectory) -> list[Check]:
     back = started(scene, run.state[-1] * FLIP)
     way = _product().run(back, [back.duration])
     figure = float((np.abs(way.state[-1] * FLIP - scene.initial_state) / _sizes(run.state)).max())
-    growth = max(sensitivity(scene, run), sensitivity(back, way))
-    return [Check("time reversal", figure, SPLIT * (1 + len(run.switches)) * growth)]
+    return [Check("time reversal", figure, _divergence(run) * max(growth(), sensitivity(back, way)))]
 
 
-def _reference(scene: Scene, run: Trajectory) -> list[Check]:
+def _reference(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
     """The end by another method, in 25 digits."""
     try:
         with deadline(REFERENCE_SECONDS):
@@ -193,7 +198,7 @@ def _reference(scene: Scene, run: Trajectory) -> list[Check]:
     except (Deadline, RuntimeError):
         return []
     figure = float((np.abs(run.state[-1] - expected) / _sizes(run.state)).max())
-    return [Check("reference", figure, SPLIT * (1 + len(run.switches)) * sensitivity(scene, run))]
+    return [Check("reference", figure, _divergence(run) * growth())]
 
 
 def _balances(scene: Scene, run: Trajectory) -> list[Check]:

@@ -90,15 +90,13 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     levels = []
     rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):
-        level = _own_energy(system, state)
+        level, size = _own_energy(system, state)
         for side, u, _ in _pairs(system, state):
             force = hertz_force(Contact(*system.pairs[side]), u)
             level = level + 0.8 * force * u
-            rounding = rounding + 8.0 * EPS * force * (
-                np.abs(state[..., COLUMN[side]]) + np.abs(state[..., COLUMN[OBJECT]])
-            )
+            rounding = rounding + 8.0 * EPS * force * _place(system, side, state)
         levels.append(level)
-        rounding = rounding + ROUNDING * _size(system, state)
+        rounding = rounding + ROUNDING * size
     work: Array = np.zeros(np.shape(before)[:-1])
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
@@ -121,24 +119,19 @@ def _mechanical(system: System, bodies: Array, state: Array) -> Array:
     return kinetic + potential
 
 
-def _own_energy(system: System, state: Array) -> Array:
-    """Twice the energy of the bodies by themselves; k x^2 - 2 f x, because (f / k)^2 may be large beside it."""
+def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
+    """Twice the energy of the bodies by themselves, and the sum of the sizes of its terms.
+
+    k x^2 - 2 f x, because (f / k)^2 may be large beside it.
+    """
     total: Array = np.zeros(np.shape(state)[:-1])
+    size: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
         x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
         mass, stiffness, _, force = system.bodies[body]
         total = total + mass * v * v + stiffness * x * x - 2.0 * force * x
-    return total
-
-
-def _size(system: System, state: Array) -> Array:
-    """Sum of the sizes of the terms of `_own_energy`."""
-    total: Array = np.zeros(np.shape(state)[:-1])
-    for body in system.present:
-        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
-        mass, stiffness, _, force = system.bodies[body]
-        total = total + mass * v * v + (stiffness * np.abs(x) + 2.0 * np.abs(force)) * _place(system, body, state)
-    return total
+        size = size + mass * v * v + (stiffness * np.abs(x) + 2.0 * np.abs(force)) * _place(system, body, state)
+    return total, size
 
 
 def _place(system: System, body: int, state: Array) -> Array:
