@@ -40,11 +40,11 @@ setup(
     },
     entry_points={
         "console_scripts": [
-            "plant = grasp_ros.nodes.start:plant",
-            "left_controller = grasp_ros.nodes.start:left_controller",
-            "right_controller = grasp_ros.nodes.start:right_controller",
-            "monitor = grasp_ros.nodes.start:monitor",
-            "grasp = grasp_ros.cli:main",
+            "plant = grasp_ros.graph.nodes.start:plant",
+            "left_controller = grasp_ros.graph.nodes.start:left_controller",
+            "right_controller = grasp_ros.graph.nodes.start:right_controller",
+            "monitor = grasp_ros.graph.nodes.start:monitor",
+            "grasp = grasp_ros.cli.main:main",
         ]
     },
     zip_safe=False,

@@ -1,5 +1,6 @@
 """A grasp held together by impacts: exact simulation, control and measurement over ROS 2.
 
-Rooms, each importing only from those before it: `physics` (no ROS, no files, no clocks), `scene`, `simulation`
-and `reference`, `bag`, `nodes` (the only one with rclpy) and `studies`, `cli`.
+Rooms, each importing only from those before it: `physics` (equations), `exact` (the compiled integrator), `scene` (what
+a file may say), `methods` (the other integrators), `simulation` (a run without ROS), `graph` (nodes and bags),
+`verification` (reference, oracles, hard cases), `studies` (what is measured and written), `cli`.
 """

@@ -1,4 +1,4 @@
-"""Oracles of the tests alone; those that the study of hard cases shares are in `grasp_ros.oracles`.
+"""Oracles of the tests alone; those that the study of hard cases shares are in `grasp_ros.verification.oracles`.
 
 Nothing here but `run` and `ledger` calls a kernel. Everything works in mpmath unless its name says otherwise.
 """
@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.oracles import Impact, Ledger, balance, first_touch_from_rest, flight, impact, reduced_mass
-from grasp_ros.physics import certificate
-from grasp_ros.physics.integrator import ACCURACY, Integrator
+from grasp_ros.exact.integrator import ACCURACY, Integrator
+from grasp_ros.physics import energy as certificate
 from grasp_ros.physics.layout import Event
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
-from grasp_ros.reference import Reference, integrate
+from grasp_ros.verification.oracles import Impact, Ledger, balance, first_touch_from_rest, flight, impact, reduced_mass
+from grasp_ros.verification.reference import Reference, integrate
 
 __all__ = ["Impact", "Ledger", "first_touch_from_rest", "flight", "impact", "reduced_mass"]  # for the tests
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)

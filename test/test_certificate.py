@@ -9,12 +9,13 @@ from oracles import STANDARD, energy, run
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import Event
 from grasp_ros.physics.model import Arm, Contact, Grasp, hertz_force, impact_force, in_contact
+from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.reference import integrate
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import certificate
 from grasp_ros.studies.certificate import SCENES, jumps, safe_p
-from grasp_ros.studies.stability import first_limit, spectral_radius
+from grasp_ros.studies.stability import first_limit
+from grasp_ros.verification.reference import integrate
 
 PAPER = [name for name in scenes.names() if name.startswith("case_")]
 

@@ -11,16 +11,16 @@ import yaml
 from oracles import CASES, flight_array
 
 from grasp_ros import scene as scenes
-from grasp_ros.effects import BY_SECTION, EFFECTS
-from grasp_ros.physics.certificate import ledger
-from grasp_ros.physics.integrator import Integrator, Status
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.energy import ledger
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.model import Array
-from grasp_ros.pieces import tick_times
 from grasp_ros.scene import PAPER, Scene
+from grasp_ros.scene.effects import BY_SECTION, EFFECTS
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
 from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.simulation.closed_loop import tick_times
 from grasp_ros.studies.effects import registry_table, variants
-from grasp_ros.topics import JOINT_STATES, LYAPUNOV
 
 OTHERS = [name for name in scenes.names() if name not in CASES]
 
@@ -380,7 +380,7 @@ def test_the_example_of_the_documentation_works(monkeypatch: pytest.MonkeyPatch)
     for effect in namespace["EFFECTS"]:
         monkeypatch.setitem(BY_SECTION, effect.section, effect)
     others = [effect for effect in EFFECTS if not effect.section.endswith("_rail")]  # a reader may have added it
-    monkeypatch.setattr(scenes, "EFFECTS", (*others, *namespace["EFFECTS"]))
+    monkeypatch.setattr("grasp_ros.scene.scene.EFFECTS", (*others, *namespace["EFFECTS"]))
     rail = scenes.load("case_01", ["left_rail.drag_Ns_per_m=0.3", "time.duration_s=5.0"])
     assert rail.system.bodies[LEFT].tolist() == [1.0, 10.0, 0.5, 0.0]
     same = scenes.load("case_01", ["left_arm.damping_Ns_per_m=0.5", "time.duration_s=5.0"])

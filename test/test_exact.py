@@ -28,11 +28,11 @@ from oracles import (
 )
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import Integrator, Status
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
-from grasp_ros.reference import integrate
+from grasp_ros.verification.reference import integrate
 
 GRID = np.linspace(0.0, 20.0, 201)
 LONG = ("case_01", "case_02", "case_03", "case_04", "case_06", "case_09")  # 20 s of reference; 5 s for the others

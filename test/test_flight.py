@@ -11,7 +11,7 @@ import pytest
 from mpmath import mp, mpf
 from oracles import first_touch_from_rest, flight, flight_array
 
-from grasp_ros.physics.flight import (
+from grasp_ros.exact.flight import (
     DRIFT,
     NEAR,
     OVER,
@@ -25,8 +25,8 @@ from grasp_ros.physics.flight import (
     launch,
     safe_step,
 )
+from grasp_ros.exact.modes import fastest_rate
 from grasp_ros.physics.layout import Work
-from grasp_ros.physics.switching import fastest_rate
 
 Body = tuple[float, float, float, float]  # m, k, c, f
 CRITICAL = 2.0 * math.sqrt(15.0)

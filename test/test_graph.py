@@ -25,17 +25,18 @@ from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from grasp_ros import bag, scene
-from grasp_ros.graph import Graph
-from grasp_ros.nodes import messages
-from grasp_ros.physics.integrator import ACCURACY
+from grasp_ros import scene
+from grasp_ros.cli.report import compare_recording
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.model import impact_forces
-from grasp_ros.report import compare_recording
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV_NAMES, RIGHT_COMMAND, SCENE, state_of
 from grasp_ros.simulation import simulate
-from grasp_ros.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV_NAMES, RIGHT_COMMAND, SCENE, state_of
 
 DEADLINE = 60.0
-START = [sys.executable, "-m", "grasp_ros.nodes.start"]
+START = [sys.executable, "-m", "grasp_ros.graph.nodes.start"]
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:

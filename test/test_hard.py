@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.hard.case import Case, Product, judge
-from grasp_ros.hard.registry import cases
-from grasp_ros.physics import integrator
-from grasp_ros.physics.integrator import Status
+from grasp_ros.exact import integrator
+from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import DAMPING, OBJECT, Work
 from grasp_ros.simulation import simulate
+from grasp_ros.verification.cases.case import Case, Product, judge
+from grasp_ros.verification.cases.registry import cases
 
 PARAMETERS = [pytest.param(case, id=f"{case.family}: {case.name}") for case in cases()]
 

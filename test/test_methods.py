@@ -11,10 +11,10 @@ import pytest
 from oracles import ELASTIC, FREE, STANDARD, energy, flight_array, impact, make_grasp, reduced_mass
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import discrete_gradient, fixed_step, library
 from grasp_ros.methods.equations import Solution, parameters
 from grasp_ros.methods.registry import EXACT, METHODS, STEP
-from grasp_ros.physics.integrator import Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.model import Array, Grasp, acceleration
 from grasp_ros.simulation import Trajectory, load, simulate

@@ -12,15 +12,15 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from grasp_ros import scene as scenes
-from grasp_ros.hard import fuzz, properties
-from grasp_ros.hard.case import Product, Unfinished
-from grasp_ros.hard.draw import NUMBERS, draw_scene
-from grasp_ros.hard.impacts import impact_error
-from grasp_ros.hard.properties import Check, checks
-from grasp_ros.hard.relations import reversal
-from grasp_ros.hard.scenes import ELASTIC, distance, grasp, reference
 from grasp_ros.physics.layout import DAMPING
 from grasp_ros.physics.model import Arm, Contact
+from grasp_ros.verification import fuzz, properties
+from grasp_ros.verification.cases.case import Product, Unfinished
+from grasp_ros.verification.cases.impacts import impact_error
+from grasp_ros.verification.cases.scenes import ELASTIC, distance, grasp, reference
+from grasp_ros.verification.draw import NUMBERS, draw_scene
+from grasp_ros.verification.properties import Check, checks
+from grasp_ros.verification.relations import reversal
 
 FIXED = settings(
     derandomize=True, database=None, deadline=None, max_examples=100, phases=(Phase.explicit, Phase.generate),

@@ -11,7 +11,7 @@ import pytest
 from gmpy2 import mpfr
 
 from grasp_ros.physics.model import Arm, Contact, Grasp
-from grasp_ros.reference import Reference, integrate
+from grasp_ros.verification.reference import Reference, integrate
 
 FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING = Contact(0.0, 0.0)

@@ -13,6 +13,18 @@ ROOT = Path(grasp_ros.__file__).parent
 SOURCES = sorted(path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.py"))
 MESSAGES = {"std_srvs", "rcl_interfaces", "builtin_interfaces"}
 LINES = 300
+BELOW = {  # what the files of a room may import beside their own room
+    "physics": (),
+    "exact": ("physics",),
+    "scene": ("physics",),
+    "methods": ("physics", "exact", "scene"),
+    "simulation": ("physics", "exact", "scene", "methods"),
+    "graph": ("physics", "exact", "scene", "simulation"),
+    "verification": ("physics", "exact", "scene", "simulation"),
+    "studies": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification"),
+    "cli": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification", "studies"),
+}
+ROOMS = tuple(BELOW)
 
 
 def imports(name: str) -> set[str]:
@@ -41,47 +53,54 @@ def module_of(name: str) -> str:
     return ".".join(["grasp_ros", *Path(name).with_suffix("").parts]).removesuffix(".__init__")
 
 
+def room_of(module: str) -> str:
+    """The room of a module of the package; empty for the package itself."""
+    return [*module.split("."), ""][1]
+
+
 def test_the_search_finds_the_files() -> None:
-    assert {"physics/hybrid.py", "nodes/plant.py", "bag.py", "plots.py", "scene.py"} <= set(SOURCES)
-    assert "rclpy" in tops("nodes/node.py")
-    assert "rosbags" in tops("bag.py")
-    assert "matplotlib" in tops("plots.py")
+    files = {"exact/hybrid.py", "graph/nodes/plant.py", "graph/bag.py", "simulation/plots.py", "scene/scene.py"}
+    assert files <= set(SOURCES)
+    assert "rclpy" in tops("graph/nodes/node.py")
+    assert "rosbags" in tops("graph/bag.py")
+    assert "matplotlib" in tops("simulation/plots.py")
+
+
+def test_nothing_lies_loose_at_the_root() -> None:
+    assert {path.name for path in ROOT.iterdir() if path.name != "__pycache__"} == {
+        "__init__.py", "py.typed", "config", *ROOMS
+    }
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_each_library_has_its_room(name: str) -> None:
+def test_each_library_has_its_place(name: str) -> None:
     found = tops(name)
-    if not name.startswith("nodes/"):
+    if not name.startswith("graph/nodes/"):
         assert not {
             top for top in found if top.startswith(("rclpy", "rosidl")) or top.endswith("_msgs") or top in MESSAGES
         }
-    if name != "bag.py":
+    if name != "graph/bag.py":
         assert "rosbags" not in found
-    if name not in ("plots.py", "studies/figures.py"):
+    if name not in ("simulation/plots.py", "studies/figures.py", "studies/page_figures.py"):
         assert "matplotlib" not in found
-    if not name.startswith("physics/"):
+    if not name.startswith("exact/"):
         assert "numba" not in found
-    if name not in ("reference.py", "oracles.py"):
+    if not name.startswith("verification/"):
         assert not {"gmpy2", "mpmath"} & found
+    if name.startswith(("physics/", "exact/")) and name != "exact/jit.py":
+        assert not {"yaml", "pathlib", "time", "datetime"} & found
 
 
-@pytest.mark.parametrize("name", [name for name in SOURCES if name.startswith("physics/")])
-def test_physics_knows_only_itself(name: str) -> None:
-    own = {module for module in imports(name) if module.split(".")[0] == "grasp_ros"}
-    assert all(module.startswith("grasp_ros.physics") for module in own)
-    assert not {"yaml", "pathlib", "time", "datetime"} & tops(name) or name == "physics/jit.py"
+@pytest.mark.parametrize("name", [name for name in SOURCES if name != "__init__.py"])
+def test_a_room_knows_only_those_below(name: str) -> None:
+    room = name.split("/")[0]
+    known = {room_of(module) for module in imports(name) if module.split(".")[0] == "grasp_ros"}
+    assert known <= {*BELOW[room], room, ""}
 
 
-@pytest.mark.parametrize("name", [name for name in SOURCES if name.startswith("methods/")])
-def test_methods_know_the_physics_and_the_scene(name: str) -> None:
-    own = {module for module in imports(name) if module.split(".")[0] == "grasp_ros"}
-    allowed = ("grasp_ros.physics", "grasp_ros.methods", "grasp_ros.scene")
-    assert all(module.startswith(allowed) for module in own)
-
-
-@pytest.mark.parametrize("name", [name for name in SOURCES if not name.startswith("nodes/")])
+@pytest.mark.parametrize("name", [name for name in SOURCES if not name.startswith("graph/nodes/")])
 def test_nothing_imports_the_nodes(name: str) -> None:
-    assert not {module for module in imports(name) if module.startswith("grasp_ros.nodes")}
+    assert not {module for module in imports(name) if module.startswith("grasp_ros.graph.nodes")}
 
 
 def test_imports_make_no_circle() -> None:
@@ -94,6 +113,6 @@ def test_imports_make_no_circle() -> None:
         done |= free
 
 
-@pytest.mark.parametrize("name", [name for name in SOURCES if name != "reference.py"])
+@pytest.mark.parametrize("name", [name for name in SOURCES if name != "verification/reference.py"])
 def test_files_stay_small(name: str) -> None:
     assert len((ROOT / name).read_text(encoding="utf-8").splitlines()) < LINES

@@ -14,10 +14,10 @@ import yaml
 from oracles import CASES
 
 from grasp_ros import scene as scenes
-from grasp_ros.effects import BY_SECTION
-from grasp_ros.parameters import Parameter
 from grasp_ros.scene import Scene, load, parse
-from grasp_ros.validation import SceneError
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.validation import SceneError
 
 BASE: dict[str, Any] = yaml.safe_load(load("case_01").to_yaml())
 EVERY = [(section, parameter) for section in BASE if section in BY_SECTION

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
+from grasp_ros.exact.modes import impact_scales
+from grasp_ros.exact.polynomial import curvatures, first_rise, invert_time, lane_range, values
+from grasp_ros.exact.series import Tables, expand_both, expand_one, new_tables, series_order, step_size
 from grasp_ros.physics.layout import (
     CHECK,
     DISSIPATION,
@@ -28,9 +31,6 @@ from grasp_ros.physics.layout import (
     Work,
 )
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.polynomial import curvatures, first_rise, invert_time, lane_range, values
-from grasp_ros.physics.series import Tables, expand_both, expand_one, new_tables, series_order, step_size
-from grasp_ros.physics.switching import impact_scales
 
 BODIES = np.array([[1.0, 15.0, 0.7, 0.4], [2.0, 12.0, 1.1, -0.3], [5.0, 3.0, 0.9, 0.2]])
 PAIRS = np.array([[1e2, 0.3], [3e2, 0.7]])

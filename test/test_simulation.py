@@ -11,13 +11,13 @@ import pytest
 from oracles import energy
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import Integrator, Status
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
-from grasp_ros.pieces import tick_times
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
+from grasp_ros.simulation.closed_loop import tick_times
 
 
 def scene_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001, *settings: str) -> Scene:

@@ -14,6 +14,7 @@ from conftest import grasp
 from oracles import FREE, energy, flight
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics import sampled
 from grasp_ros.physics.model import Arm
 from grasp_ros.studies import accuracy, adviser, drift, figures, measure, predictability, stability
 from grasp_ros.studies.contenders import own_contenders
@@ -228,14 +229,14 @@ def test_largest_stable_period(arm: Arm, delay: int, limit: float) -> None:
 
 
 def test_stability_returns_in_an_island() -> None:
-    radii = [stability.spectral_radius(STANDARD, h, 0) for h in (1.6, 1.7, 2.6, 2.7)]
+    radii = [sampled.spectral_radius(STANDARD, h, 0) for h in (1.6, 1.7, 2.6, 2.7)]
     assert [radius < 1.0 for radius in radii] == [False, True, True, False]
 
 
 @pytest.mark.parametrize("arm", [STANDARD, FREE, Arm(2.0, 0.0, 3.0, 1.0, 1.0), Arm(1.0, 9.0, 6.0, 1.0, 1.0), HEAVY])
 def test_flow_under_a_held_command(arm: Arm) -> None:
     """Against the matrix exponential: under-, over- and critically damped arms, without spring, without anything."""
-    flow = stability.held_flow(arm, np.array([0.3]))[0]
+    flow = sampled.held_flow(arm, np.array([0.3]))[0]
     body = (arm.mass, arm.stiffness, arm.damping)
     for column, (x, v, force) in enumerate(np.eye(3)):
         expected = [float(value) for value in flight((*body, force), x, v, 0.3)]
@@ -251,7 +252,7 @@ def test_without_feedback_there_is_no_limit() -> None:
 def test_simulation_grows_as_the_spectral_radius_says(delay: int) -> None:
     limit = stability.first_limit(STANDARD, delay)
     for factor, stable in ((0.9, True), (1.1, False)):
-        radius = stability.spectral_radius(STANDARD, factor * limit, delay)
+        radius = sampled.spectral_radius(STANDARD, factor * limit, delay)
         growth = stability.simulated_growth(STANDARD, factor * limit, delay, 1600)
         assert (growth < 1.0) is stable
         assert growth == pytest.approx(radius, abs=3e-4)
@@ -260,7 +261,7 @@ def test_simulation_grows_as_the_spectral_radius_says(delay: int) -> None:
 def test_continuous_feedback_is_the_limit_of_short_periods() -> None:
     """Growth over 1 s tends to exp(-C / 2 m)."""
     for delay in (0, 1):
-        assert stability.spectral_radius(STANDARD, 1e-4, delay) ** 1e4 == pytest.approx(math.exp(-0.35), rel=2e-3)
+        assert sampled.spectral_radius(STANDARD, 1e-4, delay) ** 1e4 == pytest.approx(math.exp(-0.35), rel=2e-3)
 
 
 # The commands.

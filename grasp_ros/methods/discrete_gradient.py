@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.integrator import Status
+from grasp_ros.exact.jit import kernel
 from grasp_ros.methods.equations import EPS, SLIVER, Solution, Work, parameters, put
-from grasp_ros.physics.integrator import Status
-from grasp_ros.physics.jit import kernel
 from grasp_ros.physics.model import Array, Grasp
 
 DONE, NOT_FINITE, NOT_SOLVED = 0, 1, 2

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.integrator import Status
-from grasp_ros.physics.jit import kernel
+from grasp_ros.exact.integrator import Status
+from grasp_ros.exact.jit import kernel
 from grasp_ros.physics.layout import LEFT, Event, Pair
 from grasp_ros.physics.model import Array, Grasp
 

@@ -24,6 +24,8 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.integrator import Status
+from grasp_ros.exact.jit import allocating, kernel
 from grasp_ros.methods.equations import (
     CLAMPED,
     CONTACT,
@@ -42,8 +44,6 @@ from grasp_ros.methods.equations import (
     rates,
     relative,
 )
-from grasp_ros.physics.integrator import Status
-from grasp_ros.physics.jit import allocating, kernel
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Grasp
 

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST
 from grasp_ros.methods import discrete_gradient, fixed_step, library
 from grasp_ros.methods.equations import Solution
-from grasp_ros.physics.integrator import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.model import Array, Grasp
 from grasp_ros.scene import PAPER, Scene
 
@@ -76,7 +76,7 @@ METHODS: dict[str, Method] = {
     method.name: method
     for method in (
         Method(
-            EXACT, "any, by the accuracy", "this package: grasp_ros/physics",
+            EXACT, "any, by the accuracy", "this package: grasp_ros/exact",
             "closed-form flight to the touch, which cannot be missed; Taylor series in w = sqrt(u) through the contact",
             ACCURACY_KNOB, ACCURACY, _tens(3, 16), FINEST, COARSEST, None,
         ),

@@ -1,4 +1,4 @@
-"""Physics and exact integration. No ROS, no files but the compiler's cache, no clocks: time is an argument.
+"""Physics: equations, energies, control laws. NumPy only: no ROS, no files, no clocks, no compiled code.
 
 Notation. All numbers are SI; the line points to the right, i stands for l or r.
 
@@ -21,6 +21,6 @@ V_c             V_c                    J          V with the Hertz term of every
 w, s, G         w, s, g                           regularised variables of a contact, see `series`
 ==============  =====================  =========  ==========================================================
 
-`model` states the equations. `flight`, `series`, `polynomial`, `switching` and `hybrid` are the compiled kernels on
-the arrays of `layout`; `integrator` is what the rest of the package uses.
+`model` states the equations, `control` the law of a controller, `system` puts a scene into arrays, `layout` says what
+stands where in them, `energy` computes V and its balance, `sampled` the limits of a loop of held commands.
 """

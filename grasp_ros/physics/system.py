@@ -1,7 +1,7 @@
 """What a scene simulates, as arrays: bodies, pairs, friction, controllers and external forces.
 
-The effects of a scene put it together, see `grasp_ros.effects`. What no effect has named has no mass, no stiffness of
-contact, no controller and no force here, and is not simulated.
+The effects of a scene put it together, see `grasp_ros.scene.effects`. What no effect has named has no mass, no
+stiffness of contact, no controller and no force here, and is not simulated.
 """
 
 from __future__ import annotations

@@ -20,16 +20,7 @@ from grasp_ros.studies import measure
 from grasp_ros.studies.contenders import OURS, all_contenders
 from grasp_ros.studies.measure import Effort
 from grasp_ros.studies.peers import Contender
-from grasp_ros.studies.records import (
-    Journal,
-    Record,
-    describe_machine,
-    metric,
-    origin,
-    scene_key,
-    to_record,
-    write_csv,
-)
+from grasp_ros.studies.records import Journal, Record, describe_machine, metric, origin, scene_key, to_record, write_csv
 
 STANDARD = ("case_01", "case_02", "case_03", "case_04")
 STIFF = ("case_01", 1e8)  # ten thousand times the paper's Hertz coefficient

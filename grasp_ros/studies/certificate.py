@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros import plots
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import Integrator, Status
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.layout import HERTZ, LEFT, RIGHT, Event
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.simulation import simulate
+from grasp_ros.studies import page_figures
 from grasp_ros.studies.document import put
 from grasp_ros.studies.stability import first_limit
 
@@ -164,7 +164,7 @@ def run(document: Path | None) -> None:
     if document is not None:
         figure = document.with_suffix(".png")
         shown = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 8001)) for name in SCENES[:2]]
-        plots.draw_jumps(shown, figure)
+        page_figures.v_jumps(shown, figure)
         block = f"{table}\n\n![V and V_c]({figure.name})"
         document.write_text(put(put(text, JUMPS, block), LIMITS, limits), encoding="utf-8")
 

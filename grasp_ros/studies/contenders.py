@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 
 from grasp_ros import simulation
+from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import equations
 from grasp_ros.methods.library import slopes
 from grasp_ros.methods.registry import EXACT, METHODS
-from grasp_ros.physics.integrator import Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.layout import Work as ExactWork
 from grasp_ros.physics.model import Array

@@ -11,12 +11,12 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.certificate import energy
+from grasp_ros.physics.energy import energy
 from grasp_ros.scene import Scene
-from grasp_ros.studies import measure
 from grasp_ros.studies.contenders import all_contenders
 from grasp_ros.studies.peers import Contender
 from grasp_ros.studies.records import Journal, origin, scene_key
+from grasp_ros.verification.deadline import Deadline, deadline
 
 SECONDS = 2000.0
 POINTS = 2001
@@ -71,13 +71,13 @@ def _measure(contender: Contender, scene: Scene, setting: float) -> Drift:
     try:
         solve = contender.build(scene, setting)
         solve(grid[:2])  # compiles
-        with measure.deadline(DEADLINE_S):
+        with deadline(DEADLINE_S):
             begin = time.perf_counter()
             answer = solve(grid)
             seconds = time.perf_counter() - begin
     except ImportError:
         return Drift(contender.name, text, [], [], 0.0, "not installed")
-    except measure.Deadline:
+    except Deadline:
         return Drift(contender.name, text, [], [], DEADLINE_S, f"stopped: longer than {DEADLINE_S:g} s")
     level = energy(scene.system, answer.state).V_c
     drift = level / energy(scene.system, scene.initial_state).V_c - 1.0

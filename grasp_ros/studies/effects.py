@@ -18,15 +18,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros import plots, strict_yaml
 from grasp_ros import scene as scenes
-from grasp_ros.effects import EFFECTS
-from grasp_ros.graph import Graph
+from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.layout import Event
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, strict_yaml
+from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.simulation import simulate
+from grasp_ros.simulation.versions import versions
+from grasp_ros.studies import page_figures
 from grasp_ros.studies.document import put
-from grasp_ros.versions import versions
 
 BARE = "bare"
 REPEATS, SAMPLED_REPEATS = 31, 5
@@ -69,7 +69,7 @@ def run(scene: Scene, document: Path | None) -> None:
     print(table)
     if text is not None and document is not None:
         figure = document.with_suffix(".png")
-        plots.draw_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
+        page_figures.effect_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
         block = f"{table}\n\n![costs of the effects]({figure.name})"
         document.write_text(put(text, COSTS, block), encoding="utf-8")
 

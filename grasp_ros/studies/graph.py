@@ -16,10 +16,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from grasp_ros.graph import Graph
-from grasp_ros.physics.integrator import ACCURACY
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.graph.processes import Graph
 from grasp_ros.scene import Scene
-from grasp_ros.versions import versions
+from grasp_ros.simulation.versions import versions
 
 REPEATS = 5
 RUN_SECONDS = 300.0
@@ -67,7 +67,8 @@ def bare_speed(ticks: int) -> float:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     processes = {
         name: subprocess.Popen(
-            [sys.executable, "-m", "grasp_ros.nodes.bare", name, str(ticks)], env=environment, stderr=subprocess.PIPE
+            [sys.executable, "-m", "grasp_ros.graph.nodes.bare", name, str(ticks)], env=environment,
+            stderr=subprocess.PIPE,
         )
         for name in ("monitor", "left_controller", "right_controller", "plant")
     }

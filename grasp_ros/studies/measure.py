@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import signal
 import statistics
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros import reference, simulation
+from grasp_ros import simulation
 from grasp_ros.physics.layout import LEFT, RIGHT, Event
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.studies.peers import Answer, Contender, Solve
 from grasp_ros.studies.records import Journal, Record, scene_key
+from grasp_ros.verification import reference
+from grasp_ros.verification.deadline import Deadline, deadline
 
 DIGITS = 25
 
@@ -41,25 +40,6 @@ class Effort(NamedTuple):
 
 FULL = Effort(patience=0.7, deadline=10.0, budget=0.25, most=30, stride=1)
 QUICK = Effort(patience=0.2, deadline=60.0, budget=0.02, most=3, stride=4)
-
-
-class Deadline(Exception):  # noqa: N818 - an instant, not an error
-    """A run took too long."""
-
-
-@contextmanager
-def deadline(seconds: float) -> Iterator[None]:
-    """Stop what runs in Python after some seconds; compiled code is stopped when it returns."""
-    def late(*_: Any) -> None:
-        raise Deadline
-
-    before = signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def check(scene: Scene) -> None:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.physics.jit import kernel
+from grasp_ros.exact.jit import kernel
 from grasp_ros.physics.layout import LEFT, RIGHT, X_L, X_O, X_R
 from grasp_ros.physics.model import Array, Grasp
 from grasp_ros.scene import Scene

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import Integrator
+from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene

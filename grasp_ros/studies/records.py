@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from grasp_ros import methods
-from grasp_ros.physics.jit import sources_digest
+from grasp_ros.exact.jit import sources_digest
 from grasp_ros.scene import Scene
 
 PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "heyoka")

@@ -1,0 +1,1 @@
+"""`grasp`, the command line: one file of subcommands per subject."""

@@ -1,0 +1,5 @@
+"""Exact hybrid integration: every compiled kernel of the method `exact`, and the integrator that drives them.
+
+`integrator` is the door. `hybrid` joins the segments: `flight` between contacts, `contact` with `series` and
+`polynomial` in them; `modes` is the automaton, `friction` that of the object, `energy_check` compares energies.
+"""

@@ -1,0 +1,214 @@
+"""One running simulation: the compiled kernels with their memory, events and counters."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.exact import hybrid
+from grasp_ros.exact.friction import PUSH
+from grasp_ros.exact.jit import with_deep_stack
+from grasp_ros.exact.modes import SPARE, UNKNOWN
+from grasp_ros.exact.series import Tables, new_tables, series_order
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Event, Outcome, Work
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.system import System
+
+ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
+FINEST, COARSEST = 1e-16, 1e-3
+MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for about a minute
+BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
+EVENT_ROWS = 1024
+
+
+class Status(Enum):
+    """How a simulation ended; the value is the sentence shown to the user."""
+
+    DONE = "reached the end of the horizon"
+    EVENT_BUDGET = "stopped: the event budget is used up before the end of the horizon"
+    NOT_FINITE = "stopped: a state is not finite any more"
+    WORK_BUDGET = "stopped: the budget of work is used up before the end of the horizon"
+    ENERGY_RISES = "stopped: the energy rose by more than rounding explains"
+    STALLED = "stopped: a search for the next event does not end, or the time does not advance"
+
+
+class SwitchEvent(NamedTuple):
+    """One switch of one pair, or of the object."""
+
+    time: float  # s
+    side: int  # layout.LEFT or RIGHT; OBJECT for what friction does
+    kind: Event
+    u: float  # penetration, m; 0 for the object
+    u_rate: float  # m/s; 0 for the object
+
+
+def to_events(switches: Array) -> list[SwitchEvent]:
+    """Records of rows (m, 5)."""
+    time, side, kind, u, u_rate = switches.T.tolist()
+    return list(map(SwitchEvent, time, map(int, side), map(_KINDS.__getitem__, map(int, kind)), u, u_rate))
+
+
+_KINDS = tuple(Event)
+_STATUS = {
+    Outcome.DONE: Status.DONE,
+    Outcome.NOT_FINITE: Status.NOT_FINITE,
+    Outcome.STALLED: Status.STALLED,
+    Outcome.ENERGY_RISES: Status.ENERGY_RISES,
+    Outcome.WORK_USED: Status.WORK_BUDGET,
+}
+
+
+@cache
+def _workspace(accuracy: float) -> tuple[Tables, Array]:
+    """Tables and rows for events that the kernels write to before they read; no call leaves anything there.
+
+    The kernels hold the interpreter's lock, so that integrators may share them.
+    """
+    return new_tables(series_order(accuracy)), np.empty((EVENT_ROWS, 5))
+
+
+class Integrator:
+    """Integrates one system from its initial state, in pieces of any length.
+
+    Parameters
+    ----------
+    system : System
+    continuous : bool
+        True: the feedback acts all the time, (4), (5). False: the arms get the forces of `hold` only.
+    accuracy : float
+        Size of the first neglected Taylor term of a contact relative to the impact, in [1e-16, 1e-3].
+    max_events : int
+        Budget of switches; the integration stops with `Status.EVENT_BUDGET` beyond it.
+    max_work : int
+        Budget of flights, Taylor steps and evaluations of event functions together; the integration stops with
+        `Status.WORK_BUDGET` when it is used up.
+
+    Raises
+    ------
+    ValueError
+        If the accuracy is outside its range or the state is not finite.
+    """
+
+    def __init__(
+        self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = MAX_EVENTS,
+        max_work: int = MAX_WORK,
+    ) -> None:
+        if not FINEST <= accuracy <= COARSEST:
+            raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+        state = system.state
+        if state.shape != (6,) or not np.isfinite(state).all():
+            raise ValueError(f"state: {state!r} is not an array of six finite numbers")
+        self.status = Status.DONE
+        self.work = np.zeros(len(Work), dtype=np.int64)
+        self._system, self._accuracy = system, accuracy
+        self._max_events, self._max_work = max_events, max_work
+        self._time = 0.0
+        self._bodies = system.closed_loop if continuous else system.bodies.copy()
+        self._bodies[self._bodies[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
+        self._own_forces = self._bodies[:, FORCE].copy()
+        self._pairs = system.pairs
+        self._friction = np.array([system.coulomb, self._bodies[OBJECT, MASS], self._own_forces[OBJECT]])
+        self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
+        self._mode = np.full(3, UNKNOWN, dtype=np.int64)
+        self._tables, self._event_rows = _workspace(accuracy)
+        self._switches: list[Array] = []
+        self._switch_count = 0
+
+    @property
+    def state(self) -> Array:
+        """Copy of the state (6,): x_l, v_l, x_o, v_o, x_r, v_r."""
+        return self._y[:6].copy()
+
+    @property
+    def penetration(self) -> Array:
+        """Copy of (u_l, u_r) in m, exact where the difference of the positions is not."""
+        return self._y[[U_L, U_R]]
+
+    @property
+    def _spent(self) -> int:
+        return int(self.work[Work.FLIGHTS] + self.work[Work.CONTACT_STEPS] + self.work[Work.ROOT_ITERATIONS])
+
+    @property
+    def stop(self) -> str:
+        """Why and where the integration stopped, with time, contact mode and state; empty if it did not."""
+        if self.status is Status.DONE:
+            return ""
+        with np.errstate(over="ignore", invalid="ignore"):  # of states that are not finite any more
+            mode = int(energy(self._system, self.state).mode)
+        return f"{self.status.value}: t = {self._time!r} s, mode {mode}, state {self.state.tolist()}"
+
+    @property
+    def switches(self) -> Array:
+        """All switches so far, shape (m, 5): time, side, kind, u, u'."""
+        return np.concatenate(self._switches) if self._switches else np.empty((0, 5))
+
+    @property
+    def events(self) -> list[SwitchEvent]:
+        """The rows of `switches` as records."""
+        return to_events(self.switches)
+
+    def hold(self, forces: Array) -> None:
+        """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
+        self._bodies[:, FORCE] = self._own_forces + forces
+        self._friction[PUSH] = self._bodies[OBJECT, FORCE]
+
+    def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
+        """Integrate for `duration` seconds.
+
+        Parameters
+        ----------
+        duration : float, s
+        grid : array (n,), s
+            Ascending output times in [0, duration], counted from the beginning of this call.
+        start : float, s
+            Time of the beginning of this call on the clock of the recorded events.
+
+        Returns
+        -------
+        array (n, 6)
+            States at the grid; only the rows reached, if `status` is not DONE afterwards.
+
+        Raises
+        ------
+        ValueError
+            If the duration is negative or not finite.
+        """
+        if not (math.isfinite(duration) and duration >= 0.0):
+            raise ValueError(f"duration: {duration!r} is not a finite number of seconds >= 0")
+        times = np.zeros(0) if grid is None else np.ascontiguousarray(grid, dtype=float)
+        out = np.empty((len(times), 6))
+        clock = np.zeros(2)
+        filled = np.zeros(2, dtype=np.int64)
+        while self.status is Status.DONE:
+            allowed = self._event_rows[: self._max_events - self._switch_count + SPARE]
+            outcome = hybrid.advance(
+                self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
+                self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled, self.work,
+            )
+            if filled[1]:
+                rows = self._event_rows[: filled[1]].copy()
+                rows[:, 0] += start
+                self._switches.append(rows)
+                self._switch_count += len(rows)
+                filled[1] = 0
+            if outcome == Outcome.EVENTS_FULL:
+                if self._switch_count > self._max_events:
+                    self.status = Status.EVENT_BUDGET
+            elif outcome != Outcome.WORK_USED or self._spent >= self._max_work:
+                self.status = _STATUS[Outcome(outcome)]
+                break
+        self._time = start + float(clock[0] + clock[1])
+        return out[: filled[0]]
+
+
+@with_deep_stack
+def compile_kernels() -> None:
+    """Compile the kernels, or load them from disk, by integrating over no time at all."""
+    arm = Arm(1.0, 1.0, 0.0, 0.0, 0.0)
+    contact = Contact(1.0, 0.0)
+    Integrator(System.of(Grasp(arm, arm, contact, contact, 1.0), np.zeros(6)), continuous=False).advance(0.0)

@@ -1,0 +1,93 @@
+"""How the kernels are compiled, and where their machine code is kept.
+
+`NUMBA_DISABLE_JIT=1` in the environment runs the same source uncompiled.
+"""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import FunctionType
+from typing import Any
+
+import numba
+
+# Off by default in numba; it turns the eight independent sums of `series.convolve` into vector instructions, which
+# makes a contact several times faster. It never reorders a floating-point sum.
+numba.config.SLP_VECTORIZE = 1
+
+DEEP_STACK = 70_000  # slots; more than half a megabyte
+
+
+def sources_digest(room: Path) -> str:
+    """A short name of the sources of this room, of the physics whose constants it uses, and of a room that calls it."""
+    digest = hashlib.sha256()
+    own = Path(__file__).parent
+    for source in sorted({*own.glob("*.py"), *(own.parent / "physics").glob("*.py"), *room.glob("*.py")}):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _cache_directory(room: Path) -> Path:
+    """A writable directory for the kernels of a room.
+
+    numba looks for changes only in the file of the function that is called, not in those that it calls from other
+    files: without the digest an edited kernel would go on running as it was.
+    """
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    directory = Path(base) / "grasp_ros" / sources_digest(room)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        directory = Path(tempfile.mkdtemp(prefix="grasp_ros"))
+    return directory
+
+
+COMPILING = "compiling the kernels; this happens once after an installation and takes some 15 s"
+CACHE_DIRECTORY = _cache_directory(Path(__file__).parent)
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compile a function to machine code at its first call and keep the result on disk.
+
+    It may not make arrays: without them nothing counts references, which makes a kernel a quarter faster.
+    """
+    return _compiled(function, counts=False, inline=False)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A kernel that becomes part of its callers: handing over many arrays can cost as much as a short function."""
+    return _compiled(function, counts=False, inline=True)
+
+
+def allocating(function: Callable[..., Any]) -> Any:
+    """A kernel that may make arrays."""
+    return _compiled(function, counts=True, inline=False)
+
+
+def with_deep_stack(function: Callable[[], None]) -> Callable[[], None]:
+    """A function that compiles kernels, with room on CPython's stack for all the compiler's frames.
+
+    CPython asks the system for 16 kB more whenever a call does not fit, and gives it back when that call returns.
+    Compiling makes millions of calls; where they go back and forth over such an edge, this took seconds.
+    """
+    code = function.__code__.replace(co_stacksize=DEEP_STACK)
+    return FunctionType(code, function.__globals__, function.__name__)
+
+
+def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> Any:
+    """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
+    try:
+        return numba.njit(cache=True, error_model="numpy", _nrt=counts, forceinline=inline)(function)
+    finally:
+        numba.config.CACHE_DIR = before
+
+
+def kernels_on_disk() -> bool:
+    """Whether the integrator has machine code on disk, so that its first call need not wait for the compiler."""
+    return bool(numba.config.DISABLE_JIT) or any(CACHE_DIRECTORY.rglob("*.advance-*.nbi"))

@@ -1,0 +1,262 @@
+"""Contact in regularised variables, integrated by Taylor series of high order.
+
+u^(3/2) is only once differentiable at a touch. With w = sqrt(u) and a new independent variable s,
+
+    dt = 2 G ds,   dw/ds = (G / w) u',   d(.)/ds = 2 G d(.)/dt,   G = w, or w_l w_r with both sides in contact,
+
+every right-hand side is a polynomial in w, the positions and the velocities: the solution is analytic through
+touch and release, and w simply crosses zero at release. Its Taylor coefficients follow from recurrences whose
+only nonlinear operation is the product of two series (Cauchy product), so one step is one loop over the order.
+The coefficients are also the dense output, and bounds on them prove where an event function has no root.
+
+With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g (1 + p u'). An order waits only for the newest
+coefficients of the velocities, and they pass through one product; w, u = w^2 and g are known one order ahead.
+
+Source of step size and order: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by
+means of high-order Taylor methods, Experimental Mathematics 14 (2005), sections 3.1 and 3.2.
+"""
+
+import itertools
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.exact.flight import FLIGHT_ORDER
+from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.physics.layout import (
+    CHECK,
+    DAMPING,
+    DISSIPATION,
+    FORCE,
+    HERTZ,
+    LANES,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    STIFFNESS,
+    V_L,
+    V_O,
+    V_R,
+    X_O,
+    Z_L,
+    Z_R,
+)
+
+FACTORS = 32  # numbers of one order in the table of factors: 16 first ones, 16 second ones
+SECOND = 16
+CACHE_LINE = 64  # bytes
+TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
+
+
+def series_order(tolerance: float) -> int:
+    """Order that costs least for a tolerance; even, see `polynomial.values`.
+
+    Jorba and Zou derive -ln(tolerance) / 2 + 1 from a work that grows with the square of the order. Here the work
+    per order is nearly constant, because a product is one short loop over vectors: the measured optimum is higher.
+    """
+    return 2 * math.ceil(-0.4 * math.log(tolerance) + 2.0)
+
+
+@kernel
+def convolve(f: Any, k: int, lane: int, skip: int) -> Any:
+    """Coefficients k of eight products of series, without the terms that hold a coefficient below `skip`.
+
+    f has FACTORS numbers for each order. Eight sums in one loop, written out, become one vector instruction each;
+    unsigned indices spare the test for negative ones. The caller adds the terms that are left out: they hold the
+    newest coefficients, which have just been stored one by one, and reading those as a vector would wait.
+    """
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
+    end = np.uint64(k)
+    for j in range(np.uint64(skip), np.uint64(max(k + 1 - skip, skip))):
+        i = np.uint64(FACTORS) * j + np.uint64(lane)
+        m = np.uint64(FACTORS) * (end - j) + np.uint64(SECOND + lane)
+        s0 += f[i] * f[m]
+        s1 += f[i + np.uint64(1)] * f[m + np.uint64(1)]
+        s2 += f[i + np.uint64(2)] * f[m + np.uint64(2)]
+        s3 += f[i + np.uint64(3)] * f[m + np.uint64(3)]
+        s4 += f[i + np.uint64(4)] * f[m + np.uint64(4)]
+        s5 += f[i + np.uint64(5)] * f[m + np.uint64(5)]
+        s6 += f[i + np.uint64(6)] * f[m + np.uint64(6)]
+        s7 += f[i + np.uint64(7)] * f[m + np.uint64(7)]
+    return s0, s1, s2, s3, s4, s5, s6, s7
+
+
+@kernel
+def per_mass(body: Any) -> Any:
+    """Inverse mass, k / m, c / m and f / m of a body."""
+    inverse = 1.0 / body[MASS]
+    return inverse, body[STIFFNESS] * inverse, body[DAMPING] * inverse, body[FORCE] * inverse
+
+
+@kernel
+def accelerations(left: Any, right: Any, middle: Any, one: float, x_o: float, u_l: float, u_r: float, v_l: float,
+                  v_o: float, v_r: float) -> Any:
+    """A coefficient of the bodies' accelerations without impact, (1) to (3); `one` is 1 in order 0, then 0."""
+    return (
+        (one * left[3] - left[1] * (x_o + u_l)) - left[2] * v_l,
+        (one * right[3] - right[1] * (x_o - u_r)) - right[2] * v_r,
+        (one * middle[3] - middle[1] * x_o) - middle[2] * v_o,
+    )
+
+
+@kernel
+def put(table: Any, i: int, x0: float, x1: float, x2: float, x3: float, x4: float, x5: float, x6: float,
+        x7: float) -> None:
+    """Store eight neighbouring numbers."""
+    table[i], table[i + 1], table[i + 2], table[i + 3] = x0, x1, x2, x3
+    table[i + 4], table[i + 5], table[i + 6], table[i + 7] = x4, x5, x6, x7
+
+
+@kernel
+def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: float, b_1: float, a_before: float,
+              b_before: float) -> float:
+    """A sum of `convolve` with its four outer terms; a, the newest coefficient, comes last."""
+    return ((total + a_0 * b) + (a_before * b_1 + a_1 * b_before)) + a * b_0
+
+
+@inlined
+def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, n: int) -> None:
+    """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
+
+    Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, H g (1 + p u'). Their terms with coefficients
+    0 and 1 are added here: a term of two such coefficients occurs once, so a constant that multiplies the newest
+    coefficient is set after its own order.
+    """
+    hertz, loss = pairs[side, HERTZ], pairs[side, DISSIPATION]
+    left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
+    on_left = side == LEFT
+    push_l, push_r, push_o = (left[0], 0.0, middle[0]) if on_left else (0.0, right[0], -middle[0])
+    x_o, v_l, v_o, v_r = c[X_O], c[V_L], c[V_O], c[V_R]
+    w, gap = (c[Z_L], c[Z_R]) if on_left else (c[Z_R], c[Z_L])
+    w_0, g_0, w_end, u_end = w, hertz * ((w * w) * (w * w)), w, w * w  # w_end, u_end multiply the newest w, u
+    w_1 = g_1 = w_next = u_next = w_before = u_before = g_before = 0.0
+    first = second = before = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(np.uint64(n)):
+        gv, gd, gl, gr, go, u, q, z = convolve(f, k, 0, 2)
+        u = (u + w_next * w_before) + w_end * w
+        q = (q + u_next * u_before) + u_end * u
+        g = hertz * q
+        u_l, u_r = (u, gap) if on_left else (gap, u)
+        one = 1.0 if k == 0 else 0.0
+        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
+        d, d_open = (v_l - v_o, v_o - v_r) if on_left else (v_o - v_r, v_l - v_o)
+        e = one + loss * d
+        now = (v_o, d_open, a_l, a_r, a_o, e)
+        z = with_ends(z, e, g, first[5], g_0, second[5], g_1, before[5], g_before)
+        gv = with_ends(gv, v_o, w, first[0], w_0, second[0], w_1, before[0], w_before)
+        gd = with_ends(gd, d_open, w, first[1], w_0, second[1], w_1, before[1], w_before)
+        gl = with_ends(gl, a_l, w, first[2], w_0, second[2], w_1, before[2], w_before)
+        gr = with_ends(gr, a_r, w, first[3], w_0, second[3], w_1, before[3], w_before)
+        go = with_ends(go, a_o, w, first[4], w_0, second[4], w_1, before[4], w_before)
+        put(f, FACTORS * k, v_o, d_open, a_l, a_r, a_o, w, u, e)
+        put(f, FACTORS * k + SECOND, w, w, w, w, w, w, u, g)
+        if k == 0:
+            first, w_end, u_end = now, 2.0 * w, 2.0 * u
+        elif k == 1:
+            w_1, g_1, w_next, u_next = w, g, w, u
+        elif k == 2:
+            second, w_next, u_next = before, 2.0 * w_next, 2.0 * u_next
+        before, w_before, u_before, g_before = now, w, u, g
+        step = unit / (k + 1)
+        c[LANES * k + CHECK] = u
+        time, w = 2.0 * step * w, step * d
+        x_o, gap = 2.0 * step * gv, 2.0 * step * gd
+        v_l, v_r = 2.0 * step * (gl - push_l * z), 2.0 * step * (gr + push_r * z)
+        v_o = 2.0 * step * (go + push_o * z)
+        z_l, z_r = (w, gap) if on_left else (gap, w)
+        put(c, LANES * (k + 1), time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r)
+
+
+@inlined
+def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) -> None:
+    """Fill the Taylor table c from its order 0, with both sides in contact: G = w_l w_r. The series are in s / unit.
+
+    Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
+    w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, H g (1 + p u').
+    """
+    hertz_l, loss_l = pairs[LEFT, HERTZ], pairs[LEFT, DISSIPATION]
+    hertz_r, loss_r = pairs[RIGHT, HERTZ], pairs[RIGHT, DISSIPATION]
+    left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
+    x_o, v_l, v_o, v_r, w_l, w_r = c[X_O], c[V_L], c[V_O], c[V_R], c[Z_L], c[Z_R]
+    b = (w_l * w_r, w_l, w_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * w_r),
+         hertz_r * ((w_r * w_r) * (w_r * w_r) * w_l))
+    w_end_l, w_end_r, u_end_l, u_end_r = w_l, w_r, w_l * w_l, w_r * w_r
+    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(np.uint64(n)):
+        gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, 0, 1)
+        u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, 8, 1)
+        u_l, u_r = u_l + w_end_l * w_l, u_r + w_end_r * w_r
+        q_l, q_r = q_l + u_end_l * u_l, q_r + u_end_r * u_r
+        g_l, g_r = hertz_l * ((g_l + a[8] * w_r) + q_l * b[2]), hertz_r * ((g_r + a[9] * w_l) + q_r * b[1])
+        g = 0.5 * (((ww + a[4] * w_r) + w_l * b[2]) + ((ww_mirrored + a[5] * w_l) + w_r * b[1]))
+        one = 1.0 if k == 0 else 0.0
+        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
+        d_l, d_r = v_l - v_o, v_o - v_r
+        e_l, e_r = one + loss_l * d_l, one + loss_r * d_r
+        z_l, z_r = (z_l + a[10] * g_l) + e_l * b[3], (z_r + a[11] * g_r) + e_r * b[4]
+        wd_l, wd_r = (wd_l + a[6] * w_r) + d_l * b[2], (wd_r + a[7] * w_l) + d_r * b[1]
+        gv, gl, gr, go = (
+            (gv + a[0] * g) + v_o * b[0], (gl + a[1] * g) + a_l * b[0], (gr + a[2] * g) + a_r * b[0],
+            (go + a[3] * g) + a_o * b[0],
+        )
+        put(f, FACTORS * k, v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r)
+        put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r)
+        put(f, FACTORS * k + SECOND, g, g, g, g, w_r, w_l, w_r, w_l)
+        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, w_r, w_l, g_l, g_r)
+        if k == 0:
+            a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
+            w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
+        step = unit / (k + 1)
+        twice = 2.0 * step
+        c[LANES * k + CHECK] = g
+        w_l, w_r, x_o = step * wd_l, step * wd_r, twice * gv
+        v_l, v_r = twice * (gl - left[0] * z_l), twice * (gr + right[0] * z_r)
+        v_o = twice * (go + middle[0] * (z_l - z_r))
+        put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)
+
+
+@inlined
+def step_size(c: Any, left: bool, right: bool, w_l: float, w_r: float, v: float, n: int, tolerance: float) -> float:
+    """Step in s / unit at which the first neglected term is `tolerance` times the scales of the impact.
+
+    The radius of convergence is estimated from the last TAIL coefficients of w and of the velocities. A state at
+    rest gives inf.
+    """
+    growth = -math.inf  # logarithm of the inverse radius
+    for k in range(n - TAIL + 1, n + 1):
+        i = LANES * k
+        size = max(abs(c[i + V_L]), abs(c[i + V_O]), abs(c[i + V_R])) / v
+        if left:
+            size = max(size, abs(c[i + Z_L]) / w_l)
+        if right:
+            size = max(size, abs(c[i + Z_R]) / w_r)
+        if size > 0.0:
+            growth = max(growth, math.log(size) / k)
+    return math.exp(math.log(tolerance) / (n + 1) - growth) if growth > -math.inf else math.inf
+
+
+class Tables(NamedTuple):
+    """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
+
+    The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
+    the beginning of the step, and CHECK for the product w w or w_l w_r as far as it is expanded.
+    """
+
+    c: NDArray[np.float64]
+    f: NDArray[np.float64]
+    at: NDArray[np.float64]  # (LANES,) values of the lanes at some s
+    size: NDArray[np.float64]  # (LANES,) their sums of |c_k| s^k, k >= 2
+    row: NDArray[np.float64]  # (orders,) one polynomial
+
+
+def new_tables(order: int) -> Tables:
+    """Workspace for steps of one order; its tables begin at cache lines, which vector loads want."""
+    orders, line = max(order, FLIGHT_ORDER) + 1, CACHE_LINE // 8
+    ends = list(itertools.accumulate((LANES * orders, FACTORS * orders, LANES, LANES)))
+    room = np.zeros(ends[-1] + order + 1 + line)
+    room = room[-(room.ctypes.data // 8) % line :]
+    c, f, at, size, row = np.split(room, ends)
+    return Tables(c, f, at, size, row[: order + 1])

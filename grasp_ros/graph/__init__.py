@@ -1,0 +1,1 @@
+"""The graph: processes, nodes and bags. Only `nodes` imports rclpy, only `bag` rosbags."""

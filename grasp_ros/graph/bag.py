@@ -1,0 +1,237 @@
+"""Recording and reading bags: rosbag2 directories with MCAP storage, stamped in simulated time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
+from rosbags.typesys import Stores, get_typestore
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic, state_of
+
+_TYPES = get_typestore(Stores.ROS2_JAZZY)
+_NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
+
+
+class BagError(ValueError):
+    """A bag that cannot be written or read: names the path and the reason."""
+
+
+def _qos(topic: Topic) -> Qos:
+    return Qos(
+        QosHistory.KEEP_LAST, topic.depth, QosReliability.RELIABLE,
+        QosDurability.TRANSIENT_LOCAL if topic.latched else QosDurability.VOLATILE, _NO_LIMIT, _NO_LIMIT,
+        QosLiveliness.AUTOMATIC, _NO_LIMIT, False,
+    )
+
+
+class Recorder:
+    """Writes one bag: the scene and the versions first, then ticks.
+
+    Parameters
+    ----------
+    path : Path
+        Directory that does not exist yet.
+    scene : Scene
+        Its topics get a connection each.
+    versions : mapping of str to str
+        Stored in the bag's metadata.
+
+    Raises
+    ------
+    BagError
+        If the directory exists or cannot be written.
+    """
+
+    def __init__(self, path: Path, scene: scenes.Scene, versions: dict[str, str]) -> None:
+        self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        try:
+            self._writer.open()
+        except (WriterError, OSError) as error:
+            raise BagError(f"{path}: cannot be written: {error}") from None
+        scene_yaml = scene.to_yaml()
+        self._writer.set_custom_data("scene", scene_yaml)
+        for name, version in sorted(versions.items()):
+            self._writer.set_custom_data(f"version {name}", version)
+        self._connections: dict[str, Connection] = {
+            topic.name: self._writer.add_connection(
+                f"/{topic.name}", topic.type, typestore=_TYPES, offered_qos_profiles=[_qos(topic)]
+            )
+            for topic in (SCENE, *scene.topics, *CHANGES.values())
+        }
+        string = _TYPES.types[SCENE.type](data=scene_yaml)
+        self.write(SCENE, 0, bytes(_TYPES.serialize_cdr(string, SCENE.type)))
+
+    def write(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
+        """Append one serialized message with its simulated time."""
+        self._writer.write(self._connections[topic.name], time_ns, cdr)
+
+    def write_lyapunov(self, time_ns: int, values: Sequence[float]) -> None:
+        """Append the monitor's own values; serialized here, because rclpy pads this type with stray bytes."""
+        types = _TYPES.types
+        seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
+        stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+        nothing = np.zeros(0)
+        message = types[LYAPUNOV.type](
+            header=header, name=LYAPUNOV_NAMES, position=np.array(values), velocity=nothing, effort=nothing
+        )
+        self.write(LYAPUNOV, time_ns, bytes(_TYPES.serialize_cdr(message, LYAPUNOV.type)))
+
+    def close(self) -> None:
+        """Finish the bag; only now it has its metadata."""
+        self._writer.close()
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is in a bag.
+
+    Attributes
+    ----------
+    path : Path
+    scene : Scene
+    versions : dict of str to str
+        What the recording process ran with.
+    counts : dict of str to int
+        Messages by topic, of those that have one per tick.
+    tick : int array (n,)
+        Ticks whose state is in the bag.
+    state : array (n, 6), m and m/s
+        NaN for a body that is not there.
+    effort, command : arrays (n, 2), N
+        Input forces applied until the tick, commands answered to it; 0 without a controller, NaN where missing.
+    outputs : dict of str to array (n,), N
+        Impact and external forces by topic; NaN where missing.
+    lyapunov : array (n, 6)
+        What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
+    changes : dict of int to dict of str to float
+        Numbers that were set while the graph ran, by the tick from which they act.
+    """
+
+    path: Path
+    scene: scenes.Scene
+    versions: dict[str, str]
+    counts: dict[str, int]
+    tick: np.ndarray
+    state: Array
+    effort: Array
+    command: Array
+    outputs: dict[str, Array]
+    lyapunov: Array
+    changes: dict[int, dict[str, float]]
+
+    @property
+    def t(self) -> Array:
+        """Times in s."""
+        return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
+
+    @property
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force."""
+        scene, starts = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
+        parts = []
+        for begin, end in pairwise(starts):
+            scene = scene.changed(self.changes.get(begin, {}))
+            parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
+        return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    @property
+    def alarms(self) -> int:
+        """Ticks at which the monitor found energy that the held forces do not explain."""
+        return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Ticks up to the last one recorded that have no message, by topic."""
+        ticks = int(self.tick.max(initial=-1)) + 1
+        return {name: ticks - count for name, count in self.counts.items()}
+
+
+def read(path: Path) -> Recording:
+    """Read a bag that the monitor recorded, with the rosbags reader.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag.
+    """
+    try:
+        metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        custom = metadata["rosbag2_bagfile_information"]["custom_data"]
+        scene = scenes.parse(custom["scene"], path.name, str(path))
+        with Reader(path) as reader:
+            columns = {topic: _column(reader, topic, scene) for topic in scene.topics}
+            changes = _changes(reader, scene)
+    except (ReaderError, KeyError, TypeError, OSError, ValueError, yaml.YAMLError) as error:
+        reason = " ".join(str(error).split())
+        raise BagError(f"{path}: not a bag of this package: {reason}") from None
+    ticks, joints = columns[JOINT_STATES]
+    if not len(ticks):
+        raise BagError(f"{path}: holds no tick")
+
+    def aligned(topic: Topic) -> Array:
+        found, values = columns[topic]
+        result = np.full((len(ticks), values.shape[1]), np.nan)
+        _, here, there = np.intersect1d(ticks, found, return_indices=True)
+        result[here] = values[there]
+        return result
+
+    command = np.zeros((len(ticks), 2))
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        command[:, side] = aligned(topic)[:, 0]
+    return Recording(
+        path, scene, {k.removeprefix("version "): v for k, v in custom.items() if k.startswith("version ")},
+        {topic.name: len(found) for topic, (found, _) in columns.items()}, ticks, joints[:, :6], joints[:, 6:], command,
+        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV), changes,
+    )
+
+
+def _messages(reader: Reader, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:
+    """Tick and message of everything on a topic."""
+    connections = [connection for connection in reader.connections if connection.topic == f"/{topic.name}"]
+    for _, time_ns, raw in reader.messages(connections) if connections else ():
+        yield time_ns // scene.period_ns, _TYPES.deserialize_cdr(raw, topic.type)
+
+
+def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
+    found = [(tick, _values(topic, message)) for tick, message in _messages(reader, topic, scene)]
+    rows = np.array([row for _, row in found], dtype=float).reshape(len(found), -1)
+    return np.array([tick for tick, _ in found], dtype=np.int64), rows
+
+
+def _values(topic: Topic, message: Any) -> Array:
+    if topic == JOINT_STATES:
+        state, inputs = state_of(message)
+        return np.concatenate([state, inputs[[LEFT, RIGHT]]])
+    return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
+
+
+def _changes(reader: Reader, scene: scenes.Scene) -> dict[int, dict[str, float]]:
+    changes: dict[int, dict[str, float]] = {}
+    for topic in CHANGES.values():
+        for _, message in _messages(reader, topic, scene):
+            stamp = message.header.stamp  # a monitor that came late has recorded it late
+            tick = (stamp.sec * NANOSECONDS + stamp.nanosec) // scene.period_ns
+            changes.setdefault(tick, {}).update(zip(message.name, message.position.tolist(), strict=True))
+    return changes

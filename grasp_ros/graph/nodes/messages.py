@@ -1,0 +1,125 @@
+"""Conversion between numbers and messages, in one place.
+
+Jazzy does not check fields: an int or a numpy scalar in a float field travels as garbage. Every number that enters
+a message goes through float() here.
+"""
+
+from __future__ import annotations
+
+import struct
+from array import array
+from collections.abc import Mapping, Sequence
+
+from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import WrenchStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.topics import LYAPUNOV_NAMES, Topic
+
+TYPES = {
+    "sensor_msgs/msg/JointState": JointState,
+    "geometry_msgs/msg/WrenchStamped": WrenchStamped,
+    "std_msgs/msg/String": String,
+    "rosgraph_msgs/msg/Clock": Clock,
+    "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+}
+_STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
+_CDR_HEADER = 4
+_TEXT_LENGTH = struct.Struct("<I")  # of the frame_id behind the stamp, with the final zero
+
+
+def qos(topic: Topic) -> QoSProfile:
+    """Reliable everywhere: a lost message would stop the lockstep."""
+    return QoSProfile(
+        depth=topic.depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def to_time(time_ns: int) -> Time:
+    """Stamp of an integer time in ns."""
+    return Time(sec=time_ns // NANOSECONDS, nanosec=time_ns % NANOSECONDS)
+
+
+def to_ns(stamp: Time) -> int:
+    """Integer time in ns of a stamp."""
+    return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
+
+
+def raw_stamp_ns(cdr: bytes) -> int:
+    """Integer time in ns of a serialized stamped message, without deserializing it."""
+    sec, nanosec = _STAMP.unpack_from(cdr, _CDR_HEADER)
+    return int(sec * NANOSECONDS + nanosec)
+
+
+def raw_frame_id(cdr: bytes) -> str:
+    """frame_id of a serialized stamped message, without deserializing it."""
+    begin = _CDR_HEADER + _STAMP.size
+    (length,) = _TEXT_LENGTH.unpack_from(cdr, begin)
+    begin += _TEXT_LENGTH.size
+    return cdr[begin : begin + length - 1].decode()
+
+
+def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array) -> JointState:
+    """State (6,) of some bodies, and the input forces (3,) in N by body."""
+    message = JointState(name=[NAMES[body] for body in bodies])
+    message.header.stamp = to_time(time_ns)
+    message.position = array("d", [state[COLUMN[body]] for body in bodies])
+    message.velocity = array("d", [state[COLUMN[body] + 1] for body in bodies])
+    message.effort = array("d", [inputs[body] for body in bodies])
+    return message
+
+
+def wrench(time_ns: int, force: float, frame_id: str = "") -> WrenchStamped:
+    """A force along the line in N."""
+    message = WrenchStamped()
+    message.header.stamp = to_time(time_ns)
+    message.header.frame_id = frame_id
+    message.wrench.force.x = float(force)
+    return message
+
+
+def named_list(time_ns: int, names: Sequence[str], values: Sequence[float], frame_id: str = "") -> JointState:
+    """A stamped list of numbers with names, which plotters show by name."""
+    message = JointState(name=list(names))
+    message.header.stamp = to_time(time_ns)
+    message.header.frame_id = frame_id
+    message.position = array("d", [float(value) for value in values])
+    return message
+
+
+def lyapunov(time_ns: int, values: Sequence[float]) -> JointState:
+    """What the monitor computes at a tick, see `topics.LYAPUNOV_NAMES`."""
+    return named_list(time_ns, LYAPUNOV_NAMES, values)
+
+
+def clock(time_ns: int) -> Clock:
+    """Simulated time."""
+    return Clock(clock=to_time(time_ns))
+
+
+def text(content: str) -> String:
+    """A text."""
+    return String(data=content)
+
+
+def diagnostics(stamp: Time, name: str, summary: str, healthy: bool, values: Mapping[str, object]) -> DiagnosticArray:
+    """One node's health."""
+    status = DiagnosticStatus(
+        level=DiagnosticStatus.OK if healthy else DiagnosticStatus.WARN,
+        name=name,
+        message=summary,
+        hardware_id="grasp_ros",
+        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
+    )
+    message = DiagnosticArray(status=[status])
+    message.header.stamp = stamp
+    return message

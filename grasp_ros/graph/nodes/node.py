@@ -1,0 +1,182 @@
+"""What every node of the graph shares: parameters, health, the wait for its peers, and its life in a process."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import rclpy
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.scene import Scene
+from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.topics import DIAGNOSTICS, Topic
+
+POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
+PEER_SECONDS = 0.02
+REPORT_SECONDS = 1.0
+PATIENCE_SECONDS = 5.0
+ACKNOWLEDGE_SECONDS = 5.0
+UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
+
+
+class GraspNode(Node):
+    """A node with parameters, counters on /diagnostics and an end."""
+
+    why_read_only = "set at the start only, with -p or a parameter file"
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self.finished = False
+        self.exit_code = 0
+        self.counters: dict[str, int | float | str] = {}
+        self.state = "waiting for peers"
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._diagnostics = self.publisher(DIAGNOSTICS)
+        self.wall_timer(REPORT_SECONDS, self.report)
+
+    def read_only(self, name: str, default: Any, text: str) -> Any:
+        """Declare a parameter that is set at start only, and return its value."""
+        number = isinstance(default, float)  # for which an integer will do as well
+        descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=number)
+        value = self.declare_parameter(name, default, descriptor).value
+        return float(value) if number else value
+
+    def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
+        """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
+
+        The types are dynamic so that an integer will do for a floating-point number.
+        """
+        given = {}
+        for effect in scene.effects:
+            for parameter in effect.parameters if effect.node == executable else ():
+                if parameter.key not in scene.values[effect.section]:
+                    continue
+                name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
+                default = list(value) if parameter.several else value
+                found = self.declare_parameter(name, default, _descriptor(parameter)).value
+                found = list(found) if parameter.several else parameter.read(found)
+                if found != default:
+                    given[name] = found
+        unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        if unknown:  # rclpy itself would not say a word
+            raise ValueError(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
+        return given
+
+    def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Set parameters; integers become floating-point numbers, and a refusal says why."""
+        numbers = []
+        for parameter in parameter_list:
+            if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
+                return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
+            whole = isinstance(parameter.value, int) and not isinstance(parameter.value, bool)
+            numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
+        return super().set_parameters_atomically(numbers)
+
+    def publisher(self, topic: Topic) -> Publisher:
+        """Create the publisher of a topic of the graph."""
+        return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
+
+    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> None:
+        """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
+        self.create_subscription(messages.TYPES[topic.type], topic.name, callback, messages.qos(topic), raw=raw)
+
+    def wall_timer(self, seconds: float, callback: Callable[[], None]) -> Any:
+        """Timer on wall time: simulated time waits for the nodes, so no node may wait for it."""
+        return self.create_timer(seconds, callback, clock=self._steady)
+
+    def when(self, ready: Callable[[], bool], action: Callable[[], None]) -> None:
+        """Do something once, as soon as a condition holds."""
+
+        def poll() -> None:
+            if ready():
+                timer.cancel()
+                action()
+            else:
+                self.get_logger().info(self.state, throttle_duration_sec=PATIENCE_SECONDS, skip_first=True)
+
+        timer = self.wall_timer(PEER_SECONDS, poll)
+
+    def linked(self, publisher: Publisher, sources: Sequence[Topic]) -> bool:
+        """Whether the nodes that publish the source topics all listen to this publisher.
+
+        Matching is asynchronous and messages sent before it are lost. Names come from discovery, which is earlier
+        than matching; so every discovered subscription must also have been matched.
+        """
+        readers = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
+        for source in sources:
+            writers = self.get_publishers_info_by_topic(source.name)
+            if not writers or any((writer.node_namespace, writer.node_name) not in listening for writer in writers):
+                return False
+        return bool(publisher.get_subscription_count() >= len(readers))
+
+    def count(self, counter: str) -> None:
+        """Add one to a counter."""
+        self.counters[counter] = int(self.counters[counter]) + 1
+
+    def flush(self, *publishers: Publisher) -> None:
+        """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
+        deadline = time.monotonic() + ACKNOWLEDGE_SECONDS
+        for publisher in publishers:
+            publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 1e-3)))
+
+    def report(self) -> None:
+        """Publish the counters."""
+        stamp = self.get_clock().now().to_msg()
+        healthy = self.exit_code == 0 and not any(self.counters[key] for key in self.counters if key.startswith("lost"))
+        self._diagnostics.publish(
+            messages.diagnostics(stamp, self.get_fully_qualified_name(), self.state, healthy, self.counters)
+        )
+
+    def close(self) -> None:
+        """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
+
+
+def _descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """What `ros2 param describe` shows of a number of the scene."""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.text}, in {parameter.unit}", additional_constraints=f"allowed: {parameter.allowed}",
+        read_only=not parameter.live, dynamic_typing=True,
+    )
+    if not parameter.whole and not parameter.several:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
+    return descriptor
+
+
+def run(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
+    """Run one node until it has finished or a signal has been received; returns the exit status of the process.
+
+    0 after a finished run or a signal, 2 if the node refuses its parameters, otherwise the node's own status.
+    The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
+    raises.
+    """
+    node = None
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        node = make()
+        executor = EventsExecutor()
+        executor.add_node(node)
+        while not (node.finished or received):
+            executor.spin_once(timeout_sec=POLL_SECONDS)
+        executor.shutdown()
+    except (ValueError, ParameterException) as error:
+        print(error, file=sys.stderr)
+        return 2
+    finally:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return node.exit_code

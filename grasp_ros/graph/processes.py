@@ -1,0 +1,125 @@
+"""Starts the processes of the graph together, waits for them and stops them."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from grasp_ros.scene import Scene
+
+STOP_SECONDS = 10.0
+TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
+POLL_SECONDS = 0.02
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class GraphError(RuntimeError):
+    """A process of the graph failed: names it and its exit status."""
+
+
+@dataclass
+class Graph:
+    """The processes of one scene: plant, monitor and a controller for every arm that has one.
+
+    Parameters
+    ----------
+    scene : Scene
+    directory : Path
+        New directory for the resolved scene and the bag.
+    accuracy : float
+    progress : bool
+        Whether the plant shows a progress bar on the terminal.
+    errors : int, optional
+        Where the processes' messages go, as in `subprocess.Popen`; default: the terminal.
+
+    Raises
+    ------
+    FileExistsError
+        If the directory exists.
+    """
+
+    scene: Scene
+    directory: Path
+    accuracy: float
+    progress: bool = False
+    errors: int | None = None
+    processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+
+    @property
+    def bag(self) -> Path:
+        """Directory of the bag."""
+        return self.directory / "bag"
+
+    def start(self) -> None:
+        """Start the processes, each in a session of its own: a Ctrl-C reaches them through `stop`, once."""
+        self.directory.mkdir(parents=True)
+        scene_file = self.directory / f"{self.scene.name}.yaml"
+        scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+        environment = {
+            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+            "ROS_LOG_DIR": str(self.directory / "log"),
+            **os.environ,
+        }
+        settings = {
+            "monitor": {"bag": json.dumps(str(self.bag))},
+            **{name: {"wait_for_monitor": "true"} for name in self.scene.controllers},
+            "plant": {
+                "scene": json.dumps(str(scene_file)),
+                "accuracy": repr(float(self.accuracy)),
+                "wait_for_monitor": "true",
+                "progress": str(self.progress).lower(),
+            },
+        }
+        # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+        try:
+            for name, parameters in settings.items():
+                words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+                command = [sys.executable, "-m", "grasp_ros.graph.nodes.start", name, "--ros-args", *words]
+                self.processes[name] = subprocess.Popen(
+                    command, env=environment, start_new_session=True, stderr=self.errors
+                )
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def wait(self, received: Sequence[int]) -> None:
+        """Wait until plant and monitor have finished, or until a signal has been received.
+
+        Raises
+        ------
+        GraphError
+            If a process ends with another status than 0, a controller ends early, or plant and monitor do not end
+            together.
+        """
+        deadline = math.inf
+        while not received and (running := [n for n in ("plant", "monitor") if self.processes[n].poll() is None]):
+            if len(running) == 1:
+                deadline = min(deadline, time.monotonic() + TOGETHER_SECONDS)
+            if time.monotonic() > deadline:
+                raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
+            for name, process in self.processes.items():
+                if process.poll() or (process.poll() == 0 and name.endswith("controller")):
+                    raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")
+            time.sleep(POLL_SECONDS)
+
+    def stop(self) -> dict[str, int]:
+        """Interrupt what still runs, wait for it, and return the exit statuses."""
+        for process in self.processes.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGINT)
+        deadline = time.monotonic() + STOP_SECONDS
+        for process in self.processes.values():
+            try:
+                process.wait(max(0.0, deadline - time.monotonic()))
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        return {name: process.returncode for name, process in self.processes.items()}

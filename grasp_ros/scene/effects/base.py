@@ -1,0 +1,86 @@
+"""What an effect is: everything that one section of a scene brings, in one record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import System
+from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.topics import Topic
+
+Numbers = Mapping[str, Any]  # one section of a scene: its keys and values
+Sections = Mapping[str, Numbers]  # a whole scene
+SIDES = {"left": LEFT, "right": RIGHT}
+NANOSECONDS = 1_000_000_000
+
+
+class Output(NamedTuple):
+    """A force that the plant publishes at every tick."""
+
+    topic: Topic
+    value: Callable[[System, int, Array], float]  # system, tick, state (6,) to N
+
+
+class Problem(NamedTuple):
+    """Why numbers that are each in their range do not go together."""
+
+    key: str
+    value: object
+    allowed: str
+
+
+def no_problem(_: Sections) -> Iterable[Problem]:
+    """For effects whose numbers go together in any way."""
+    return ()
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One section of a scene.
+
+    Attributes
+    ----------
+    section : str
+        Its name in a scene; the effect is there if the scene names it.
+    text : str
+        What it simulates, in one line.
+    parameters : tuple of Parameter
+    build : callable
+        Adds its terms to the system.
+    certificate : str
+        What it does to V_c, in words.
+    needs : tuple of str
+        Sections that must be there as well.
+    node : str
+        The executable that declares its parameters.
+    commands : Topic, optional
+        Topic of the controller that it brings.
+    outputs : tuple of Output
+        What the plant publishes about it.
+    problems : callable
+        Finds what is wrong beyond ranges.
+    example : mapping of str to numbers
+        Keys to add to a scene to see what it does; `grasp study effects` does. Empty for what the paper's grasp has.
+    """
+
+    section: str
+    text: str
+    parameters: tuple[Parameter, ...]
+    build: Callable[[Sections, System], None]
+    certificate: str
+    needs: tuple[str, ...] = ()
+    node: str = "plant"
+    commands: Topic | None = None
+    outputs: tuple[Output, ...] = ()
+    problems: Callable[[Sections], Iterable[Problem]] = no_problem
+    example: Numbers = field(default_factory=dict)
+
+
+def period_ns(sections: Sections) -> int:
+    """Control period of a scene in ns."""
+    seconds: float = sections["time"]["control_period_s"]
+    return round(seconds * NANOSECONDS)

@@ -1,0 +1,38 @@
+"""The controllers: linear state feedback of an arm, (4), (5), around a set-point, with a constant force."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections
+from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.topics import COMMANDS
+
+PARAMETERS = (
+    Parameter("position_gain_N_per_m", -1e12, 1e12, "gain of the position feedback, Kp", live=True),
+    Parameter("velocity_gain_Ns_per_m", -1e12, 1e12, "gain of the velocity feedback, Kv", live=True),
+    Parameter("set_point_m", -1e9, 1e9, "position that the feedback aims at; without it 0, as in the paper",
+              optional=True, live=True),
+    Parameter("feed_forward_N", -1e12, 1e12, "constant force added to the feedback", optional=True, live=True),
+)
+
+
+def _build(side: str, sections: Sections, system: System) -> None:
+    numbers = sections[f"{side}_feedback"]
+    system.laws[SIDES[side]] = ControlLaw(
+        numbers["position_gain_N_per_m"], numbers["velocity_gain_Ns_per_m"], numbers.get("set_point_m", 0.0),
+        numbers.get("feed_forward_N", 0.0),
+    )
+
+
+EFFECTS = tuple(
+    Effect(
+        f"{side}_feedback", f"controller of the {side} arm: linear state feedback", PARAMETERS, partial(_build, side),
+        "Kp x^2, with a set-point or a constant force (k + Kp) (x - x_e)^2; the feedback takes 2 Kv x'^2",
+        needs=(f"{side}_arm",), node=f"{side}_controller", commands=COMMANDS[side],
+        example={"set_point_m": 0.05, "feed_forward_N": 0.5},
+    )
+    for side in SIDES
+)

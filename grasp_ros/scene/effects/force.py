@@ -1,0 +1,124 @@
+"""External forces on a body: a pulse, a sine or a table, each constant over a control period.
+
+Because a force changes at ticks only, the motion between them stays exact, and its work is known from the states.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterable
+from functools import partial
+from itertools import pairwise
+
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import ExternalForce, System
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Problem, Sections, no_problem, period_ns
+from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.topics import EXTERNAL_FORCES
+
+SECTIONS = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}
+FORCE = Parameter("force_N", -1e12, 1e12, "force, positive to the right")
+PULSE = (
+    FORCE,
+    Parameter("start_s", 0.0, 1e9, "begin of the pulse"),
+    Parameter("length_s", 0.0, 1e9, "length of the pulse", open_low=True),
+)
+SINE = (
+    Parameter("amplitude_N", 0.0, 1e12, "amplitude"),
+    Parameter("frequency_Hz", 0.0, 1e6, "frequency", open_low=True),
+    Parameter("phase_rad", -1e3, 1e3, "phase at t = 0", optional=True),
+)
+TABLE = (
+    Parameter("time_s", 0.0, 1e9, "times from which the forces act, ascending", several=True),
+    Parameter("force_N", -1e12, 1e12, "forces, each until the next time, the last one for good", several=True),
+)
+
+A_PULSE = {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}
+A_SINE = {"amplitude_N": 1.0, "frequency_Hz": 2.0}
+A_TABLE = {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}
+
+
+def _pulse(section: str, sections: Sections) -> tuple[Callable[[int], float], list[int]]:
+    numbers, period = sections[section], period_ns(sections)
+    begin = round(numbers["start_s"] * NANOSECONDS) // period
+    end = begin + round(numbers["length_s"] * NANOSECONDS) // period
+    return (lambda tick: numbers["force_N"] if begin <= tick < end else 0.0), [begin, end]
+
+
+def _table(section: str, sections: Sections) -> tuple[Callable[[int], float], list[int]]:
+    numbers, period = sections[section], period_ns(sections)
+    ticks = [round(time * NANOSECONDS) // period for time in numbers["time_s"]]
+    forces = (0.0, *numbers["force_N"])
+    return (lambda tick: forces[bisect_right(ticks, tick)]), ticks
+
+
+def _add(section: str, force: ExternalForce, system: System) -> None:
+    system.external.append(force)
+    system.doubts.append(f"{section} does work")
+
+
+def _build_steps(steps: Callable[..., tuple[Callable[[int], float], list[int]]], section: str, body: int,
+                 sections: Sections, system: System) -> None:
+    at, ticks = steps(section, sections)
+    _add(section, ExternalForce(body, at, lambda end: [tick for tick in ticks if 0 < tick < end]), system)
+
+
+def _build_sine(section: str, body: int, sections: Sections, system: System) -> None:
+    """A staircase: each step has the value at the middle of its control period."""
+    numbers = sections[section]
+    turn = 2.0 * math.pi * numbers["frequency_Hz"] * period_ns(sections) / NANOSECONDS
+    phase = numbers.get("phase_rad", 0.0)
+
+    def at(tick: int) -> float:
+        return float(numbers["amplitude_N"] * math.sin(turn * (tick + 0.5) + phase))
+
+    _add(section, ExternalForce(body, at, lambda end: range(1, end)), system)
+
+
+def _off_tick(section: str, keys: tuple[str, ...], sections: Sections) -> Iterable[Problem]:
+    """Times must be whole control periods."""
+    period = period_ns(sections)
+    for key in keys:
+        value = sections[section][key]
+        times = value if isinstance(value, tuple) else (value,)
+        whole = all(round(time * NANOSECONDS) / NANOSECONDS == time for time in times)
+        if not whole or any(round(time * NANOSECONDS) % period for time in times):
+            yield Problem(f"{section}.{key}", value, f"whole control periods of {period / NANOSECONDS:g} s")
+
+
+def _pulse_problems(section: str, sections: Sections) -> Iterable[Problem]:
+    return _off_tick(section, ("start_s", "length_s"), sections)
+
+
+def _table_problems(section: str, sections: Sections) -> Iterable[Problem]:
+    yield from _off_tick(section, ("time_s",), sections)
+    times, forces = sections[section]["time_s"], sections[section]["force_N"]
+    if any(later <= earlier for earlier, later in pairwise(times)):
+        yield Problem(f"{section}.time_s", times, "ascending times")
+    if len(times) != len(forces):
+        yield Problem(f"{section}.force_N", forces, f"as many forces as times, {len(times)}")
+
+
+def _total(body: int, system: System, tick: int, _: Array) -> float:
+    return float(system.external_at(tick)[body])
+
+
+def _effects(name: str, body: int) -> Iterable[Effect]:
+    outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
+    work = "the force does work: V_c rises by 2 f times the way at most"
+    for kind, parameters, build, problems, example in (
+        ("pulse", PULSE, partial(_build_steps, _pulse), _pulse_problems, A_PULSE),
+        ("sine", SINE, _build_sine, lambda _, sections: no_problem(sections), A_SINE),
+        ("table", TABLE, partial(_build_steps, _table), _table_problems, A_TABLE),
+    ):
+        section = f"{name}_{kind}"
+        yield Effect(
+            section, f"external force on the {name.replace('_', ' ')}: a {kind}", parameters,
+            partial(build, section, body), work, needs=(name,), outputs=outputs, problems=partial(problems, section),
+            example=example,
+        )
+
+
+EFFECTS = tuple(effect for name, body in SECTIONS.items() for effect in _effects(name, body))

@@ -1,0 +1,28 @@
+"""Friction of the object on its line: viscous, and dry with sticking (Coulomb)."""
+
+from __future__ import annotations
+
+from grasp_ros.physics.layout import DAMPING, OBJECT
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import Effect, Sections
+from grasp_ros.scene.parameter import Parameter
+
+
+def _build(sections: Sections, system: System) -> None:
+    """m_o x_o'' = ... - c x_o' - F sign(x_o'); at x_o' = 0 the friction balances up to F."""
+    numbers = sections["object_friction"]
+    system.bodies[OBJECT, DAMPING] += numbers.get("viscous_Ns_per_m", 0.0)
+    system.coulomb += numbers.get("coulomb_N", 0.0)
+
+
+EFFECTS = (
+    Effect(
+        "object_friction", "the object rubs on its line",
+        (
+            Parameter("viscous_Ns_per_m", 0.0, 1e12, "drag of the object", optional=True),
+            Parameter("coulomb_N", 0.0, 1e12, "dry friction, sliding and sticking alike", optional=True),
+        ),
+        _build, "takes 2 c x_o'^2 + 2 F |x_o'|", needs=("object",),
+        example={"viscous_Ns_per_m": 0.2, "coulomb_N": 0.2},
+    ),
+)

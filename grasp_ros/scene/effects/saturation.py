@@ -1,0 +1,30 @@
+"""An actuator that cannot push or pull harder than its limit."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections
+from grasp_ros.scene.parameter import Parameter
+
+PARAMETERS = (Parameter("limit_N", 0.0, 1e12, "largest force of the actuator in both directions", live=True),)
+
+
+def _limit(limit: float, force: float) -> float:
+    return min(max(force, -limit), limit)
+
+
+def _build(side: str, sections: Sections, system: System) -> None:
+    system.laws[SIDES[side]].actuation.append(partial(_limit, sections[f"{side}_actuator"]["limit_N"]))
+    system.doubts.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
+
+
+EFFECTS = tuple(
+    Effect(
+        f"{side}_actuator", f"the force of the {side} actuator is limited", PARAMETERS, partial(_build, side),
+        "V_c keeps the energy of the unlimited feedback and may rise while the limit acts",
+        needs=(f"{side}_feedback", "loop"), node=f"{side}_controller", example={"limit_N": 1.0},
+    )
+    for side in SIDES
+)

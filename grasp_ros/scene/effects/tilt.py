@@ -1,0 +1,31 @@
+"""A tilted line: gravity pulls every body along it."""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.physics.layout import FORCE, MASS
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import Effect, Sections
+from grasp_ros.scene.parameter import Parameter
+
+
+def _build(sections: Sections, system: System) -> None:
+    """m x'' = ... - m g sin(angle)."""
+    numbers = sections["tilt"]
+    pull = numbers["gravity_m_per_s2"] * math.sin(numbers["angle_rad"])
+    for body in system.present:
+        system.bodies[body, FORCE] -= system.bodies[body, MASS] * pull
+
+
+EFFECTS = (
+    Effect(
+        "tilt", "the line is tilted: gravity pulls every body along it",
+        (
+            Parameter("angle_rad", -math.pi / 2, math.pi / 2, "angle of the line, positive if the right end is higher"),
+            Parameter("gravity_m_per_s2", 0.0, 1e3, "gravitational acceleration"),
+        ),
+        _build, "2 m g sin(angle) x of every body: V_c is known up to a constant",
+        example={"angle_rad": 0.02, "gravity_m_per_s2": 9.81},
+    ),
+)

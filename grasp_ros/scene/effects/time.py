@@ -1,0 +1,38 @@
+"""Length of a run and its control period. Every scene has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Problem, Sections, period_ns
+from grasp_ros.scene.parameter import Parameter
+
+
+def _build(sections: Sections, system: System) -> None:
+    """Time is not part of the equations."""
+
+
+def _problems(sections: Sections) -> Iterable[Problem]:
+    numbers = sections["time"]
+    for key in ("control_period_s", "duration_s"):
+        seconds = numbers[key]
+        if round(seconds * NANOSECONDS) / NANOSECONDS != seconds or seconds < 1 / NANOSECONDS:
+            yield Problem(f"time.{key}", seconds, "whole nanoseconds")
+            return
+    if round(numbers["duration_s"] * NANOSECONDS) % period_ns(sections):
+        allowed = f"a whole number of control periods of {numbers['control_period_s']!r} s"
+        yield Problem("time.duration_s", numbers["duration_s"], allowed)
+
+
+EFFECTS = (
+    Effect(
+        "time", "length of the run and control period",
+        (
+            Parameter("duration_s", 0.0, 1e9, "length of the run", open_low=True),
+            Parameter("control_period_s", 0.0, 1e3, "how long a command is held if the feedback is sampled",
+                      open_low=True),
+        ),
+        _build, "none", problems=_problems,
+    ),
+)

@@ -1,0 +1,267 @@
+"""Scenes: strict YAML files that say everything about a run.
+
+A scene is composed of effects, each a section of the file, see `grasp_ros.scene.effects`: what it does not name is not
+simulated. Every key carries its unit. Nothing is repaired: a file that is not exactly right is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from grasp_ros.physics.layout import LEFT, MASS, OBJECT, RIGHT
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects import BY_SECTION, EFFECTS
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
+from grasp_ros.scene.effects.loop import HELD
+from grasp_ros.scene.strict_yaml import dump
+from grasp_ros.scene.strict_yaml import load as load_yaml
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
+from grasp_ros.scene.validation import SceneError, check_keys, check_together, read_sections
+
+TEXTS = ("title", "readings", "watch")
+PAPER = frozenset(  # the sections of the paper's grasp
+    ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")
+)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A validated scene.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file without its ending.
+    title : str
+    readings : tuple of str
+        Where the source leaves something open: what this scene assumes.
+    watch : str
+        What to watch for; may be empty.
+    values : mapping of str to mapping of str to float, int or tuple of float
+        Every number that the scene names, by section and key.
+    """
+
+    name: str
+    title: str
+    readings: tuple[str, ...]
+    watch: str
+    values: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def effects(self) -> list[Effect]:
+        """What the scene names, in the order of the registry."""
+        return [effect for effect in EFFECTS if effect.section in self.values]
+
+    @cached_property
+    def system(self) -> System:
+        """What is simulated, as arrays; not to be changed."""
+        system = System()
+        for effect in self.effects:
+            effect.build(self.values, system)
+        return system
+
+    @property
+    def grasp(self) -> Grasp:
+        """The paper's grasp with its gains.
+
+        Raises
+        ------
+        ValueError
+            If the scene is not two arms, an object, two contacts and the paper's feedback.
+        """
+        system = self.system
+        if self.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
+            raise ValueError(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
+        left, right = (self._arm(side) for side in (LEFT, RIGHT))
+        (hertz_l, loss_l), (hertz_r, loss_r) = system.pairs.tolist()
+        mass = float(system.bodies[OBJECT, MASS])
+        return Grasp(left, right, Contact(hertz_l, loss_l), Contact(hertz_r, loss_r), mass)
+
+    def _arm(self, side: int) -> Arm:
+        mass, stiffness, damping, _ = self.system.bodies[side].tolist()
+        law = self.system.laws[side]
+        return Arm(mass, stiffness, damping, law.position_gain, law.velocity_gain)
+
+    @property
+    def initial_state(self) -> Array:
+        """x_l, v_l, x_o, v_o, x_r, v_r at t = 0, shape (6,), m and m/s; 0 for what is not there."""
+        return self.system.state.copy()
+
+    @property
+    def duration(self) -> float:
+        """Length of the run in s."""
+        return float(self.values["time"]["duration_s"])
+
+    @property
+    def period_ns(self) -> int:
+        """Control period in ns."""
+        return period_ns(self.values)
+
+    @property
+    def ticks(self) -> int:
+        """Number of control periods in the run."""
+        return round(self.duration * NANOSECONDS) // self.period_ns
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the scene itself holds its commands over control periods."""
+        return self.system.sampled
+
+    @property
+    def outputs(self) -> list[Output]:
+        """Forces that the plant publishes, one per topic."""
+        return list({output.topic: output for effect in self.effects for output in effect.outputs}.values())
+
+    @property
+    def controllers(self) -> dict[str, Topic]:
+        """Command topics of the controllers by the names of their executables."""
+        return {effect.node: effect.commands for effect in self.effects if effect.commands is not None}
+
+    @property
+    def topics(self) -> list[Topic]:
+        """Topics with one message per tick, in the order in which they are recorded."""
+        forces = [output.topic for output in self.outputs]
+        return [JOINT_STATES, *self.controllers.values(), *forces, LYAPUNOV]
+
+    @property
+    def live(self) -> list[str]:
+        """Numbers, as "section.key", that belong to controllers: what they may be given in place of the scene's."""
+        controllers = self.controllers
+        return [
+            f"{effect.section}.{key}" for effect in self.effects if effect.node in controllers
+            for key in self.values[effect.section]
+        ]
+
+    def certificate_in_words(self, sampled: bool) -> str:
+        """Whether V_c can rise in this scene, and why."""
+        held = [HELD] if sampled and not self.sampled and self.system.laws else []
+        doubts = [*held, *self.system.doubts]
+        return f"V_c may rise: {'; '.join(doubts)}" if doubts else "V_c cannot rise"
+
+    def time_of(self, tick: int) -> float:
+        """Time of a tick in s: an integer number of ns, rounded once."""
+        return tick * self.period_ns / NANOSECONDS
+
+    def feedback_in_words(self, sampled: bool) -> str:
+        """What acts on the arms: the paper's continuous feedback, or commands that are held."""
+        if not self.system.laws:
+            return "no controller"
+        return f"each command held for {self.period_ns / 1e6:g} ms" if sampled else "continuous feedback"
+
+    def changed(self, numbers: Mapping[str, float]) -> Scene:
+        """The scene with other numbers, by "section.key".
+
+        Raises
+        ------
+        SceneError
+            If the result cannot be run.
+        """
+        values = {section: dict(content) for section, content in self.values.items()}
+        for name, number in numbers.items():
+            section, _, key = name.partition(".")
+            if key not in values.get(section, {}):
+                raise SceneError(f"{self.name}: {name}: not in this scene; allowed: what it names")
+            values[section][key] = number
+        values = read_sections(self.name, values)
+        check_together(self.name, values)
+        return replace(self, values=values)
+
+    def to_yaml(self) -> str:
+        """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
+        values = {
+            section: {key: list(value) if isinstance(value, tuple) else value for key, value in numbers.items()}
+            for section, numbers in self.values.items()
+        }
+        texts = {"title": self.title, "readings": list(self.readings), **({"watch": self.watch} if self.watch else {})}
+        return dump({**texts, **values})
+
+
+def names() -> list[str]:
+    """Names of the scenes that come with the package, the paper's cases first."""
+    found = [entry.name.removesuffix(".yaml") for entry in _library().iterdir() if entry.name.endswith(".yaml")]
+    return sorted(found, key=lambda name: (not name.startswith("case_"), name))
+
+
+def load(reference: str, settings: Sequence[str] = ()) -> Scene:
+    """Read a scene of the package by its name, or a file by its path.
+
+    Parameters
+    ----------
+    reference : str
+    settings : sequence of str
+        "section.key=value": numbers that replace those of the file, or name what it does not.
+
+    Raises
+    ------
+    SceneError
+        If there is no such scene, or if it cannot be run as written.
+    """
+    path = Path(reference)
+    if path.suffix in (".yaml", ".yml"):
+        if not path.is_file():
+            raise SceneError(f"{reference}: no such file")
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError as error:
+            raise SceneError(f"{reference}: {error}; allowed: UTF-8 text") from None
+        return parse(text, path.stem, str(path), settings)
+    if reference not in names():
+        known = ", ".join(names())
+        raise SceneError(f"{reference}: no such scene; allowed: a path that ends in .yaml, or one of {known}")
+    return parse((_library() / f"{reference}.yaml").read_text(encoding="utf-8"), reference, reference, settings)
+
+
+def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Scene:
+    """Validate the text of a scene; `source` is the file that errors name.
+
+    Raises
+    ------
+    SceneError
+        If the text is not a scene that can be run as written.
+    """
+    try:
+        document = load_yaml(text)
+    except ValueError as error:
+        raise SceneError(f"{source}: {' '.join(str(error).split())}") from None
+    if not isinstance(document, dict):
+        raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
+    for setting in settings:
+        _apply(document, setting)
+    check_keys(source, "", document, (*TEXTS, *BY_SECTION), ("title", "readings", "time"))
+    title, readings, watch = document["title"], document["readings"], document.get("watch", "")
+    for key, value in (("title", title), ("watch", watch)):
+        if not isinstance(value, str):
+            raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text")
+    if not isinstance(readings, list) or not all(isinstance(reading, str) for reading in readings):
+        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of texts")
+    values = read_sections(source, {key: numbers for key, numbers in document.items() if key in BY_SECTION})
+    check_together(source, values)
+    return Scene(name, title, tuple(readings), watch, values)
+
+
+def _library() -> Any:
+    return resources.files("grasp_ros.config")
+
+
+def _apply(document: dict[Any, Any], setting: str) -> None:
+    match = re.fullmatch(r"(\w+)\.(\w+)=(.*)", setting)
+    if match is None:
+        raise SceneError(f"--set {setting}: not understood; allowed: section.key=value")
+    section, key, value = match.groups()
+    known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
+    if f"{section}.{key}" not in known:
+        raise SceneError(f"--set {setting}: no such key; allowed: {', '.join(known)}")
+    try:
+        number = load_yaml(value)
+    except ValueError as error:
+        raise SceneError(f"--set {setting}: {error}; allowed: a number") from None
+    numbers = document.setdefault(section, {})
+    if isinstance(numbers, dict):  # anything else is refused with the file
+        numbers[key] = number

@@ -1,0 +1,88 @@
+"""What a scene may contain: every refusal names the file, the key, the value and what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from grasp_ros.scene.effects import BY_SECTION, EFFECTS
+from grasp_ros.scene.effects.base import Effect
+from grasp_ros.scene.parameter import Parameter
+
+SOMETHING = frozenset(("left_arm", "object", "right_arm"))
+
+
+class SceneError(ValueError):
+    """A scene that cannot be run as written: names the file, the key, the value and what is allowed."""
+
+
+def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str], needed: Sequence[str]
+               ) -> None:
+    """Refuse unknown keys and missing ones.
+
+    Raises
+    ------
+    SceneError
+        Names the first of them.
+    """
+    for key in found:
+        if key not in allowed:
+            known = ", ".join(allowed)
+            raise SceneError(f"{source}: {prefix}{key}: unknown key with the value {found[key]!r}; allowed: {known}")
+    for key in needed:
+        if key not in found:
+            optional = ", ".join(key for key in allowed if key not in needed)
+            every = f"the keys {', '.join(needed)}" + (f" and, where wanted, {optional}" if optional else "")
+            raise SceneError(f"{source}: {prefix}{key}: missing; allowed: {every}")
+
+
+def read_sections(source: str, values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Numbers of all sections, each within its range.
+
+    Raises
+    ------
+    SceneError
+        If a key or a value is not allowed.
+    """
+    return {section: _section(source, BY_SECTION[section], found) for section, found in values.items()}
+
+
+def _section(source: str, effect: Effect, found: Any) -> dict[str, Any]:
+    keys = [parameter.key for parameter in effect.parameters]
+    needed = [parameter.key for parameter in effect.parameters if not parameter.optional]
+    if not isinstance(found, dict):
+        raise SceneError(
+            f"{source}: {effect.section}: {found!r} is not allowed; allowed: a mapping with {', '.join(keys)}"
+        )
+    check_keys(source, f"{effect.section}.", found, keys, needed)
+    return {
+        parameter.key: _number(source, effect.section, parameter, found[parameter.key])
+        for parameter in effect.parameters
+        if parameter.key in found
+    }
+
+
+def _number(source: str, section: str, parameter: Parameter, value: Any) -> Any:
+    if not parameter.accepts(value):
+        raise SceneError(f"{source}: {section}.{parameter.key}: {value!r} is not allowed; allowed: {parameter.allowed}")
+    return parameter.read(value)
+
+
+def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse sections that do not go together.
+
+    Raises
+    ------
+    SceneError
+        Names the first that does not.
+    """
+    if not SOMETHING & values.keys():
+        raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(sorted(SOMETHING))}")
+    effects = [effect for effect in EFFECTS if effect.section in values]
+    for effect in effects:
+        for section in effect.needs:
+            if section not in values:
+                raise SceneError(f"{source}: {effect.section}: needs {section}; allowed: a scene that names both")
+    for effect in effects:
+        for problem in effect.problems(values):
+            raise SceneError(f"{source}: {problem.key}: {problem.value!r} is not allowed; allowed: {problem.allowed}")

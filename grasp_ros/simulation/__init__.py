@@ -1,0 +1,5 @@
+"""Running a scene without ROS, and what comes of it."""
+
+from grasp_ros.simulation.simulate import GRID_POINTS, Trajectory, load, simulate
+
+__all__ = ["GRID_POINTS", "Trajectory", "load", "simulate"]

@@ -1,0 +1,128 @@
+"""What a hard case is, and who solves it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status, SwitchEvent
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory, simulate
+
+
+class Unfinished(Exception):  # noqa: N818
+    """A solver that does not deliver what was asked for; the text is its status."""
+
+
+class Solver(Protocol):
+    """Whoever integrates the scenes of a case."""
+
+    def states(self, scene: Scene, times: Iterable[float]) -> Array:
+        """States (n, 6) with continuous feedback at ascending times in s; raises Unfinished."""
+
+    def events(self, scene: Scene) -> list[SwitchEvent]:
+        """All switches up to the scene's end; raises Unfinished, also if the solver does not look for them."""
+
+
+@dataclass
+class Product:
+    """The simulation of this package.
+
+    Attributes
+    ----------
+    max_events, max_work : int
+    accuracy : float
+        See `physics.integrator.Integrator`.
+    runs : list of Trajectory
+        All runs so far; what was reached is in them even if a run was stopped.
+    """
+
+    max_events: int = MAX_EVENTS
+    max_work: int = MAX_WORK
+    accuracy: float = ACCURACY
+    runs: list[Trajectory] = field(default_factory=list)
+
+    def run(self, scene: Scene, times: Iterable[float] | None = None, sampled: bool = False) -> Trajectory:
+        """Simulate a scene to its end.
+
+        Raises
+        ------
+        Unfinished
+            If it ends with another status than DONE.
+        """
+        grid = None if times is None else np.array(list(times))
+        result = simulate(scene, grid=grid, sampled=sampled, accuracy=self.accuracy, max_events=self.max_events,
+                          max_work=self.max_work)
+        self.runs.append(result)
+        if result.status is not Status.DONE:
+            raise Unfinished(result.status.value)
+        return result
+
+    def states(self, scene: Scene, times: Iterable[float]) -> Array:
+        """States (n, 6) at ascending times."""
+        return self.run(scene, times).state
+
+    def events(self, scene: Scene) -> list[SwitchEvent]:
+        """All switches."""
+        return self.run(scene, [scene.duration]).events
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hard case.
+
+    Attributes
+    ----------
+    family, name : str
+    why : str
+        Why it is hard.
+    oracle : str
+        What decides.
+    figure : callable
+        Runs the case with a solver and returns its error by the oracle, >= 0.
+    bound : float
+        What the product promises for the figure.
+    limit : Status
+        A status with which the product may end instead; DONE: none.
+    product_only : bool
+        Whether the figure needs more than states and events, which other solvers do not have.
+    max_events, max_work : int
+        Budgets of contact switches and of work.
+    """
+
+    family: str
+    name: str
+    why: str
+    oracle: str
+    figure: Callable[..., float]  # of a Solver, or of the Product
+    bound: float
+    limit: Status = Status.DONE
+    product_only: bool = False
+    max_events: int = MAX_EVENTS
+    max_work: int = MAX_WORK
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a case ended."""
+
+    figure: float | None  # None: no result
+    status: str
+
+    def right(self, case: Case) -> bool:
+        """Whether the figure is within the bound, or the status is the announced one."""
+        if self.figure is not None:
+            return self.figure <= case.bound  # False for NaN
+        return case.limit is not Status.DONE and self.status == case.limit.value
+
+
+def judge(case: Case, solver: Solver) -> Outcome:
+    """Run a case."""
+    try:
+        return Outcome(float(case.figure(solver)), Status.DONE.value)
+    except Unfinished as reason:
+        return Outcome(None, str(reason))

@@ -1,0 +1,109 @@
+"""The sampled loop near and past its stability limit: reported as it is, neither hidden nor repaired."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.control import DelayLine
+from grasp_ros.physics.energy import ledger
+from grasp_ros.physics.sampled import spectral_radius
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory
+from grasp_ros.verification.cases.case import Case, Product
+from grasp_ros.verification.cases.scenes import STANDARD, composed, reference
+
+HALF = 200  # control periods
+LEAST = 1e-300  # J, against 0/0 where nothing moves
+WORK = "(B) of docs/certificate.md: energy that no work explains, over what rounding may add"
+
+
+def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]], **numbers: float) -> Scene:
+    values = {key: dict(content) for key, content in scenes.load("case_01").values.items()}
+    values["time"] = {"duration_s": round(period * ticks, 9), "control_period_s": period}
+    for name, number in numbers.items():
+        for side in ("left", "right"):
+            values[f"{side}_feedback"][name] = number
+    return composed("case_01", {**values, **{key: dict(content) for key, content in added.items()}})
+
+
+def forces_of(trajectory: Trajectory) -> np.ndarray:
+    """Forces (n - 1, 3) that acted over the control periods of a sampled run, from its commands."""
+    system = trajectory.scene.system
+    line = DelayLine(system.delay)
+    rows = []
+    for tick, (left, right) in enumerate(trajectory.command[:-1]):
+        rows.append(line.pass_on(np.array([left, right, 0.0])) + system.external_at(tick))
+    return np.array(rows)
+
+
+def unexplained(trajectory: Trajectory) -> float:
+    """Largest rise of the energy that the held forces do not explain, over the allowance for rounding."""
+    states = np.nan_to_num(trajectory.state)
+    book = ledger(trajectory.scene.system, states[:-1], states[1:], forces_of(trajectory))
+    return float((np.maximum(book.unexplained, 0.0) / np.maximum(book.rounding, LEAST)).max())
+
+
+def _work(scene: Scene, product: Product) -> float:
+    return unexplained(product.run(scene, sampled=True))
+
+
+def _alone(period: float, delay: int, ticks: int) -> Scene:
+    """An arm that meets nobody, in a sampled loop."""
+    scene = scenes.load("arm_alone").changed({
+        "time.control_period_s": period, "time.duration_s": round(ticks * period, 9), "left_feedback.set_point_m": 0.0,
+    })
+    return composed("alone", {**scene.values, "loop": {"delay_ticks": delay}})
+
+
+def _growth(period: float, delay: int, product: Product) -> float:
+    """Growth per period beside the spectral radius of the loop, relative; from the largest swings of both halves."""
+    states = product.run(_alone(period, delay, 2 * HALF)).state[:, :2]
+    size = np.hypot(states[:, 0], states[:, 1])
+    grown = float((size[HALF + 1 :].max() / size[1 : HALF + 1].max()) ** (1.0 / HALF))
+    return abs(grown / spectral_radius(STANDARD, period, delay) - 1.0)
+
+
+def _overflow(product: Product) -> float:
+    """A loop with a spectral radius of 3.6 that nobody stops."""
+    return float(len(product.run(_alone(1.0, 0, 4000)).t))
+
+
+def _one_period(product: Product) -> float:
+    """One control period of 3 s with many contacts in it, beside the reference under the same forces."""
+    scene = _case_01(3.0, 1, {})
+    expected = reference(scene, [0.0, 3.0], force=(1.5, -2.5), feedback=False)
+    return float(np.abs(product.run(scene, sampled=True).state[1] - expected[1]).max())
+
+
+def cases() -> Iterator[Case]:
+    """All sampled loops."""
+    sine = {"amplitude_N": 50.0, "frequency_Hz": 3.0}
+    limit = {"left_actuator": {"limit_N": 0.5}, "right_actuator": {"limit_N": 0.5}}
+    noise = {f"{side}_sensor": {"noise_seed": 1, "position_noise_m": 1e-3, "velocity_noise_m_per_s": 1e-2,
+                                "position_step_m": 1e-4} for side in ("left", "right")}
+    for text, scene in (
+        ("1 ms", _case_01(0.001, 5000, {})), ("0.27 s, just stable", _case_01(0.27, 400, {})),
+        ("0.28 s, just unstable", _case_01(0.28, 400, {})), ("1 s, grows a thousand times", _case_01(1.0, 6, {})),
+        ("10 ms, 5 periods late", _case_01(0.01, 2000, {"loop": {"delay_ticks": 5}})),
+        ("20 ms, 20 periods late, unstable", _case_01(0.02, 1000, {"loop": {"delay_ticks": 20}})),
+        ("unstable, but limited to 0.5 N", _case_01(0.02, 1000, {"loop": {"delay_ticks": 20}, **limit})),
+        ("limited, noisy, in steps", _case_01(0.01, 2000, {"loop": {}, **limit, **noise})),
+        ("a force of 50 N at 3 Hz", _case_01(0.001, 3000, {"object_sine": sine})),
+    ):
+        yield Case("loop", text, "held commands do work; the balance must close in every period", WORK,
+                   partial(_work, scene), 1.0, product_only=True)
+    for period, delay in ((0.27, 0), (0.28, 0), (1.0, 0), (2.0, 0), (0.088, 1), (0.09, 1), (0.06, 3)):
+        yield Case(
+            "loop", f"growth at h = {period:g} s, {delay} periods late", "instability must come as strong as it is",
+            "spectral radius of the sampled loop, per period", partial(_growth, period, delay), 5e-3, product_only=True,
+        )
+    yield Case("loop", "until numbers overflow", "infinities and NaN must not be a result", "the status says so",
+               _overflow, 0.0, limit=Status.NOT_FINITE, product_only=True)
+    yield Case("loop", "3 s in one control period", "all contacts lie between two ticks", "reference with 25 digits",
+               _one_period, 1e-12, product_only=True)
