@@ -14,7 +14,7 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, Integrator
 from grasp_ros.physics import energy as certificate
-from grasp_ros.physics.layout import Event
+from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.verification.oracles import Impact, Ledger, balance, first_touch_from_rest, flight, impact, reduced_mass
@@ -33,10 +33,10 @@ def energy(grasp: Grasp, state: Array) -> certificate.Energy:
 
 
 def make_grasp(
-    arm: Arm = STANDARD, hertz: float = 1e4, p: float = 0.1, object_mass: float = 5.0, right: Arm | None = None
+    arm: Arm = STANDARD, hertzian: float = 1e4, p: float = 0.1, object_mass: float = 5.0, right: Arm | None = None
 ) -> Grasp:
     """The same contact on both sides, and the same arm unless told otherwise."""
-    return Grasp(arm, arm if right is None else right, Contact(hertz, p), Contact(hertz, p), object_mass)
+    return Grasp(arm, arm if right is None else right, Contact(hertzian, p), Contact(hertzian, p), object_mass)
 
 
 # Flight: m x'' + c x' + k x = f.
@@ -74,7 +74,7 @@ class Run(NamedTuple):
     integrator: Integrator
     states: Array
 
-    def times(self, side: int, *kinds: Event) -> Array:
+    def times(self, side: int, *kinds: Transition) -> Array:
         """Times of one side's events of some kinds."""
         return np.array([e.time for e in self.integrator.events if e.side == side and e.kind in kinds])
 

@@ -13,7 +13,7 @@ from oracles import CASES, flight_array
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.energy import ledger
-from grasp_ros.physics.layout import LEFT, RIGHT, Event
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import PAPER, Scene
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
@@ -145,7 +145,7 @@ def test_hammer_gives_the_object_the_momentum_that_the_arm_loses() -> None:
 
 def test_the_wall_gives_way_by_its_share_of_the_momentum() -> None:
     motion = simulate(scenes.load("wall"))
-    bounces = motion.times(Event.RELEASE, RIGHT)
+    bounces = motion.times(Transition.RELEASE, RIGHT)
     assert len(bounces) == 5
     assert abs(motion.state[-1, 4] - 0.2) < 1e-4
     assert motion.state[-1, 5] > 0.0
@@ -263,7 +263,7 @@ def plain_loop(scene: Scene, delay: int) -> Array:
     for tick in range(scene.ticks):
         x_l, v_l, _, _, x_r, v_r = integrator.state
         waiting.append(np.array([-5.0 * x_l - 0.5 * v_l, -5.0 * x_r - 0.5 * v_r, 0.0]))
-        integrator.hold(waiting.popleft())
+        integrator.set_input(waiting.popleft())
         integrator.advance(scene.period_ns / 1e9, start=scene.time_of(tick))
         assert integrator.status is Status.DONE
         states.append(integrator.state)
@@ -419,7 +419,7 @@ def against_the_slope(gap: float, friction: float = 1.0) -> Scene:
 
 def test_a_pair_that_touches_at_rest_is_judged_with_the_friction() -> None:
     touching, apart = simulate(against_the_slope(0.0)), simulate(against_the_slope(1e-12))
-    assert len(touching.times(Event.TOUCH, LEFT)) == len(apart.times(Event.TOUCH, LEFT)) > 3
+    assert len(touching.times(Transition.TOUCH, LEFT)) == len(apart.times(Transition.TOUCH, LEFT)) > 3
     assert np.abs(touching.state - apart.state)[:, :4].max() < 1e-9
     assert np.diff(touching.energy.V_c).max() <= 1e-12
 
@@ -468,7 +468,7 @@ def sliding(**friction: float) -> Scene:
 def test_dry_friction_stops_the_object_where_and_when_it_must() -> None:
     motion = simulate(scenes.load("friction_slide"))
     (stop,) = motion.events
-    assert stop.kind is Event.STICK
+    assert stop.kind is Transition.STICK
     assert stop.time == pytest.approx(2.0 * 1.5 / 1.0, rel=1e-15)
     assert motion.state[-1, 2] == pytest.approx(2.0 * 1.5**2 / 2.0, rel=1e-15)
     assert motion.state[-1, 3] == 0.0
@@ -499,7 +499,7 @@ def test_a_stuck_object_gives_way_only_to_more_than_the_friction(sign: float) ->
                 "object_table": {"time_s": [0.0, 1.0, 2.0], "force_N": [sign, 1.5 * sign, 0.5 * sign]}}
     motion = simulate(scenes.parse(yaml.safe_dump(document), "pull", "pull"))
     slip, stick = motion.events
-    assert (slip.kind, stick.kind) == (Event.SLIP, Event.STICK)
+    assert (slip.kind, stick.kind) == (Transition.SLIP, Transition.STICK)
     assert slip.time == 1.0
     assert stick.time == pytest.approx(3.0, rel=1e-15)  # 0.25 m/s^2 for a second, then as much against it
     assert motion.state[-1, 2] == pytest.approx(sign * 0.25, rel=1e-15)
@@ -523,7 +523,7 @@ def test_the_energy_lost_is_force_times_way() -> None:
                      "object_friction.viscous_Ns_per_m=0", "time.duration_s=10.0")
     motion = simulate(scene, grid=np.linspace(0.0, 10.0, 400_001))
     kinds = {event.kind for event in motion.events}
-    assert {Event.STICK, Event.SLIP} <= kinds
+    assert {Transition.STICK, Transition.SLIP} <= kinds
     way = np.abs(np.diff(motion.state[:, 2])).sum()
     V_c = motion.energy.V_c
     assert V_c[0] - V_c[-1] == pytest.approx(2.0 * 1.0 * way, abs=1e-7)
@@ -535,8 +535,8 @@ def test_the_object_sticks_exactly_while_the_arms_push_too_weakly() -> None:
     stuck = False
     rest = []
     for event in motion.events:
-        if event.kind in (Event.STICK, Event.SLIP):
-            stuck = event.kind is Event.STICK
+        if event.kind in (Transition.STICK, Transition.SLIP):
+            stuck = event.kind is Transition.STICK
             rest.append(event.time)
     assert stuck
     end = motion.t > rest[-1]

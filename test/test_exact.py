@@ -29,7 +29,7 @@ from oracles import (
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.verification.reference import integrate
@@ -38,7 +38,7 @@ GRID = np.linspace(0.0, 20.0, 201)
 LONG = ("case_01", "case_02", "case_03", "case_04", "case_06", "case_09")  # 20 s of reference; 5 s for the others
 TOUCHES = {"case_01": (22, 22), "case_02": (29, 25), "case_03": (27, 21)}
 AT_REST = [-0.3, 0.0, 0.0, 0.0, 0.5, 0.0]
-BEGIN, END = (Event.TOUCH, Event.REENTRY), (Event.RELEASE, Event.CLAMP)
+BEGIN, END = (Transition.TOUCH, Transition.REENTRY), (Transition.RELEASE, Transition.CLAMP)
 
 
 def case(name: str, **options: Any) -> Run:
@@ -74,7 +74,7 @@ def done(result: Run) -> Integrator:
 
 
 @pytest.mark.parametrize(
-    ("m1", "m2", "hertz", "p", "speed", "duration", "restitution"),
+    ("m1", "m2", "hertzian", "p", "speed", "duration", "restitution"),
     [
         (1, 1, 1e4, "0.3", "1", "0.0625829618265027708", "0.83286979226560167"),
         (2, 3, 1e9, "0.5", "0.01", "0.00218480327186658349", "0.996677737196872286"),
@@ -82,9 +82,9 @@ def done(result: Run) -> Integrator:
     ],
 )
 def test_impact_oracle_has_the_known_digits(
-    m1: Any, m2: Any, hertz: float, p: str, speed: str, duration: str, restitution: str | None
+    m1: Any, m2: Any, hertzian: float, p: str, speed: str, duration: str, restitution: str | None
 ) -> None:
-    law = impact(reduced_mass(m1, m2), hertz, mpf(p), mpf(speed))
+    law = impact(reduced_mass(m1, m2), hertzian, mpf(p), mpf(speed))
     assert abs(law.duration / mpf(duration) - 1) < mpf("1e-15")
     z = mpf(p) * mpf(speed)
     y = z * law.restitution
@@ -94,13 +94,13 @@ def test_impact_oracle_has_the_known_digits(
 
 
 def test_impact_oracle_solves_its_equation() -> None:
-    mu, hertz, p, speed = mpf("0.5"), mpf("1e4"), mpf("0.3"), mpf(1)
-    start, law = mp.matrix([0, speed]), impact(mu, hertz, p, speed)
+    mu, hertzian, p, speed = mpf("0.5"), mpf("1e4"), mpf("0.3"), mpf(1)
+    start, law = mp.matrix([0, speed]), impact(mu, hertzian, p, speed)
     # Runge and Kutta in w with dt = 2 w ds: dw/ds = u', du'/ds = -2 (H / mu) w^4 (1 + p u')
     n, depth, t, w, d = 4000, mpf(0), mpf(0), *start
 
     def rate(w: Any, d: Any) -> tuple[Any, Any, Any]:
-        return 2 * w, d, -2 * hertz / mu * w**4 * (1 + p * d)
+        return 2 * w, d, -2 * hertzian / mu * w**4 * (1 + p * d)
 
     h = mp.sqrt(law.depth) / 1000
     with mp.workdps(25):
@@ -174,25 +174,25 @@ def test_switches_against_the_reference(name: str) -> None:
             # a slow touch is as uncertain as position / speed; case 9 amplifies most
             assert np.abs(found - np.array([float(t) for t in expected])).max() < (1e-7 if name == "case_09" else 5e-9)
     if name in TOUCHES:
-        assert tuple(len(result.times(side, Event.TOUCH)) for side in (LEFT, RIGHT)) == TOUCHES[name]
+        assert tuple(len(result.times(side, Transition.TOUCH)) for side in (LEFT, RIGHT)) == TOUCHES[name]
 
 
 def test_first_contacts_of_the_standard_case() -> None:
     result = run(scenes.load("case_01").grasp, AT_REST, 0.6)
     events = {(event.kind, event.side): event for event in done(result).events}
-    touch = events[Event.TOUCH, LEFT].time
-    assert touch == events[Event.TOUCH, RIGHT].time
+    touch = events[Transition.TOUCH, LEFT].time
+    assert touch == events[Transition.TOUCH, RIGHT].time
     assert touch == pytest.approx(float(first_touch_from_rest(1, 15, mpf("0.7"))), rel=2e-16)
-    assert events[Event.TOUCH, LEFT].u_rate == pytest.approx(0.99930564858067212555, rel=1e-15)
-    assert events[Event.RELEASE, LEFT].time == pytest.approx(0.513325334884, abs=6e-13)
-    assert events[Event.RELEASE, RIGHT].time == pytest.approx(0.503118325389, abs=6e-13)
+    assert events[Transition.TOUCH, LEFT].u_rate == pytest.approx(0.99930564858067212555, rel=1e-15)
+    assert events[Transition.RELEASE, LEFT].time == pytest.approx(0.513325334884, abs=6e-13)
+    assert events[Transition.RELEASE, RIGHT].time == pytest.approx(0.503118325389, abs=6e-13)
 
 
 @pytest.mark.parametrize("name", ["case_02", "case_03"])
 def test_marginal_cases_touch_first_at_a_quarter_period(name: str) -> None:
     result = run(scenes.load(name).grasp, AT_REST, 0.5)
     for side in (LEFT, RIGHT):
-        assert result.times(side, Event.TOUCH)[0] == pytest.approx(math.pi / (2 * math.sqrt(15)), rel=2e-16)
+        assert result.times(side, Transition.TOUCH)[0] == pytest.approx(math.pi / (2 * math.sqrt(15)), rel=2e-16)
 
 
 # Events alternate, and happen where the state says.
@@ -206,8 +206,8 @@ def test_events_are_in_order_and_alternate(name: str) -> None:
         own = [e for e in events if e.side == side]
         assert len(own) >= 3
         assert [e.kind in BEGIN for e in own] == [i % 2 == 0 for i in range(len(own))]
-        assert all(e.u == 0.0 for e in own if e.kind in (Event.TOUCH, Event.RELEASE))
-        assert all((e.u_rate > 0.0) == (e.kind is Event.TOUCH) for e in own)
+        assert all(e.u == 0.0 for e in own if e.kind in (Transition.TOUCH, Transition.RELEASE))
+        assert all((e.u_rate > 0.0) == (e.kind is Transition.TOUCH) for e in own)
 
 
 # O1, O2
@@ -230,19 +230,19 @@ IMPACTS = [
 
 
 @pytest.mark.parametrize("mirror", [False, True])
-@pytest.mark.parametrize(("m1", "m2", "hertz", "p", "speed"), IMPACTS)
-def test_single_impact(m1: float, m2: float, hertz: float, p: float, speed: float, mirror: bool) -> None:
-    law = impact(reduced_mass(m1, m2), hertz, p, speed)
+@pytest.mark.parametrize(("m1", "m2", "hertzian", "p", "speed"), IMPACTS)
+def test_single_impact(m1: float, m2: float, hertzian: float, p: float, speed: float, mirror: bool) -> None:
+    law = impact(reduced_mass(m1, m2), hertzian, p, speed)
     duration = float(law.duration)
     arms = FREE._replace(mass=m1), FREE
     start = [-speed, speed, 0.0, 0.0, 1e3 * speed * (1 + duration), 1e3 * speed]  # touches after exactly 1 s
     if mirror:
         arms = arms[::-1]
         start = [-value for value in start[4:6] + start[2:4] + start[0:2]]
-    contacts = Contact(hertz, p), Contact(hertz, p)
+    contacts = Contact(hertzian, p), Contact(hertzian, p)
     result = run(Grasp(*arms, *contacts, m2), start, 1 + duration * 1.1, [1 + duration / 2])
     touch, release = done(result).events
-    assert (touch.kind, release.kind) == (Event.TOUCH, Event.RELEASE)
+    assert (touch.kind, release.kind) == (Transition.TOUCH, Transition.RELEASE)
     assert touch.side == release.side == (RIGHT if mirror else LEFT)
     assert touch.time == 1.0
     assert release.time - touch.time == pytest.approx(duration, rel=1e-12, abs=4.5e-16)
@@ -287,8 +287,8 @@ def test_huge_dissipation_creeps_open() -> None:
     [
         *((scenes.load(name).grasp, scenes.load(name).initial_state, 20.0) for name in CASES),
         (make_grasp(Arm(1.0, 10.0, 0.2, 50.0, 5.0), 1e4, 10.0, 1.0), [-0.3, 0, 0, 0, 0.3, 0], 3.0),
-        (make_grasp(hertz=1e3, p=15.0, object_mass=1.0), [-0.3, 0, 0, 0, 0.2, 0], 5.0),
-        (make_grasp(hertz=1e12), AT_REST, 1.0),
+        (make_grasp(hertzian=1e3, p=15.0, object_mass=1.0), [-0.3, 0, 0, 0, 0.2, 0], 5.0),
+        (make_grasp(hertzian=1e12), AT_REST, 1.0),
         (make_grasp(object_mass=1e-4), AT_REST, 1.0),
         (make_grasp(object_mass=1e6), AT_REST, 5.0),
         (make_grasp(Arm(1.0, 10.0, 0.0, 5.0, 9.0)), [-0.3, 2.0, 0.0, 0.0, 0.5, -2.0], 5.0),
@@ -348,7 +348,7 @@ def test_symmetric_scene_keeps_the_object_at_zero(arm: Arm, p: float) -> None:
 @pytest.mark.parametrize("name", [*CASES, "clamped"])
 def test_mirror_is_exact(name: str) -> None:
     if name == "clamped":
-        grasp, start = make_grasp(hertz=1e3, p=15.0, object_mass=1.0), np.array([-0.3, 0, 0, 0, 0.2, 0])
+        grasp, start = make_grasp(hertzian=1e3, p=15.0, object_mass=1.0), np.array([-0.3, 0, 0, 0, 0.2, 0])
     else:
         grasp, start = scenes.load(name).grasp, scenes.load(name).initial_state
     grasp = grasp._replace(left=grasp.left._replace(mass=grasp.left.mass * 1.25), left_contact=Contact(3e3, 0.2))
@@ -365,7 +365,7 @@ def test_mirror_is_exact(name: str) -> None:
 @pytest.mark.parametrize("name", ["case_01", "case_06", "clamped"])
 def test_scaling_by_powers_is_exact(name: str, L: float, S: float, A: float) -> None:
     if name == "clamped":
-        grasp, start = make_grasp(hertz=1e3, p=15.0, object_mass=1.0), np.array([-0.3, 0, 0, 0, 0.2, 0])
+        grasp, start = make_grasp(hertzian=1e3, p=15.0, object_mass=1.0), np.array([-0.3, 0, 0, 0, 0.2, 0])
     else:
         grasp, start = scenes.load(name).grasp, scenes.load(name).initial_state
 
@@ -376,7 +376,7 @@ def test_scaling_by_powers_is_exact(name: str, L: float, S: float, A: float) -> 
         )
 
     def contact(c: Contact) -> Contact:
-        return Contact(c.hertz * A / (S**2 * math.sqrt(L)), c.dissipation * S / L)
+        return Contact(c.hertzian * A / (S**2 * math.sqrt(L)), c.dissipation * S / L)
 
     image = Grasp(
         arm(grasp.left),
@@ -419,7 +419,7 @@ def test_separated_chain(object_mass: float, p: float, duration: float, speeds: 
     assert done(result).state[1::2] == pytest.approx(speeds, abs=1e-13)
     assert sum(kind == "TOUCH" for kind, _ in kinds(result)) == touches
     if p:
-        assert result.times(LEFT, Event.TOUCH)[1] == pytest.approx(74.994, abs=5e-4)
+        assert result.times(LEFT, Transition.TOUCH)[1] == pytest.approx(74.994, abs=5e-4)
 
 
 @pytest.mark.parametrize(
@@ -430,10 +430,10 @@ def test_separated_chain(object_mass: float, p: float, duration: float, speeds: 
         (0.1, (-0.0475095756030004457, 0.907669860965354066, 0.956742589506465039)),
     ],
 )
-@pytest.mark.parametrize("hertz", [1e4, 1e8])
+@pytest.mark.parametrize("hertzian", [1e4, 1e8])
 @pytest.mark.parametrize("speed", [1.0, 1e-3])
-def test_touching_chain(object_mass: float, speeds: Any, hertz: float, speed: float) -> None:
-    grasp = make_grasp(FREE, hertz, 0.0, object_mass)
+def test_touching_chain(object_mass: float, speeds: Any, hertzian: float, speed: float) -> None:
+    grasp = make_grasp(FREE, hertzian, 0.0, object_mass)
     result = run(grasp, [0.0, speed, 0.0, 0.0, 0.0, 0.0], 10.0)
     assert done(result).state[1::2] / speed == pytest.approx(speeds, abs=1e-12)
     mirrored = run(grasp, [0.0, 0.0, 0.0, 0.0, 0.0, -speed], 10.0)
@@ -447,7 +447,7 @@ def test_elastic_symmetric_arm_is_periodic() -> None:
     assert np.abs(result.states[0] - start).max() < 2e-14
     assert np.abs(result.states[1] - start).max() < 1e-8  # measured: 2e-9
     assert done(result).status is Status.DONE
-    assert len(result.times(LEFT, Event.TOUCH)) == 1000
+    assert len(result.times(LEFT, Transition.TOUCH)) == 1000
 
 
 # O13
@@ -490,7 +490,7 @@ def test_touches_that_are_nearly_simultaneous(exponent: int) -> None:
     start = [-1.0, 1.0, 0.0, 0.0, 1.0 + 10.0**-exponent, -1.0]
     delay = start[4] - 1.0  # what double precision makes of it
     result = run(make_grasp(FREE, 1e4, 0.3, 1.0), start, 1.5)
-    touches = [result.times(side, Event.TOUCH) for side in (LEFT, RIGHT)]
+    touches = [result.times(side, Transition.TOUCH) for side in (LEFT, RIGHT)]
     assert [len(times) for times in touches] == [1, 1]
     assert touches[1][0] - touches[0][0] == pytest.approx(delay, rel=1e-4, abs=3e-16)
     assert result.integrator.state[3] == pytest.approx(-5.65648 * delay, rel=1e-5 + 5 * delay, abs=2e-15)
@@ -518,9 +518,9 @@ def test_symmetric_clamp_and_reentry_of_scene_a() -> None:
 
 
 def test_one_sided_reentry_of_scene_b() -> None:
-    grasp = make_grasp(hertz=1e3, p=15.0, object_mass=1.0)
+    grasp = make_grasp(hertzian=1e3, p=15.0, object_mass=1.0)
     result = run(grasp, [-0.3, 0, 0, 0, 0.2, 0], 0.6)
-    reentry = [e for e in done(result).events if e.kind is Event.REENTRY]
+    reentry = [e for e in done(result).events if e.kind is Transition.REENTRY]
     assert [e.side for e in reentry] == [RIGHT]
     assert reentry[0].time == pytest.approx(0.572927357351903, abs=1e-12)
     tiny = 1e-9
@@ -653,9 +653,9 @@ def test_a_very_long_flight_ends_in_its_touch() -> None:
     assert result.integrator.work[Work.ROOT_ITERATIONS] < 200
 
 
-@pytest.mark.parametrize(("object_mass", "hertz"), [(1e-6, 1e4), (1e6, 1e4), (1e6, 1e6), (1e6, 1e12)])
-def test_extreme_ratios_against_the_reference(object_mass: float, hertz: float) -> None:
-    grasp = make_grasp(hertz=hertz, object_mass=object_mass)
+@pytest.mark.parametrize(("object_mass", "hertzian"), [(1e-6, 1e4), (1e6, 1e4), (1e6, 1e6), (1e6, 1e12)])
+def test_extreme_ratios_against_the_reference(object_mass: float, hertzian: float) -> None:
+    grasp = make_grasp(hertzian=hertzian, object_mass=object_mass)
     start, horizon = [-0.3, 0.0, 0.01, 0.0, 0.5, 0.0], 0.45 if object_mass < 1 else 1.2
     grid = np.linspace(0.0, horizon, 11)
     reference = integrate(grasp, start, grid.tolist(), digits=20)
@@ -750,7 +750,7 @@ def test_held_forces_obey_the_work_theorem() -> None:
         right=STANDARD._replace(position_gain=0.0, velocity_gain=0.0),
     )
     integrator = Integrator(System.of(grasp, np.array(AT_REST)), continuous=False)
-    integrator.hold(np.array([2.0, -3.0, 0.0]))
+    integrator.set_input(np.array([2.0, -3.0, 0.0]))
     integrator.advance(3.0)
     # the same with the force as a shifted spring's rest point: continuous feedback of the passive arm about f / k
     times = np.linspace(0.0, 3.0, 4)

@@ -15,7 +15,7 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import discrete_gradient, fixed_step, library
 from grasp_ros.methods.equations import Solution, parameters
 from grasp_ros.methods.registry import EXACT, METHODS, STEP
-from grasp_ros.physics.layout import LEFT, RIGHT, Event
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Grasp, acceleration
 from grasp_ros.simulation import Trajectory, load, simulate
 
@@ -42,7 +42,7 @@ def slope(steps: Any, errors: Any) -> float:
 def python_rk4(grasp: Grasp, y: Array, h: float, push: bool) -> Array:
     """One classical step with the model's own right-hand side; `push` False: nothing touches."""
     without = grasp._replace(
-        left_contact=grasp.left_contact._replace(hertz=0.0), right_contact=grasp.right_contact._replace(hertz=0.0)
+        left_contact=grasp.left_contact._replace(hertzian=0.0), right_contact=grasp.right_contact._replace(hertzian=0.0)
     )
 
     def f(y: Array) -> Array:
@@ -97,7 +97,7 @@ def test_paper_touch_step_by_hand() -> None:
     after = python_rk4(grasp, at_touch, 0.4 * h, push=True)
     assert result.state[0] == pytest.approx(after, abs=1e-15)
     assert result.state[1] == pytest.approx(python_rk4(grasp, after, h, push=True), abs=1e-15)
-    assert result.switches == pytest.approx(np.array([[0.6 * h, LEFT, Event.TOUCH, 0.0, 1.0]]), abs=1e-15)
+    assert result.event_table == pytest.approx(np.array([[0.6 * h, LEFT, Transition.TOUCH, 0.0, 1.0]]), abs=1e-15)
 
 
 def test_paper_release_step_by_hand() -> None:
@@ -111,7 +111,7 @@ def test_paper_release_step_by_hand() -> None:
     assert 0.3 < part < 0.5
     assert result.state[0] == pytest.approx(start + 0.1 * (overshoot - start), abs=1e-15)
     assert result.state[1] == pytest.approx(python_rk4(grasp, chord, (1.0 - part) * h, push=False), abs=1e-15)
-    assert result.switches[0, :3] == pytest.approx([part * h, LEFT, Event.RELEASE], abs=1e-15)
+    assert result.event_table[0, :3] == pytest.approx([part * h, LEFT, Transition.RELEASE], abs=1e-15)
 
 
 def test_paper_takes_both_sides_in_one_step_in_their_order() -> None:
@@ -120,21 +120,21 @@ def test_paper_takes_both_sides_in_one_step_in_their_order() -> None:
     start = np.array([-0.8e-3, 1.0, 0.0, 0.0, 0.3e-3, -1.0])
     result = fixed(fixed_step.PAPER, grasp, start, [h], h)
     first = start + 0.3 * (python_rk4(grasp, start, h, push=False) - start)
-    only_right = grasp._replace(left_contact=grasp.left_contact._replace(hertz=0.0))
+    only_right = grasp._replace(left_contact=grasp.left_contact._replace(hertzian=0.0))
     rest = python_rk4(only_right, first, 0.7 * h, push=True)
     gap, gap_end = first[0] - first[2], rest[0] - rest[2]
     part = gap / (gap - gap_end)
     second = first + part * (rest - first)
     last = python_rk4(grasp, second, (1.0 - part) * 0.7 * h, push=True)
-    assert result.switches[:, 1].tolist() == [RIGHT, LEFT]
-    assert result.switches[:, 0] == pytest.approx([0.3 * h, (0.3 + part * 0.7) * h], abs=1e-15)
+    assert result.event_table[:, 1].tolist() == [RIGHT, LEFT]
+    assert result.event_table[:, 0] == pytest.approx([0.3 * h, (0.3 + part * 0.7) * h], abs=1e-15)
     assert result.state[0] == pytest.approx(last, abs=1e-15)
 
 
 def test_paper_is_of_order_2_through_a_touch() -> None:
     """Steps that meet the first touch of case 1 at their middle; elsewhere the motion is smooth."""
     grasp, start = make_grasp(STANDARD), [-0.3, 0.0, 0.0, 0.0, 9.0, 0.0]
-    touch = simulate(horizon("case_01", 0.5, "right_arm.position_m=9")).times(Event.TOUCH, LEFT)[0]
+    touch = simulate(horizon("case_01", 0.5, "right_arm.position_m=9")).times(Transition.TOUCH, LEFT)[0]
     exact = simulate(horizon("case_01", 0.44, "right_arm.position_m=9")).state[-1, :4]
     counts = (3200, 6400, 12800, 25600)
     steps = [touch / (n + 0.5) for n in counts]
@@ -189,14 +189,14 @@ def test_methods_agree_with_exact_for_some_contacts(name: str) -> None:
     assert motion.work[0] > 100
     if name in LOCATING:
         for side in (LEFT, RIGHT):
-            for kind in (Event.TOUCH, Event.RELEASE):
+            for kind in (Transition.TOUCH, Transition.RELEASE):
                 assert motion.times(kind, side) == pytest.approx(exact.times(kind, side), abs=1e-6)
     else:
-        assert len(motion.switches) == 0
+        assert len(motion.event_table) == 0
 
 
 @pytest.mark.parametrize("name", LOCATING)
-def test_condition_10_is_a_switch_in_both_directions(name: str) -> None:
+def test_condition_10_is_an_event_in_both_directions(name: str) -> None:
     """Oracles' scene (a): both pairs pass u' = -1/p at once, come back through it, and then release."""
     settings = [
         f"{key}={value}"
@@ -210,8 +210,8 @@ def test_condition_10_is_a_switch_in_both_directions(name: str) -> None:
     motion = simulate(scene, method=name, setting=PRECISE[METHODS[name].knob])
     tolerance = 1e-4 if name == "paper" else 1e-6
     for side in (LEFT, RIGHT):
-        assert motion.times(Event.CLAMP, side) == pytest.approx([0.315452318447362], abs=tolerance)
-        assert motion.times(Event.REENTRY, side) == pytest.approx([0.363159009501776], abs=tolerance)
+        assert motion.times(Transition.CLAMP, side) == pytest.approx([0.315452318447362], abs=tolerance)
+        assert motion.times(Transition.REENTRY, side) == pytest.approx([0.363159009501776], abs=tolerance)
 
 
 @pytest.mark.parametrize("name", STEPPING)
@@ -250,7 +250,7 @@ def test_jacobian_is_the_derivative_of_the_right_hand_side() -> None:
 def test_a_coarse_method_misses_contacts_and_does_not_hide_it() -> None:
     """design.md: order 8 with events reports success on case 2 with most of the 54 touches missed."""
     motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=1e-5)
-    found = sum(len(motion.times(Event.TOUCH, side)) for side in (LEFT, RIGHT))
+    found = sum(len(motion.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     assert motion.status is Status.DONE
     assert 0 < found < 54
 
@@ -268,7 +268,7 @@ def test_output_does_not_depend_on_the_grid_or_its_repetitions() -> None:
 def test_event_budget_is_a_status(name: str) -> None:
     motion = simulate(horizon("case_01", 5.0), method=name, setting=1e-3, max_events=3)
     assert motion.status is Status.EVENT_BUDGET
-    assert len(motion.switches) == 3
+    assert len(motion.event_table) == 3
     assert 0 < len(motion.t) < 2001
 
 
@@ -284,7 +284,7 @@ def test_saved_with_method_setting_and_its_own_counters(tmp_path: Any) -> None:
     again = load(tmp_path / "a.npz")
     assert (again.method, again.setting, again.counters) == ("rk4_events", 1e-3, motion.counters)
     assert motion.counters["right hand sides"] >= 4000
-    assert np.array_equal(again.switches, motion.switches)
+    assert np.array_equal(again.event_table, motion.event_table)
 
 
 @pytest.mark.parametrize(
@@ -333,11 +333,11 @@ def test_elastic_arm_keeps_its_period() -> None:
     )
     motion = simulate(scene, method="rk4_events", setting=1e-4)
     assert ELASTIC.damping == 0.0
-    touches = motion.times(Event.TOUCH, LEFT)
+    touches = motion.times(Transition.TOUCH, LEFT)
     assert np.diff(touches) == pytest.approx(period, abs=1e-6)
 
 
-def test_switches_without_progress_end_with_a_status() -> None:
+def test_events_without_progress_end_with_a_status() -> None:
     """scipy at 1e-4 on case 2: a touch and a release at the same instant, for ever."""
     motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=1e-4)
     assert motion.status is Status.STALLED

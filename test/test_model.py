@@ -13,7 +13,7 @@ from grasp_ros.physics.model import (
     Mode,
     acceleration,
     feedback,
-    hertz_force,
+    hertzian_force,
     impact_force,
     impact_forces,
     in_contact,
@@ -40,18 +40,18 @@ STATES = {
 def test_layout_indexes_every_column_once() -> None:
     assert sorted((layout.LEFT, layout.RIGHT, layout.OBJECT)) == [0, 1, 2]
     assert sorted((layout.MASS, layout.STIFFNESS, layout.DAMPING, layout.FORCE)) == [0, 1, 2, 3]
-    assert sorted((layout.HERTZ, layout.DISSIPATION)) == [0, 1]
+    assert sorted((layout.HERTZIAN, layout.DISSIPATION)) == [0, 1]
     state = (layout.X_L, layout.V_L, layout.X_O, layout.V_O, layout.X_R, layout.V_R, layout.U_L, layout.U_R)
     assert state == tuple(range(8))
     assert layout.U_R == layout.U_L + layout.RIGHT
-    for enum in (layout.Pair, layout.Event, layout.Outcome, layout.Work):
+    for enum in (layout.Pair, layout.Transition, layout.Outcome, layout.Work):
         assert sorted(enum) == list(range(len(enum)))
 
 
 def test_hand_numbers() -> None:
     assert feedback(STANDARD, 0.2, -2.0) == pytest.approx(-5.0 * 0.2 + 0.5 * 2.0)
     contact = Contact(1e4, 0.1)
-    assert hertz_force(contact, np.float64(0.01)) == pytest.approx(10.0)  # 1e4 0.01^1.5
+    assert hertzian_force(contact, np.float64(0.01)) == pytest.approx(10.0)  # 1e4 0.01^1.5
     assert impact_force(contact, np.float64(0.01), np.float64(2.0)) == pytest.approx(12.0)
     assert impact_force(contact, np.float64(0.01), np.float64(-4.0)) == pytest.approx(6.0)
     assert impact_force(contact, np.float64(0.01), np.float64(-11.0)) == 0.0

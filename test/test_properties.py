@@ -67,24 +67,24 @@ def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @settings(FIXED, max_examples=40)
 @given(st.floats(0.0, 12.0), st.floats(-6.0, 3.0), st.just(0.0) | st.floats(1e-3, 100.0), st.floats(-3.0, 3.0))
-def test_isolated_impacts_of_any_kind(hertz: float, speed: float, loss: float, mass: float) -> None:
+def test_isolated_impacts_of_any_kind(hertzian: float, speed: float, loss: float, mass: float) -> None:
     """Restitution and duration to 1e-11 over H = 1 to 1e12, v = 1e-6 to 1e3 m/s, p v = 0 to 100."""
-    assert impact_error(1.0, 10.0**mass, 10.0**hertz, (loss,), 10.0**speed, Product()) <= 1e-11
+    assert impact_error(1.0, 10.0**mass, 10.0**hertzian, (loss,), 10.0**speed, Product()) <= 1e-11
 
 
 @settings(FIXED, max_examples=25)
 @given(st.floats(2.0, 8.0), st.floats(-2.0, 1.3), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5), st.floats(0.0, 6.0))
-def test_agreement_with_an_independent_method(hertz: float, p: float, mass: float, v: float, damping: float) -> None:
+def test_agreement_with_an_independent_method(hertzian: float, p: float, mass: float, v: float, damping: float) -> None:
     scene = grasp([-0.3, v, 0.0, 0.0, 0.4, 0.0], 1.0, left=Arm(1.0, 10.0, 0.2, 20.0, damping),
-                  contact=Contact(10.0**hertz, 10.0**p), mass=10.0**mass)
+                  contact=Contact(10.0**hertzian, 10.0**p), mass=10.0**mass)
     times = [0.0, 0.5, scene.duration]
     assert distance(Product().states(scene, times), reference(scene, times)) < 1e-10
 
 
 @settings(FIXED, max_examples=60)
 @given(st.floats(0.0, 8.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
-def test_elastic_motion_runs_backwards(hertz: float, mass: float, v_l: float, v_o: float) -> None:
-    scene = grasp([-0.3, v_l, 0.05, v_o, 0.3, 0.2], 1.0, left=ELASTIC, contact=Contact(10.0**hertz, 0.0),
+def test_elastic_motion_runs_backwards(hertzian: float, mass: float, v_l: float, v_o: float) -> None:
+    scene = grasp([-0.3, v_l, 0.05, v_o, 0.3, 0.2], 1.0, left=ELASTIC, contact=Contact(10.0**hertzian, 0.0),
                   mass=10.0**mass)
     assert reversal(scene, Product()) < 1e-9
 

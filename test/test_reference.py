@@ -27,9 +27,9 @@ def _precision() -> Any:
         yield
 
 
-def grasp(arm: Arm, hertz: float, p: float, object_mass: float) -> Grasp:
+def grasp(arm: Arm, hertzian: float, p: float, object_mass: float) -> Grasp:
     """The same arm and contact on both sides."""
-    return Grasp(arm, arm, Contact(hertz, p), Contact(hertz, p), object_mass)
+    return Grasp(arm, arm, Contact(hertzian, p), Contact(hertzian, p), object_mass)
 
 
 def close(actual: Any, expected: Any, tolerance: str) -> bool:
@@ -122,9 +122,9 @@ def test_more_digits_and_a_finer_grid_change_nothing() -> None:
     assert fine.as_array().shape == (101, 6)
 
 
-def two_bodies(m1: float, m2: float, hertz: float, p: Any, speed: Any) -> Reference:
+def two_bodies(m1: float, m2: float, hertzian: float, p: Any, speed: Any) -> Reference:
     """An impact of free bodies in their centre-of-mass frame's shape: the left arm meets a resting object."""
-    scene = Grasp(FREE._replace(mass=m1), FREE, Contact(hertz, p), NOTHING, m2)
+    scene = Grasp(FREE._replace(mass=m1), FREE, Contact(hertzian, p), NOTHING, m2)
     return integrate(scene, [-speed, speed, 0.0, 0.0, 50.0, 0.0], [0.0, 2.0], digits=30, decimal=True)
 
 
@@ -140,13 +140,13 @@ def test_hertz_impact_lasts_as_long_as_the_beta_function_says() -> None:
 
 
 @pytest.mark.parametrize(
-    ("m1", "m2", "hertz", "p", "speed"),
+    ("m1", "m2", "hertzian", "p", "speed"),
     [(1.0, 1.0, 1e4, 0.3, 1.0), (2.0, 3.0, 1e9, 0.5, 0.01), (1.0, 1e-3, 1e5, 10.0, 3.0)],
 )
 def test_damped_impact_has_the_restitution_of_its_first_integral(
-    m1: float, m2: float, hertz: float, p: float, speed: float
+    m1: float, m2: float, hertzian: float, p: float, speed: float
 ) -> None:
-    result = two_bodies(m1, m2, hertz, p, speed)
+    result = two_bodies(m1, m2, hertzian, p, speed)
     z = mpfr(repr(p)) * mpfr(repr(speed))
     # u' + ln(1 - u') for the exit equals its value for the approach: z - ln(1 + z) = -(y + ln(1 - y)), y = p v_o
     y = bisect(lambda y: z - gmpy2.log1p(z) + y + gmpy2.log1p(-y), min(z, 1) / 10**6, 1 - mpfr("1e-30"))

@@ -15,7 +15,7 @@ from grasp_ros.exact.series import Tables, expand_both, expand_one, new_tables, 
 from grasp_ros.physics.layout import (
     CHECK,
     DISSIPATION,
-    HERTZ,
+    HERTZIAN,
     LANES,
     LEFT,
     RIGHT,
@@ -115,7 +115,7 @@ def picard(name: str, n: int) -> dict[int, list[Any]]:
         for side, w, d, touching in ((LEFT, z[Z_L], d_l, left), (RIGHT, z[Z_R], d_r, right)):
             if touching:
                 damped = linear(1, (pairs[side, DISSIPATION], d))
-                force[side] = linear(0, (pairs[side, HERTZ], times(w, w, w, damped)))
+                force[side] = linear(0, (pairs[side, HERTZIAN], times(w, w, w, damped)))
         m_l, k_l, c_l, f_l = bodies[0]
         m_r, k_r, c_r, f_r = bodies[1]
         m_o, k_o, c_o, f_o = bodies[2]
@@ -167,8 +167,8 @@ def test_the_table_solves_its_equation(name: str) -> None:
     d_l, d_r = value[V_L] - value[V_O], value[V_O] - value[V_R]
     assert rate[Z_L] == pytest.approx((w_r if left else clock) * d_l, rel=1e-12)
     assert rate[Z_R] == pytest.approx((w_l if right else clock) * d_r, rel=1e-12)
-    force_l = PAIRS[LEFT, HERTZ] * w_l**3 * (1.0 + PAIRS[LEFT, DISSIPATION] * d_l) if left else 0.0
-    force_r = PAIRS[RIGHT, HERTZ] * w_r**3 * (1.0 + PAIRS[RIGHT, DISSIPATION] * d_r) if right else 0.0
+    force_l = PAIRS[LEFT, HERTZIAN] * w_l**3 * (1.0 + PAIRS[LEFT, DISSIPATION] * d_l) if left else 0.0
+    force_r = PAIRS[RIGHT, HERTZIAN] * w_r**3 * (1.0 + PAIRS[RIGHT, DISSIPATION] * d_r) if right else 0.0
     x_o = value[X_O]
     x_l, x_r = x_o + (w_l**2 if left else value[Z_L]), x_o - (w_r**2 if right else value[Z_R])
     a_l = (0.4 - 15.0 * x_l - 0.7 * value[V_L] - force_l) / 1.0
@@ -182,7 +182,7 @@ def test_the_table_solves_its_equation(name: str) -> None:
 def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
     n, tau = 30, 0.01
     pairs = PAIRS.copy()
-    pairs[LEFT if other == "right" else RIGHT, HERTZ] = 0.0
+    pairs[LEFT if other == "right" else RIGHT, HERTZIAN] = 0.0
     left = other == "left"
     ends = []
     for touching, high, start in (((True, True), 1.0, expand("both", n, pairs)), ((left, not left), 0.15, None)):

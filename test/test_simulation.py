@@ -12,7 +12,7 @@ from oracles import energy
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
@@ -33,7 +33,7 @@ def plain_loop(scene: Scene) -> tuple[Array, Array]:
     for _ in range(scene.ticks):
         x_l, v_l, _, _, x_r, v_r = integrator.state
         forces.append((feedback(grasp.left, x_l, v_l), feedback(grasp.right, x_r, v_r)))
-        integrator.hold(np.array([*forces[-1], 0.0]))
+        integrator.set_input(np.array([*forces[-1], 0.0]))
         integrator.advance(scene.period_ns / 1e9)
         assert integrator.status is Status.DONE
         states.append(integrator.state)
@@ -63,7 +63,7 @@ def test_sampled_is_a_plain_loop_bit_for_bit(name: str, period: float) -> None:
     assert np.array_equal(result.command[:-1], forces)
     assert np.array_equal(result.t, tick_times(scene))
     assert result.sampled
-    assert len(result.times(Event.TOUCH, LEFT)) >= 1
+    assert len(result.times(Transition.TOUCH, LEFT)) >= 1
 
 
 def test_sampled_between_ticks() -> None:
@@ -136,8 +136,8 @@ def test_file_holds_everything(tmp_path: Path, name: str, sampled: bool) -> None
         for key, values in zip(("V", "V_c", "V_rate", "mode"), level, strict=True):
             assert np.array_equal(data[key], values)
         for side, word in ((LEFT, "left"), (RIGHT, "right")):
-            assert np.array_equal(data[f"touch_{word}"], result.times(Event.TOUCH, side))
-            assert np.array_equal(data[f"release_{word}"], result.times(Event.RELEASE, side))
+            assert np.array_equal(data[f"touch_{word}"], result.times(Transition.TOUCH, side))
+            assert np.array_equal(data[f"release_{word}"], result.times(Transition.RELEASE, side))
             assert len(data[f"touch_{word}"]) >= 2
         assert data["events"].shape == (len(result.events), 5)
         assert dict(zip(data["work_names"].tolist(), data["work"].tolist(), strict=True)) == {
@@ -155,7 +155,7 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
     assert a.scene == b.scene
     assert a.sampled is b.sampled
     assert a.events == b.events
-    assert all(type(event.kind) is Event for event in a.events)
+    assert all(type(event.kind) is Transition for event in a.events)
     assert a.status is b.status
     for name in ("t", "state", "command", "work"):
         assert np.array_equal(getattr(a, name), getattr(b, name))
@@ -247,7 +247,7 @@ def test_stability_limit_of_a_sampled_free_arm(gains: tuple[float, float], limit
                 ],
             )
             integrator = Integrator(System.of(scene.grasp, np.array([*state, 1e6, 0.0, 2e6, 0.0])), continuous=False)
-            integrator.hold(np.array([feedback(scene.grasp.left, *state), 0.0, 0.0]))
+            integrator.set_input(np.array([feedback(scene.grasp.left, *state), 0.0, 0.0]))
             integrator.advance(period)
             assert integrator.events == []
             columns.append(integrator.state[:2])

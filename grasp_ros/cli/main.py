@@ -68,7 +68,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     _add_method(sub)
     sub.add_argument("--max-events", type=_whole(1), default=MAX_EVENTS, metavar="N",
-                     help=f"budget of contact switches (default {MAX_EVENTS})")
+                     help=f"budget of contact events (default {MAX_EVENTS})")
     sub.add_argument("--max-work", type=_whole(1), default=MAX_WORK, metavar="N",
                      help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.npz", help="write states, events, V and counters")

@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.graph.bag import Recording
 from grasp_ros.methods.registry import EXACT, METHODS, UNITS
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Event
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
@@ -48,9 +48,9 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
 
 def _touches(trajectory: Trajectory) -> str:
     """Touches of both sides; what is rare only where it happens."""
-    text = ", ".join(str(len(trajectory.times(Event.TOUCH, side))) for side in (LEFT, RIGHT))
-    clamps = sum(len(trajectory.times(Event.CLAMP, side)) for side in (LEFT, RIGHT))
-    sticks = len(trajectory.times(Event.STICK, OBJECT))
+    text = ", ".join(str(len(trajectory.times(Transition.TOUCH, side))) for side in (LEFT, RIGHT))
+    clamps = sum(len(trajectory.times(Transition.CLAMP, side)) for side in (LEFT, RIGHT))
+    sticks = len(trajectory.times(Transition.STICK, OBJECT))
     return text + (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
 
 

@@ -10,7 +10,7 @@ from grasp_ros.exact.modes import ABSENT, CONTACT, reduced_mass, scales
 from grasp_ros.physics.layout import (
     DAMPING,
     FORCE,
-    HERTZ,
+    HERTZIAN,
     LEFT,
     MASS,
     RIGHT,
@@ -58,7 +58,7 @@ def energy_level(bodies: Any, pairs: Any, friction: Any, y: Any, mode: Any, t: f
     for side in (LEFT, RIGHT):
         u = y[U_L + side]
         if u > 0.0 and mode[side] != ABSENT:
-            impact += 0.8 * pairs[side, HERTZ] * u * u * math.sqrt(u)
+            impact += 0.8 * pairs[side, HERTZIAN] * u * u * math.sqrt(u)
     return left + right + own + impact, size_l + size_r + size_o + impact
 
 

@@ -17,7 +17,7 @@ from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
     FORCE,
-    HERTZ,
+    HERTZIAN,
     LANES,
     LEFT,
     MASS,
@@ -54,7 +54,7 @@ def impact_on_object(pairs: Any, y: Any, mode: Any) -> float:
         if mode[side] == CONTACT:
             u = y[U_L + side]
             d = y[V_L] - y[V_O] if side == LEFT else y[V_O] - y[V_R]
-            force = pairs[side, HERTZ] * u * math.sqrt(u) * (1.0 + pairs[side, DISSIPATION] * d)
+            force = pairs[side, HERTZIAN] * u * math.sqrt(u) * (1.0 + pairs[side, DISSIPATION] * d)
             total += force if side == LEFT else -force
     return total
 
@@ -105,9 +105,9 @@ def impact_series(tables: Any, pairs: Any, mode: Any, n: int, row: Any) -> None:
         product(f, w, w, square, n)
         product(f, square, w, cube, n)
         product(f, cube, e, square, n)
-        hertz = pairs[side, HERTZ] if side == LEFT else -pairs[side, HERTZ]
+        hertzian = pairs[side, HERTZIAN] if side == LEFT else -pairs[side, HERTZIAN]
         for k in range(n + 1):
-            row[k] += hertz * f[square + k]
+            row[k] += hertzian * f[square + k]
 
 
 @kernel

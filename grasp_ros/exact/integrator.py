@@ -15,7 +15,7 @@ from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.modes import SPARE, UNKNOWN
 from grasp_ros.exact.series import Tables, new_tables, series_order
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Event, Outcome, Work
+from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Outcome, Transition, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -37,23 +37,23 @@ class Status(Enum):
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
-class SwitchEvent(NamedTuple):
-    """One switch of one pair, or of the object."""
+class Event(NamedTuple):
+    """One event of one pair, or of the object."""
 
     time: float  # s
     side: int  # layout.LEFT or RIGHT; OBJECT for what friction does
-    kind: Event
+    kind: Transition
     u: float  # penetration, m; 0 for the object
     u_rate: float  # m/s; 0 for the object
 
 
-def to_events(switches: Array) -> list[SwitchEvent]:
+def to_events(table: Array) -> list[Event]:
     """Records of rows (m, 5)."""
-    time, side, kind, u, u_rate = switches.T.tolist()
-    return list(map(SwitchEvent, time, map(int, side), map(_KINDS.__getitem__, map(int, kind)), u, u_rate))
+    time, side, kind, u, u_rate = table.T.tolist()
+    return list(map(Event, time, map(int, side), map(_KINDS.__getitem__, map(int, kind)), u, u_rate))
 
 
-_KINDS = tuple(Event)
+_KINDS = tuple(Transition)
 _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
@@ -79,11 +79,11 @@ class Integrator:
     ----------
     system : System
     continuous : bool
-        True: the feedback acts all the time, (4), (5). False: the arms get the forces of `hold` only.
+        True: the feedback acts all the time, (4), (5). False: the arms get the forces of `set_input` only.
     accuracy : float
         Size of the first neglected Taylor term of a contact relative to the impact, in [1e-16, 1e-3].
     max_events : int
-        Budget of switches; the integration stops with `Status.EVENT_BUDGET` beyond it.
+        Budget of events; the integration stops with `Status.EVENT_BUDGET` beyond it.
     max_work : int
         Budget of flights, Taylor steps and evaluations of event functions together; the integration stops with
         `Status.WORK_BUDGET` when it is used up.
@@ -116,8 +116,8 @@ class Integrator:
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, UNKNOWN, dtype=np.int64)
         self._tables, self._event_rows = _workspace(accuracy)
-        self._switches: list[Array] = []
-        self._switch_count = 0
+        self._events: list[Array] = []
+        self._event_count = 0
 
     @property
     def state(self) -> Array:
@@ -143,16 +143,16 @@ class Integrator:
         return f"{self.status.value}: t = {self._time!r} s, mode {mode}, state {self.state.tolist()}"
 
     @property
-    def switches(self) -> Array:
-        """All switches so far, shape (m, 5): time, side, kind, u, u'."""
-        return np.concatenate(self._switches) if self._switches else np.empty((0, 5))
+    def event_table(self) -> Array:
+        """All events so far, shape (m, 5): time, side, kind, u, u'."""
+        return np.concatenate(self._events) if self._events else np.empty((0, 5))
 
     @property
-    def events(self) -> list[SwitchEvent]:
-        """The rows of `switches` as records."""
-        return to_events(self.switches)
+    def events(self) -> list[Event]:
+        """The rows of `event_table` as records."""
+        return to_events(self.event_table)
 
-    def hold(self, forces: Array) -> None:
+    def set_input(self, forces: Array) -> None:
         """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
         self._bodies[:, FORCE] = self._own_forces + forces
         self._friction[PUSH] = self._bodies[OBJECT, FORCE]
@@ -185,7 +185,7 @@ class Integrator:
         clock = np.zeros(2)
         filled = np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
-            allowed = self._event_rows[: self._max_events - self._switch_count + SPARE]
+            allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
             outcome = hybrid.advance(
                 self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
                 self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled, self.work,
@@ -193,11 +193,11 @@ class Integrator:
             if filled[1]:
                 rows = self._event_rows[: filled[1]].copy()
                 rows[:, 0] += start
-                self._switches.append(rows)
-                self._switch_count += len(rows)
+                self._events.append(rows)
+                self._event_count += len(rows)
                 filled[1] = 0
             if outcome == Outcome.EVENTS_FULL:
-                if self._switch_count > self._max_events:
+                if self._event_count > self._max_events:
                     self.status = Status.EVENT_BUDGET
             elif outcome != Outcome.WORK_USED or self._spent >= self._max_work:
                 self.status = _STATUS[Outcome(outcome)]

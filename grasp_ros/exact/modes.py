@@ -9,7 +9,7 @@ from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
     FORCE,
-    HERTZ,
+    HERTZIAN,
     LEFT,
     MASS,
     OBJECT,
@@ -22,12 +22,12 @@ from grasp_ros.physics.layout import (
     X_L,
     X_O,
     X_R,
-    Event,
     Pair,
+    Transition,
 )
 
 OPEN, CONTACT, CLAMPED, LEAVING, HELD, ABSENT = (int(p) for p in Pair)
-TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = (int(e) for e in Event)
+TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = (int(e) for e in Transition)
 GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
 SPARE = 8  # events that one segment can have: three per pair, and two of the object
 UNKNOWN = -1  # mode of a pair before the first call
@@ -51,7 +51,7 @@ def judge(bodies: Any, pairs: Any, y: Any, side: int, pace: float, other_in_cont
 
     At rest there the first derivative that differs decides. Gravity, for one, pulls both bodies alike.
     """
-    if pairs[side, HERTZ] == 0.0:
+    if pairs[side, HERTZIAN] == 0.0:
         return ABSENT
     u = y[U_L + side]
     d, _ = relative_motion(bodies, y, side)
@@ -98,16 +98,16 @@ def root_of_two(x: float, degree: int) -> float:
 
 
 @inlined
-def impact_scales(hertz: float, mu: float, u: float, d: float, a: float) -> Any:
+def impact_scales(hertzian: float, mu: float, u: float, d: float, a: float) -> Any:
     """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
 
     The energy is that of the present motion and penetration, and of the motion that an acceleration a > 0 from
     outside will bring: it presses the pair to the depth (mu a / H)^(2/3).
     """
-    energy = 0.5 * mu * d * d + 0.4 * hertz * u * u * math.sqrt(u)
+    energy = 0.5 * mu * d * d + 0.4 * hertzian * u * u * math.sqrt(u)
     if a > 0.0:
-        energy += mu * a * (mu * a / hertz) ** (2.0 / 3.0)
-    return root_of_two(2.5 * energy / hertz, 5), root_of_two(2.0 * energy / mu, 2)
+        energy += mu * a * (mu * a / hertzian) ** (2.0 / 3.0)
+    return root_of_two(2.5 * energy / hertzian, 5), root_of_two(2.0 * energy / mu, 2)
 
 
 @inlined
@@ -119,11 +119,11 @@ def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float) -
     d, a = relative_motion(bodies, y, side)
     other = 1 - side
     if mode[other] in (CONTACT, HELD):
-        w, v = impact_scales(pairs[other, HERTZ], reduced_mass(bodies, other), y[U_L + other],
+        w, v = impact_scales(pairs[other, HERTZIAN], reduced_mass(bodies, other), y[U_L + other],
                              relative_motion(bodies, y, other)[0], 0.0)
         if w > 0.0:
             a = max(a, 0.0) + v * v / (w * w) * (reduced_mass(bodies, other) / bodies[OBJECT, MASS])
-    w, v = impact_scales(pairs[side, HERTZ], reduced_mass(bodies, side), y[U_L + side], d, a)
+    w, v = impact_scales(pairs[side, HERTZIAN], reduced_mass(bodies, side), y[U_L + side], d, a)
     if pace > 0.0:
         reach = root_of_two(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / pace) / pace), 2)
         w = min(w, reach) if w > 0.0 else reach  # 0 where the energy of a motion that died out underflows

@@ -30,7 +30,7 @@ from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
     FORCE,
-    HERTZ,
+    HERTZIAN,
     LANES,
     LEFT,
     MASS,
@@ -125,20 +125,20 @@ def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, 
     0 and 1 are added here: a term of two such coefficients occurs once, so a constant that multiplies the newest
     coefficient is set after its own order.
     """
-    hertz, loss = pairs[side, HERTZ], pairs[side, DISSIPATION]
+    hertzian, loss = pairs[side, HERTZIAN], pairs[side, DISSIPATION]
     left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
     on_left = side == LEFT
     push_l, push_r, push_o = (left[0], 0.0, middle[0]) if on_left else (0.0, right[0], -middle[0])
     x_o, v_l, v_o, v_r = c[X_O], c[V_L], c[V_O], c[V_R]
     w, gap = (c[Z_L], c[Z_R]) if on_left else (c[Z_R], c[Z_L])
-    w_0, g_0, w_end, u_end = w, hertz * ((w * w) * (w * w)), w, w * w  # w_end, u_end multiply the newest w, u
+    w_0, g_0, w_end, u_end = w, hertzian * ((w * w) * (w * w)), w, w * w  # w_end, u_end multiply the newest w, u
     w_1 = g_1 = w_next = u_next = w_before = u_before = g_before = 0.0
     first = second = before = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
         gv, gd, gl, gr, go, u, q, z = convolve(f, k, 0, 2)
         u = (u + w_next * w_before) + w_end * w
         q = (q + u_next * u_before) + u_end * u
-        g = hertz * q
+        g = hertzian * q
         u_l, u_r = (u, gap) if on_left else (gap, u)
         one = 1.0 if k == 0 else 0.0
         a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
@@ -177,8 +177,8 @@ def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) ->
     Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
     w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, H g (1 + p u').
     """
-    hertz_l, loss_l = pairs[LEFT, HERTZ], pairs[LEFT, DISSIPATION]
-    hertz_r, loss_r = pairs[RIGHT, HERTZ], pairs[RIGHT, DISSIPATION]
+    hertz_l, loss_l = pairs[LEFT, HERTZIAN], pairs[LEFT, DISSIPATION]
+    hertz_r, loss_r = pairs[RIGHT, HERTZIAN], pairs[RIGHT, DISSIPATION]
     left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
     x_o, v_l, v_o, v_r, w_l, w_r = c[X_O], c[V_L], c[V_O], c[V_R], c[Z_L], c[Z_R]
     b = (w_l * w_r, w_l, w_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * w_r),

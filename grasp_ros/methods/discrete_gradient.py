@@ -7,7 +7,7 @@ With the mean velocity of a step the equations (1) to (3) become
 
 Every potential is a function of one linear combination of the positions, so that its average gradient along the step
 is this difference quotient. V_c then changes by the damping terms alone, to the last digit that Newton's method
-leaves; with C = p = 0 it is constant for any step. The rest is only of order 2. No switch is located, and none
+leaves; with C = p = 0 it is constant for any step. The rest is only of order 2. No event is located, and none
 needs to be: the quotient spans a touch, and conserves V_c through it.
 
 References
@@ -47,7 +47,7 @@ def solve(
         Ascending output times in [0, duration].
     step : float, s
     max_events : int
-        Budget of contact switches.
+        Budget of contact events.
     """
     out, work = np.empty((len(grid), 6)), np.zeros(len(Work), dtype=np.int64)
     outcome, rows = run(parameters(grasp), tuple(state.tolist()), duration, grid, step, out, work)
@@ -72,13 +72,13 @@ def quotient(u0: float, u1: float) -> Any:
 
 
 @kernel
-def mean_force(hertz: float, loss: float, u0: float, u1: float, h: float) -> Any:
+def mean_force(hertzian: float, loss: float, u0: float, u1: float, h: float) -> Any:
     """F of the step and its derivative by u1."""
     elastic, slope = quotient(u0, u1)
     factor = 1.0 + loss * (u1 - u0) / h
     if not factor > 0.0:
         return 0.0, 0.0
-    return hertz * elastic * factor, hertz * (slope * factor + elastic * loss / h)
+    return hertzian * elastic * factor, hertzian * (slope * factor + elastic * loss / h)
 
 
 @kernel

@@ -10,21 +10,21 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import kernel
-from grasp_ros.physics.layout import LEFT, Event, Pair
+from grasp_ros.physics.layout import LEFT, Pair, Transition
 from grasp_ros.physics.model import Array, Grasp
 
 OPEN, CONTACT, CLAMPED = int(Pair.OPEN), int(Pair.CONTACT), int(Pair.CLAMPED)
 EPS = 2.0**-52
 SLIVER = 1e-9  # of a step: what rounding may leave at the end of the horizon
-TOUCH, RELEASE, CLAMP, REENTRY = (int(e) for e in (Event.TOUCH, Event.RELEASE, Event.CLAMP, Event.REENTRY))
+TOUCH, RELEASE, CLAMP, REENTRY = (int(kind) for kind in tuple(Transition)[:4])
 
 
 class Work(IntEnum):
     """Columns of the work counters of a method that steps in time."""
 
-    STEPS = 0  # steps, and parts of steps between switches
+    STEPS = 0  # steps, and parts of steps between events
     RIGHT_HAND_SIDES = 1
-    EVENT_EVALUATIONS = 2  # trial steps or interpolants that look for a switch
+    EVENT_EVALUATIONS = 2  # trial steps or interpolants that look for a event
     IMPLICIT_ITERATIONS = 3  # Newton iterations, or factorised Jacobians
 
 
@@ -32,7 +32,7 @@ class Solution(NamedTuple):
     """What a method delivers."""
 
     state: Array  # (n, 6), m and m/s; fewer rows than output times if it stopped early
-    switches: Array  # (m, 5): time, side, kind, u, u'; none if the method does not look for them
+    event_table: Array  # (m, 5): time, side, kind, u, u'; none if the method does not look for them
     work: Any  # int array, columns `Work`
     status: Status
 
@@ -41,7 +41,7 @@ def parameters(grasp: Grasp) -> Array:
     """m, K, C, H, p of the left and of the right side, then m_o, shape (11,), SI; the feedback is in K and C."""
     sides = ((grasp.left, grasp.left_contact), (grasp.right, grasp.right_contact))
     rows = [
-        (arm.mass, arm.stiffness + arm.position_gain, arm.damping + arm.velocity_gain, pair.hertz, pair.dissipation)
+        (arm.mass, arm.stiffness + arm.position_gain, arm.damping + arm.velocity_gain, pair.hertzian, pair.dissipation)
         for arm, pair in sides
     ]
     return np.array([*rows[0], *rows[1], grasp.object_mass])
@@ -99,11 +99,11 @@ def kind_of(before: int, after: int) -> int:
 
 
 @kernel
-def note(switches: Any, count: int, time: float, side: int, kind: int, y: Any) -> None:
-    """Write one row of the record of switches."""
+def note(events: Any, count: int, time: float, side: int, kind: int, y: Any) -> None:
+    """Write one row of the record of events."""
     u, d = relative(y, side)
-    switches[count, 0], switches[count, 1], switches[count, 2] = time, side, kind
-    switches[count, 3], switches[count, 4] = u, d
+    events[count, 0], events[count, 1], events[count, 2] = time, side, kind
+    events[count, 3], events[count, 4] = u, d
 
 
 @kernel

@@ -1,17 +1,17 @@
 """The classical Runge-Kutta method of order 4 with a fixed step, and three ways to treat contact.
 
 `plain` leaves (6), (7) and (10) to the right-hand side. `paper` is the paper's section "Simulation Method", read
-literally. `located` freezes the mode and finds each switch to rounding. u^(3/2) has a kink in its second derivative
+literally. `located` freezes the mode and finds each event to rounding. u^(3/2) has a kink in its second derivative
 at u = 0: no way reaches order 4 through a touch. What is measured near it is order 2.5 at best.
 
 The paper's method, in its own words and this reading of them:
 
 * Contact is judged by (10) "at the beginning and the end of every time step". Within a step the condition is frozen.
-* If it changes, time and "all state values" at the switch come from linear interpolation over the step. The quantity
+* If it changes, time and "all state values" at the event come from linear interpolation over the step. The quantity
   that is interpolated is the one that changed sign: u, or u' + 1/p.
 * "For the rest of this time step the response is calculated" under the new condition, with another Runge-Kutta step.
-* Both sides in one step are "the mixture of the previous ones": the earlier switch first, the other one in the rest.
-  Each side switches at most once in a step; whatever happens after that is judged at the next beginning.
+* Both sides in one step are "the mixture of the previous ones": the earlier event first, the other one in the rest.
+  Each side changes at most once in a step; whatever happens after that is judged at the next beginning.
 
 References
 ----------
@@ -71,13 +71,13 @@ def solve(
         Ascending output times in [0, duration].
     step : float, s
     max_events : int
-        Budget of contact switches.
+        Budget of contact events.
     """
     q, y = parameters(grasp), tuple(state.tolist())
     out, work = np.empty((len(grid), 6)), np.zeros(len(Work), dtype=np.int64)
-    switches = np.empty((0 if rule == PLAIN else max_events, 5))  # memory is only touched where it is written
-    outcome, rows, found = run(rule, q, y, duration, grid, step, out, switches, work)
-    return Solution(out[:rows], switches[:found].copy(), work, _STATUS[outcome])
+    events = np.empty((0 if rule == PLAIN else max_events, 5))  # memory is only touched where it is written
+    outcome, rows, found = run(rule, q, y, duration, grid, step, out, events, work)
+    return Solution(out[:rows], events[:found].copy(), work, _STATUS[outcome])
 
 
 @kernel
@@ -131,7 +131,7 @@ def next_mode(q: Any, y: Any, side: int, mode: int) -> int:
 
 @kernel
 def root_fraction(q: Any, y: Any, f: Any, h: float, mode: Any, side: int, after: int, work: Any) -> float:
-    """Shortest part of a step that carries one pair past its switch: Illinois, with Runge-Kutta steps as function."""
+    """Shortest part of a step that carries one pair past its event: Illinois, with Runge-Kutta steps as function."""
     low, high = 0.0, 1.0
     at_low = distance(q, y, side, mode[side], after)
     if at_low >= 0.0:
@@ -161,8 +161,8 @@ def root_fraction(q: Any, y: Any, f: Any, h: float, mode: Any, side: int, after:
 
 
 @kernel
-def first_switch(rule: int, q: Any, y: Any, f: Any, z: Any, h: float, mode: Any, free: Any, work: Any) -> Any:
-    """Fraction, side and next mode of the first switch in a step from y to z; a fraction of 2 if there is none."""
+def first_transition(rule: int, q: Any, y: Any, f: Any, z: Any, h: float, mode: Any, free: Any, work: Any) -> Any:
+    """Fraction, side and next mode of the first event in a step from y to z; a fraction of 2 if there is none."""
     best, where, then = 2.0, LEFT, OPEN
     for side in (LEFT, RIGHT):
         if not free[side]:
@@ -192,28 +192,28 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
 
 
 @kernel
-def judge_again(q: Any, y: Any, t: float, mode: Any, switched: Any, switches: Any, found: int) -> int:
-    """Judge (10) at the beginning of a step of the paper's method; returns the number of switches.
+def judge_again(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, found: int) -> int:
+    """Judge (10) at the beginning of a step of the paper's method; returns the number of events.
 
-    A pair that switches exactly here has u at a rounding error of either sign, and keeps its mode.
+    A pair that changes exactly here has u at a rounding error of either sign, and keeps its mode.
     """
     for side in (LEFT, RIGHT):
         now = condition(q, y, side)
-        if now == mode[side] or switched[side] == t:
+        if now == mode[side] or changed[side] == t:
             continue
-        if (now == CONTACT or mode[side] == CONTACT) and found < switches.shape[0]:
-            note(switches, found, t, side, kind_of(mode[side], now), y)
+        if (now == CONTACT or mode[side] == CONTACT) and found < events.shape[0]:
+            note(events, found, t, side, kind_of(mode[side], now), y)
             found += 1
         mode[side] = now
     return found
 
 
 @allocating
-def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, switches: Any, work: Any) -> Any:
-    """All steps; returns the outcome and how many rows of `out` and of `switches` are filled."""
+def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, events: Any, work: Any) -> Any:
+    """All steps; returns the outcome and how many rows of `out` and of `events` are filled."""
     row, found, number, t = 0, 0, 0, 0.0
     mode, free = np.zeros(2, dtype=np.int64), np.ones(2, dtype=np.bool_)
-    switched = np.full(2, -1.0)  # time of the last switch
+    changed = np.full(2, -1.0)  # time of the last event
     for side in (LEFT, RIGHT):
         mode[side] = CONTACT if rule == PLAIN else condition(q, y, side)
     while row < grid.shape[0] and grid[row] <= 0.0:
@@ -226,7 +226,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             end = duration
         free[:] = rule != PLAIN
         if rule == PAPER:
-            found = judge_again(q, y, t, mode, switched, switches, found)
+            found = judge_again(q, y, t, mode, changed, events, found)
         while t < end:
             h = end - t
             push_l, push_r = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
@@ -234,7 +234,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             z = rk4(q, push_l, push_r, y, f, h)
             work[STEPS] += 1
             work[RIGHT_HAND_SIDES] += 4
-            theta, side, after = first_switch(rule, q, y, f, z, h, mode, free, work)
+            theta, side, after = first_transition(rule, q, y, f, z, h, mode, free, work)
             reached = end
             if theta <= 1.0:
                 linear = along(y, theta, along(z, -1.0, y))
@@ -245,11 +245,11 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
                 row = deliver(rule == PAPER and theta <= 1.0, y, f, z, g, t, reached, grid, out, row)
             y, t = z, reached
             if theta <= 1.0:
-                if found == switches.shape[0]:
+                if found == events.shape[0]:
                     return EVENTS_FULL, row, found
-                note(switches, found, t, side, kind_of(mode[side], after), y)
+                note(events, found, t, side, kind_of(mode[side], after), y)
                 found += 1
-                mode[side], switched[side] = after, t
+                mode[side], changed[side] = after, t
                 free[side] = rule == LOCATED
         if not math.isfinite(y[0] + y[1] + y[2] + y[3] + y[4] + y[5]):
             return NOT_FINITE, row, found

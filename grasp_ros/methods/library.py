@@ -1,7 +1,7 @@
 """scipy's solvers on the grasp, with a compiled right-hand side: explicit pairs and implicit methods.
 
 Two ways: `straight` leaves (6), (7) and (10) to the right-hand side. `restarted` freezes the mode, lets scipy find
-the switches of (10) as terminal events, and starts afresh after each.
+the events of (10) as terminal events, and starts afresh after each.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from grasp_ros.methods.equations import (
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Grasp
 
-TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's switch is a switch of both
-MAX_IDLE = 100  # switches without progress in time
+TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's event is an event of both
+MAX_IDLE = 100  # events without progress in time
 IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
 SIDES = (int(LEFT), int(RIGHT))
 
@@ -77,20 +77,20 @@ def straight(
 def restarted(
     name: str, grasp: Grasp, state: Array, duration: float, grid: Array, tolerance: float, max_events: int
 ) -> Solution:
-    """Integrate from switch to switch with rtol = atol."""
+    """Integrate from event to event with rtol = atol."""
     q, work = parameters(grasp), np.zeros(len(Work), dtype=np.int64)
     mode = [int(condition(q, tuple(state), side)) for side in SIDES]
     gaps = [_gaps(LEFT, grasp.left_contact.dissipation, work), _gaps(RIGHT, grasp.right_contact.dissipation, work)]
     t, y, row, idle, states = 0.0, state, 0, 0, []
-    switches: list[tuple[float, ...]] = []
+    events: list[tuple[float, ...]] = []
     while True:
         active = [*gaps[LEFT][mode[LEFT]], *gaps[RIGHT][mode[RIGHT]]]
         args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
         result = _integrate(name, (t, duration), y, grid[row:], args, tolerance, active, work)
         states.append(_rows(result))
         row += len(states[-1])
-        if status := _status(result, len(switches) >= max_events, idle > MAX_IDLE):
-            return Solution(np.concatenate(states), np.array(switches).reshape(-1, 5), work, status)
+        if status := _status(result, len(events) >= max_events, idle > MAX_IDLE):
+            return Solution(np.concatenate(states), np.array(events).reshape(-1, 5), work, status)
         first = next(gap for gap, times in zip(active, result.t_events, strict=True) if len(times))
         at = result.t_events[active.index(first)][0]
         y = result.y_events[active.index(first)][0]
@@ -98,12 +98,12 @@ def restarted(
         t = at
         f = slopes(t, y, *args)
         for gap in (first, *(gap for gap in active if gap.side != first.side and gap.fires_too(y, f))):
-            switches.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
+            events.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
             mode[gap.side] = gap.after
 
 
 def _status(result: Any, spent: bool, idle: bool) -> Status | None:
-    """How the integration ended; None if it goes on behind a switch."""
+    """How the integration ended; None if it goes on behind a event."""
     if result.status == 0:
         return Status.DONE
     if result.status < 0 or idle:

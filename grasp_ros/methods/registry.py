@@ -52,8 +52,8 @@ def _tens(first: float, last: float, per_decade: int = 1) -> tuple[float, ...]:
 _STEPS = tuple(base * 10.0**-decade for decade in range(2, 6) for base in (1.0, 0.5, 0.2))
 _HAIRER = "Hairer, Norsett, Wanner, Solving ODEs I"
 _STIFF = "Hairer, Wanner, Solving ODEs II"
-_INSIDE = "nothing: the switches are inside the right-hand side"
-_RESTART = "frozen mode; switches are terminal events of scipy, looked for at the ends of its steps; restart after each"
+_INSIDE = "nothing: the events are inside the right-hand side"
+_RESTART = "frozen mode; terminal events of scipy, which it looks for at the ends of its steps; restart after each"
 
 
 def _fixed(name: str, order: str, source: str, at_touch: str, rule: int) -> Method:
@@ -152,7 +152,7 @@ def solve(name: str, scene: Scene, grid: Array, setting: float, max_events: int)
     setting : float
         Step in s or tolerance (rtol = atol), as `check` gives it.
     max_events : int
-        Budget of contact switches.
+        Budget of contact events.
     """
     run = METHODS[name].solve
     assert run is not None

@@ -14,7 +14,7 @@ f_l, f_r        force, command         N          input forces, positive to the 
 u_l, u_r        u                      m          x_l - x_o, x_o - x_r: positive is penetration; (8)
 u'              d, u_rate              m/s        positive is approach
 fw_l, fw_r      impact_force           N          never negative: it pushes arm and object apart; (6), (7)
-H               hertz                  N/m^1.5    Hertz coefficient; (6), (7)
+H               hertzian                  N/m^1.5    Hertz coefficient; (6), (7)
 p               dissipation            s/m        energy loss of an impact; (6), (7), contact needs u' >= -1/p; (10)
 V, V'           V, V_rate              J, W       the paper's Lyapunov function and its rate; (16), (18)
 V_c             V_c                    J          V with the Hertz term of every pair with u >= 0

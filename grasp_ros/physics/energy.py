@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
-from grasp_ros.physics.model import Array, Contact, Mode, hertz_force, in_contact, penetration
+from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force, in_contact, penetration
 from grasp_ros.physics.system import COLUMN, System
 
 FLAGS = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
@@ -52,7 +52,7 @@ def energy(system: System, state: Array, external: Array | None = None) -> Energ
     mode = np.zeros(np.shape(V), dtype=np.int64)
     for side, u, d in _pairs(system, state):
         contact = Contact(*system.pairs[side])
-        force = hertz_force(contact, u)
+        force = hertzian_force(contact, u)
         touching = in_contact(contact, u, d)
         stored = 0.8 * force * u  # a = b = 4/5, (19)
         V_c = V_c + stored
@@ -92,7 +92,7 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     for state in (before, after):
         level, size = _own_energy(system, state)
         for side, u, _ in _pairs(system, state):
-            force = hertz_force(Contact(*system.pairs[side]), u)
+            force = hertzian_force(Contact(*system.pairs[side]), u)
             level = level + 0.8 * force * u
             rounding = rounding + 8.0 * EPS * force * _place(system, side, state)
         levels.append(level)

@@ -15,7 +15,7 @@ LEFT: Any = np.int64(0)
 RIGHT: Any = np.int64(1)
 OBJECT: Any = np.int64(2)
 MASS, STIFFNESS, DAMPING, FORCE = 0, 1, 2, 3  # columns of bodies: kg, N/m, N s/m, N
-HERTZ, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
+HERTZIAN, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
 X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)
 LANES = 8  # of a table of polynomials: order k holds the coefficients k at LANES k
 TIME, CHECK = X_L, X_R  # in contact x_l and x_r follow from the others
@@ -42,7 +42,7 @@ class Slide(IntEnum):
     STUCK = 3
 
 
-class Event(IntEnum):
+class Transition(IntEnum):
     """Switches of one pair, and of the object."""
 
     TOUCH = 0  # u rises through 0

@@ -33,7 +33,7 @@ class Arm(NamedTuple):
 class Contact(NamedTuple):
     """One pair of arm and object, (6), (7)."""
 
-    hertz: float  # H, N/m^1.5
+    hertzian: float  # H, N/m^1.5
     dissipation: float  # p, s/m
 
 
@@ -66,10 +66,10 @@ def in_contact(contact: Contact, u: Array, u_rate: Array) -> NDArray[np.bool_]:
     return (u >= 0.0) & (1.0 + contact.dissipation * u_rate >= 0.0)
 
 
-def hertz_force(contact: Contact, u: Array) -> Array:
+def hertzian_force(contact: Contact, u: Array) -> Array:
     """The elastic part H u^(3/2) of the impact force in N; 0 without penetration."""
     depth = np.maximum(u, 0.0)
-    return contact.hertz * (depth * np.sqrt(depth))
+    return contact.hertzian * (depth * np.sqrt(depth))
 
 
 def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
@@ -82,7 +82,7 @@ def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
         Penetration (8); negative is a gap.
     u_rate : array, m/s
     """
-    force = (1.0 + contact.dissipation * u_rate) * hertz_force(contact, u)
+    force = (1.0 + contact.dissipation * u_rate) * hertzian_force(contact, u)
     return np.where(in_contact(contact, u, u_rate), force, 0.0)
 
 

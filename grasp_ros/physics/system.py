@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.control import ControlLaw
-from grasp_ros.physics.layout import DAMPING, FORCE, HERTZ, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import DAMPING, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, Grasp
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
@@ -50,7 +50,7 @@ class System:
         Control periods from a state to the command that answers it.
     sampled : bool
         Whether commands are held over control periods; otherwise the feedback acts continuously.
-    doubts : list of str
+    caveats : list of str
         Why V_c may rise in this scene.
     """
 
@@ -62,7 +62,7 @@ class System:
     external: list[ExternalForce] = field(default_factory=list)
     delay: int = 0
     sampled: bool = False
-    doubts: list[str] = field(default_factory=list)
+    caveats: list[str] = field(default_factory=list)
 
     @staticmethod
     def of(grasp: Grasp, state: Array) -> System:
@@ -88,7 +88,7 @@ class System:
     @property
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
-        return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZ] > 0.0]
+        return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZIAN] > 0.0]
 
     @property
     def closed_loop(self) -> Array:

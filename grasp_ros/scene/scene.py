@@ -142,8 +142,8 @@ class Scene:
     def certificate_in_words(self, sampled: bool) -> str:
         """Whether V_c can rise in this scene, and why."""
         held = [HELD] if sampled and not self.sampled and self.system.laws else []
-        doubts = [*held, *self.system.doubts]
-        return f"V_c may rise: {'; '.join(doubts)}" if doubts else "V_c cannot rise"
+        caveats = [*held, *self.system.caveats]
+        return f"V_c may rise: {'; '.join(caveats)}" if caveats else "V_c cannot rise"
 
     def time_of(self, tick: int) -> float:
         """Time of a tick in s: an integer number of ns, rounded once."""

@@ -91,7 +91,7 @@ def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequenc
     rows = [np.empty((0, 6))]
     pieces = zip(ticks, ends.tolist(), lengths.tolist(), pairwise(bounds.tolist()), strict=False)
     for tick, begin, length, (first, end) in pieces:
-        integrator.hold(forces(tick))
+        integrator.set_input(forces(tick))
         rows.append(integrator.advance(length, offsets[first:end], begin))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)

@@ -10,11 +10,11 @@ from zipfile import BadZipFile
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Integrator, Status, SwitchEvent, to_events
+from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Event, Integrator, Status, to_events
 from grasp_ros.methods import equations, registry
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.energy import Energy, energy
-from grasp_ros.physics.layout import LEFT, RIGHT, Event, Work
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
@@ -37,8 +37,8 @@ class Trajectory:
         x_l, v_l, x_o, v_o, x_r, v_r; NaN for a body that is not there.
     answers : array (n, 2), N, or None
         What sampled controllers answered last; None under continuous feedback.
-    switches : array (m, 5)
-        Time in s, side, kind, u in m and u' in m/s of every switch, in the order of time; see `events`.
+    event_table : array (m, 5)
+        Time in s, side, kind, u in m and u' in m/s of every event, in the order of time; see `events`.
     work : array of int
         Counters, see `layout.Work` for `exact` and `methods.equations.Work` for the others.
     status : Status
@@ -55,7 +55,7 @@ class Trajectory:
     t: Array
     state: Array
     answers: Array | None
-    switches: Array
+    event_table: Array
     work: np.ndarray
     status: Status
     method: str = EXACT
@@ -85,13 +85,13 @@ class Trajectory:
         return energy(self.scene.system, self.state)
 
     @property
-    def events(self) -> list[SwitchEvent]:
-        """The switches as records."""
-        return to_events(self.switches)
+    def events(self) -> list[Event]:
+        """The events as records."""
+        return to_events(self.event_table)
 
-    def times(self, kind: Event, side: int) -> Array:
+    def times(self, kind: Transition, side: int) -> Array:
         """Times in s of one side's events of a kind."""
-        chosen: Array = self.switches[(self.switches[:, 1] == side) & (self.switches[:, 2] == kind), 0]
+        chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
         return chosen
 
     def save(self, path: Path) -> None:
@@ -106,9 +106,10 @@ class Trajectory:
         with path.open("wb") as file:
             np.savez_compressed(
                 file, t=self.t, state=self.state, command=self.command, V=level.V, V_c=level.V_c, V_rate=level.V_rate,
-                mode=level.mode, touch_left=self.times(Event.TOUCH, LEFT), touch_right=self.times(Event.TOUCH, RIGHT),
-                release_left=self.times(Event.RELEASE, LEFT), release_right=self.times(Event.RELEASE, RIGHT),
-                events=self.switches, work=self.work,
+                mode=level.mode,
+                touch_left=self.times(Transition.TOUCH, LEFT), touch_right=self.times(Transition.TOUCH, RIGHT),
+                release_left=self.times(Transition.RELEASE, LEFT), release_right=self.times(Transition.RELEASE, RIGHT),
+                events=self.event_table, work=self.work,
                 work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
                 method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
                 scene_name=self.scene.name, scene=self.scene.to_yaml(),
@@ -166,7 +167,7 @@ def simulate(
     setting : float, optional
         Accuracy, step in s, or tolerance of the method. Default: `accuracy` for `exact`, otherwise the method's own.
     max_events : int
-        Budget of contact switches.
+        Budget of contact events.
     max_work : int
         Budget of work, for `exact`: flights, Taylor steps, and evaluations of event functions.
     changes : mapping of int to mapping of str to float
@@ -194,8 +195,8 @@ def simulate(
     if method != EXACT:
         found = registry.solve(method, scene, grid, setting, min(max_events, registry.MOST_EVENTS))
         return Trajectory(
-            scene, False, grid[: len(found.state)], found.state, None, found.switches, found.work, found.status, method,
-            setting,
+            scene, False, grid[: len(found.state)], found.state, None, found.event_table, found.work, found.status,
+            method, setting,
         )
     integrator = Integrator(scene.system, continuous=not sampled, accuracy=setting, max_events=max_events,
                             max_work=max_work)
@@ -206,6 +207,6 @@ def simulate(
     for body in scene.system.absent:
         states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     return Trajectory(
-        scene, sampled, grid[: len(states)], states, answers, integrator.switches, integrator.work.copy(),
+        scene, sampled, grid[: len(states)], states, answers, integrator.event_table, integrator.work.copy(),
         integrator.status, EXACT, setting, integrator.stop,
     )

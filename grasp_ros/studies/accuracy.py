@@ -30,10 +30,10 @@ METRIC = metric(simulation.GRID_POINTS, measure.DIGITS)
 
 def default_scenes() -> list[Scene]:
     """Cases 1 to 4 of the paper, and case 1 with a contact that is stiffer by 1e4."""
-    name, hertz = STIFF
-    stiff = scenes.load(name, [f"{side}_contact.hertz_N_per_m1_5={hertz}" for side in ("left", "right")])
+    name, hertzian = STIFF
+    stiff = scenes.load(name, [f"{side}_contact.hertz_N_per_m1_5={hertzian}" for side in ("left", "right")])
     text = stiff.to_yaml()
-    return [*map(scenes.load, STANDARD), scenes.parse(text, f"{name}_H{hertz:.0e}".replace("+0", ""), name)]
+    return [*map(scenes.load, STANDARD), scenes.parse(text, f"{name}_H{hertzian:.0e}".replace("+0", ""), name)]
 
 
 def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: Sequence[Contender]) -> list[Record]:

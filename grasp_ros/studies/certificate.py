@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import HERTZ, LEFT, RIGHT, Event
+from grasp_ros.physics.layout import HERTZIAN, LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.simulation import simulate
@@ -48,9 +48,9 @@ class Family(NamedTuple):
 
     def start(self, place: Array) -> tuple[Array, float, float]:
         """State, object's mass and H of a point of the box; NaN for the object's place means x_o = 0."""
-        x_l, x_r, between, mass, hertz = place
+        x_l, x_r, between, mass, hertzian = place
         x_o = 0.0 if math.isnan(between) else -x_l + between * (x_l + x_r)
-        return np.array([-x_l, 0.0, x_o, 0.0, x_r, 0.0]), 10.0**mass, 10.0**hertz
+        return np.array([-x_l, 0.0, x_o, 0.0, x_r, 0.0]), 10.0**mass, 10.0**hertzian
 
 
 def families() -> list[Family]:
@@ -79,9 +79,9 @@ def jumps(system: System, duration: float) -> list[Jump]:
     if integrator.status is not Status.DONE:
         raise RuntimeError(integrator.status.value)
     return [
-        Jump(event.time, event.side, event.u, 0.8 * float(system.pairs[event.side, HERTZ]) * event.u**2.5)
+        Jump(event.time, event.side, event.u, 0.8 * float(system.pairs[event.side, HERTZIAN]) * event.u**2.5)
         for event in integrator.events
-        if event.kind is Event.REENTRY
+        if event.kind is Transition.REENTRY
     ]
 
 
@@ -95,9 +95,9 @@ def safe_p(grasp: Grasp, start: Array) -> float:
     return math.sqrt(reduced / level)
 
 
-def table_one(p: float, object_mass: float, hertz: float) -> Grasp:
+def table_one(p: float, object_mass: float, hertzian: float) -> Grasp:
     """The arms and gains of Table 1."""
-    return Grasp(STANDARD, STANDARD, Contact(hertz, p), Contact(hertz, p), object_mass)
+    return Grasp(STANDARD, STANDARD, Contact(hertzian, p), Contact(hertzian, p), object_mass)
 
 
 class Found(NamedTuple):
@@ -110,8 +110,8 @@ class Found(NamedTuple):
 
 def highest_jump(family: Family, place: Array, p: float) -> Jump | None:
     """The highest jump of a start of the family, if it counts."""
-    start, mass, hertz = family.start(place)
-    found = jumps(System.of(table_one(p, mass, hertz), start), HORIZON)
+    start, mass, hertzian = family.start(place)
+    found = jumps(System.of(table_one(p, mass, hertzian), start), HORIZON)
     level = 15.0 * (start[0] ** 2 + start[4] ** 2)  # V(0) at rest
     best = max(found, key=lambda jump: jump.height, default=None)
     return best if best is not None and best.height >= family.part * level else None
@@ -209,10 +209,10 @@ def smallest_table(draws: int, steps: int) -> str:
     ]
     for family in families():
         p, place, jump = search(family, draws, steps, SEED)
-        start, mass, hertz = family.start(place)
+        start, mass, hertzian = family.start(place)
         where = ", ".join(f"{x:.5f}" for x in start[0::2])
         widest = np.array([-AMPLITUDE, 0.0, 0.0, 0.0, AMPLITUDE, 0.0])
-        safe = safe_p(table_one(p, 10.0 ** family.low[3], hertz), widest)
-        rows.append(f"| {family.text} | {family.part:g} | {p:.4f} | {where} | {mass:.4g} | {hertz:.4g} |"
+        safe = safe_p(table_one(p, 10.0 ** family.low[3], hertzian), widest)
+        rows.append(f"| {family.text} | {family.part:g} | {p:.4f} | {where} | {mass:.4g} | {hertzian:.4g} |"
                     f" {jump.time:.4f} | {safe:.4f} |")
     return "\n".join(rows)

@@ -13,7 +13,7 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import equations
 from grasp_ros.methods.library import slopes
 from grasp_ros.methods.registry import EXACT, METHODS
-from grasp_ros.physics.layout import LEFT, RIGHT, Event
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.layout import Work as ExactWork
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -47,7 +47,8 @@ def _simulated(name: str, scene: Scene, setting: float) -> Solve:
 
     def solve(grid: Array) -> Answer:
         motion = simulation.simulate(scene, grid=grid, method=name, setting=setting)
-        touches = (len(motion.times(Event.TOUCH, LEFT)), len(motion.times(Event.TOUCH, RIGHT))) if finds else None
+        left, right = (len(motion.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
+        touches = (left, right) if finds else None
         status = "done" if motion.status is Status.DONE else motion.status.value
         if name == EXACT:
             steps = int(motion.work[ExactWork.FLIGHTS] + motion.work[ExactWork.CONTACT_STEPS])

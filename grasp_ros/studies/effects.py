@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.processes import Graph
-from grasp_ros.physics.layout import Event
+from grasp_ros.physics.layout import Transition
 from grasp_ros.scene import Scene, strict_yaml
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.simulation import simulate
@@ -108,7 +108,7 @@ def measure(found: Mapping[str, Scene], repeats: int, sampled_repeats: int) -> l
     costs = []
     for name, scene in tqdm(found.items(), desc="recorded", file=sys.stderr):
         seconds = continuous.get(name)
-        touches = sum(event.kind == Event.TOUCH for event in simulate(scene).events)
+        touches = sum(event.kind == Transition.TOUCH for event in simulate(scene).events)
         costs.append(Cost(
             name, None if seconds is None else seconds / scene.duration,
             None if seconds is None or not touches else seconds / touches,

@@ -36,7 +36,7 @@ def color(method: str) -> str:
 
 
 def style(method: str) -> dict[str, Any]:
-    """Solid where switches are located or need not be, dashed where they are left to the right-hand side."""
+    """Solid where events are located or need not be, dashed where they are left to the right-hand side."""
     bold = method in ("exact", "paper")
     located = bold or method.endswith("_events") or method.startswith(("heyoka", "discrete"))
     mark = {"o": method.endswith("_events") or bold, "s": method == "odeint" or method.startswith("heyoka_")}

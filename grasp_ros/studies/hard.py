@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros.exact.integrator import SwitchEvent
+from grasp_ros.exact.integrator import Event
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
@@ -49,7 +49,7 @@ class Other:
             raise Unfinished(motion.status.value)
         return motion.state
 
-    def events(self, scene: Scene) -> list[SwitchEvent]:
+    def events(self, scene: Scene) -> list[Event]:
         """Switches in the order of time."""
         return simulate(scene, method=self.name, setting=min(self._setting, scene.duration)).events
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import simulation
-from grasp_ros.physics.layout import LEFT, RIGHT, Event
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.studies.peers import Answer, Contender, Solve
@@ -53,7 +53,7 @@ def check(scene: Scene) -> None:
     x_l, _, x_o, _, x_r, _ = scene.initial_state
     if not x_l < x_o < x_r:
         raise ValueError(f"{scene.name}: starts in contact; allowed here: scenes that start with gaps on both sides")
-    if any(event.kind == Event.CLAMP for event in simulation.simulate(scene).events):
+    if any(event.kind == Transition.CLAMP for event in simulation.simulate(scene).events):
         raise ValueError(f"{scene.name}: a pair separates faster than 1/p; allowed here: scenes where none does")
 
 

@@ -104,7 +104,7 @@ def heyoka_system(hy: Any, grasp: Grasp, left: bool, right: bool) -> tuple[list[
     w_l, w_r, t = hy.make_vars("w_l", "w_r", "t")
     clock = (2.0 if left or right else 1.0) * (w_l if left else 1.0) * (w_r if right else 1.0)
     force = [
-        pair.hertz * (w * w * w) * (1.0 + pair.dissipation * rate) if touching else 0.0
+        pair.hertzian * (w * w * w) * (1.0 + pair.dissipation * rate) if touching else 0.0
         for touching, pair, w, rate in (
             (left, grasp.left_contact, w_l, v_l - v_o), (right, grasp.right_contact, w_r, v_o - v_r),
         )
@@ -187,8 +187,8 @@ class _HeyokaGrasp:
 
         settings = {"tol": tolerance, **options}
         self._start = scene.initial_state
-        hertz = max(scene.grasp.left_contact.hertz, scene.grasp.right_contact.hertz)
-        self._ballistic_s = BALLISTIC_S * (BALLISTIC_HERTZ / hertz) ** 0.4
+        hertzian = max(scene.grasp.left_contact.hertzian, scene.grasp.right_contact.hertzian)
+        self._ballistic_s = BALLISTIC_S * (BALLISTIC_HERTZ / hertzian) ** 0.4
         self._legs = [_Leg(hy, scene.grasp, mode, settings) for mode in range(4)]
         flight, _ = heyoka_system(hy, scene.grasp, False, False)
         self._ballistic = hy.taylor_adaptive(flight, [0.0] * 6, **settings)

@@ -55,7 +55,7 @@ def _solver(formula: str, settings: Any, tolerance: float, **options: Any) -> An
 
 
 def _straight(formula: str, scene: Scene, tolerance: float) -> Solve:
-    """Over everything, with the switches inside the right-hand side."""
+    """Over everything, with the events inside the right-hand side."""
     solver = _solver(formula, (parameters(scene.grasp), True, True), tolerance)
 
     def solve(grid: Array) -> Answer:
@@ -106,6 +106,6 @@ def _restarted(formula: str, scene: Scene, tolerance: float) -> Solve:
             for changed in (LEFT, RIGHT) if both else (side,):
                 mode[changed] = not mode[changed]
                 touches[changed] += mode[changed]
-        return Answer(out[:row], (touches[LEFT], touches[RIGHT]), "stopped: switches without end", None, rhs)
+        return Answer(out[:row], (touches[LEFT], touches[RIGHT]), "stopped: events without end", None, rhs)
 
     return solve

@@ -83,7 +83,7 @@ def paper(records: Sequence[Record]) -> str:
         table(["scene", "error <= 1e-3", f"as many times `{EXACT}`", "best error tried"], rows),
         prose("""It judges contact at both ends of a step and interpolates time and state linearly, which makes every
         touch an error of second order, whatever the order of the Runge-Kutta method around it. Locating the
-        switch to rounding instead (`rk4_events`) costs nothing in time. Order 4 is still not reached, because
+        event to rounding instead (`rk4_events`) costs nothing in time. Order 4 is still not reached, because
         u^(3/2) has no second derivative at u = 0. For motions as in the paper's figures its method is good
         enough; for numbers it is not."""),
     ])
@@ -194,7 +194,7 @@ def methods() -> str:
         "## The methods", table(["name", "order", "at a touch", "source"], rows),
         prose("""Outside peers, only in the studies: `odeint` (LSODA, its loop over the steps outside Python),
         `cvode_*` (SUNDIALS by scikit-sundae) and `heyoka*` (Taylor series by LLVM, given the same regularisation
-        w = sqrt(u) and a terminal event per switch). All have compiled right-hand sides. Tried besides: the other
+        w = sqrt(u) and a terminal event per event). All have compiled right-hand sides. Tried besides: the other
         ways of heyoka to generate code, which differ by some percent (`grasp study speed` has them all);
         numbalsoda, for which there is no wheel for these versions of Python."""),
     ])

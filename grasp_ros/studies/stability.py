@@ -50,7 +50,7 @@ def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) ->
         x, v = integrator.state[:2]
         sizes.append(math.hypot(math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * x, v))
         waiting.append(feedback(arm, x, v))
-        integrator.hold(np.array([waiting.pop(0), 0.0, 0.0]))
+        integrator.set_input(np.array([waiting.pop(0), 0.0, 0.0]))
         integrator.advance(period, start=tick * period)
     half = ticks // 2
     window = ticks // 8  # maxima over a window: the phase of the oscillation drops out

@@ -14,7 +14,7 @@ import numpy as np
 from mpmath import mp, mpf
 
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, FORCE, HERTZ, LEFT, MASS, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import DAMPING, DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
 
@@ -47,13 +47,13 @@ def _exit(z: Any) -> Any:
         return 1 + mp.lambertw(-(1 + z) * mp.exp(-(1 + z))).real
 
 
-def impact(mu: Any, hertz: Any, p: Any, speed: Any) -> Impact:
+def impact(mu: Any, hertzian: Any, p: Any, speed: Any) -> Impact:
     """O1 and O2. mu u' du' = -H u^(3/2) (1 + p u') du gives depth and restitution; the duration is a quadrature."""
-    mu, hertz, p, speed = (mpf(value) for value in (mu, hertz, p, speed))
+    mu, hertzian, p, speed = (mpf(value) for value in (mu, hertzian, p, speed))
     if p == 0:
-        depth = (5 * mu * speed**2 / (4 * hertz)) ** mpf("0.4")
+        depth = (5 * mu * speed**2 / (4 * hertzian)) ** mpf("0.4")
         return Impact(depth, mpf("0.8") * mp.beta(mpf("0.4"), mpf("0.5")) * depth / speed, mpf(1))
-    power = 5 * mu / (2 * hertz)
+    power = 5 * mu / (2 * hertzian)
     leave = _exit(p * speed) / p
 
     def depth_of(v: Any, delta: Any) -> Any:
@@ -65,7 +65,7 @@ def impact(mu: Any, hertz: Any, p: Any, speed: Any) -> Impact:
 
         def rate(r: Any) -> Any:
             delta = sign * r ** mpf("2.5")
-            force = hertz * depth_of(v, delta) ** mpf("1.5") * (1 + p * (v - delta))
+            force = hertzian * depth_of(v, delta) ** mpf("1.5") * (1 + p * (v - delta))
             return mu / force * mpf("2.5") * r ** mpf("1.5")
 
         return mp.quad(rate, [0, abs(v) ** mpf("0.4")])
@@ -73,16 +73,16 @@ def impact(mu: Any, hertz: Any, p: Any, speed: Any) -> Impact:
     return Impact(depth_of(speed, speed), time_from(speed, 1) + time_from(-leave, -1), leave / speed)
 
 
-def creep(mu: Any, hertz: Any, p: Any, speed: Any) -> Any:
+def creep(mu: Any, hertzian: Any, p: Any, speed: Any) -> Any:
     """Duration of an impact with p v >> 1, which creeps open at almost 1/p; where `impact` loses its exit.
 
     With y = 1 + p u' the first integral of (6) is y - 1 - ln y = R + const u^(5/2), so u' follows from u by the
     branches of Lambert's W, and the duration is the integral of du / u' over both ways.
     """
-    mu, hertz, p, speed = (mpf(value) for value in (mu, hertz, p, speed))
+    mu, hertzian, p, speed = (mpf(value) for value in (mu, hertzian, p, speed))
     z = p * speed
     whole = z - mp.log1p(z)
-    depth = (whole * 5 * mu / (2 * hertz * p**2)) ** mpf("0.4")
+    depth = (whole * 5 * mu / (2 * hertzian * p**2)) ** mpf("0.4")
 
     def way(branch: int) -> Any:
         def rate(r: Any) -> Any:
@@ -99,14 +99,14 @@ def creep(mu: Any, hertz: Any, p: Any, speed: Any) -> Any:
 LARGE = 20.0  # p v from which `impact` loses the end of the way back
 
 
-def impact_numbers(m1: float, m2: float, hertz: float, p: float, speed: float) -> tuple[float, float]:
+def impact_numbers(m1: float, m2: float, hertzian: float, p: float, speed: float) -> tuple[float, float]:
     """Duration in s and restitution of an impact of two free bodies, in doubles, for any p."""
     loss = p * speed
     with mp.workdps(20 + (2 * math.ceil(-math.log10(loss)) if 0.0 < loss < 1.0 else 0)):  # what small losses cancel
         mu = reduced_mass(m1, m2)
         if loss > LARGE:
-            return float(creep(mu, hertz, p, speed)), float(_exit(mpf(loss)) / mpf(loss))
-        law = impact(mu, hertz, p, speed)
+            return float(creep(mu, hertzian, p, speed)), float(_exit(mpf(loss)) / mpf(loss))
+        law = impact(mu, hertzian, p, speed)
         return float(law.duration), float(law.restitution)
 
 
@@ -125,9 +125,9 @@ def flight(body: Sequence[Any], x: Any, v: Any, t: Any) -> tuple[Any, Any]:
     return +result[0], +result[1]
 
 
-def holding_force(stiffness: Sequence[Any], hertz: Sequence[Any], overlap: Any) -> Any:
+def holding_force(stiffness: Sequence[Any], hertzian: Sequence[Any], overlap: Any) -> Any:
     """O14: f/K_l + f/K_r + (f/H_l)^(2/3) + (f/H_r)^(2/3) = d for rest points that overlap by d."""
-    K, H, d = [mpf(k) for k in stiffness], [mpf(h) for h in hertz], mpf(overlap)
+    K, H, d = [mpf(k) for k in stiffness], [mpf(h) for h in hertzian], mpf(overlap)
 
     def excess(f: Any) -> Any:
         return sum(f / k for k in K) + sum((f / h) ** (mpf(2) / 3) for h in H) - d
@@ -158,7 +158,7 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
     system : System
     duration : float, s
     events : sequence of float, s
-        Times of all switches.
+        Times of all events.
     solve : callable
         From ascending times to states (n, 6).
     pieces : int
@@ -207,6 +207,6 @@ def _dissipation(system: System, y: Array) -> Array:
         total = total + system.closed_loop[body, DAMPING] * y[..., COLUMN[body] + 1] ** 2
     u_l, d_l, u_r, d_r = penetration(y)
     for side, u, d in ((LEFT, u_l, d_l), (RIGHT, u_r, d_r)):
-        p, elastic = system.pairs[side, DISSIPATION], system.pairs[side, HERTZ] * np.maximum(u, 0.0) ** 1.5
+        p, elastic = system.pairs[side, DISSIPATION], system.pairs[side, HERTZIAN] * np.maximum(u, 0.0) ** 1.5
         total = total + np.where(1.0 + p * d >= 0.0, p * elastic * d * d, -elastic * d)
     return total

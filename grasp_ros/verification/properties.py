@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, FORCE, LEFT, OBJECT, RIGHT, Event, Work
+from grasp_ros.physics.layout import DAMPING, DISSIPATION, FORCE, LEFT, OBJECT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import PAPER, Scene
@@ -27,7 +27,7 @@ RISE = 1e-12  # of the largest V_c so far: what rounding may add
 BALANCED = 1e-12, 1e-10  # momentum and energy at the default accuracy
 MOST_WORK = 300_000  # a squeezed contact relaxes p H u^(3/2) t / m times, and each time takes a few steps
 FINEST = 128  # pieces between two events
-SPLIT = 1e-13  # per switch
+SPLIT = 1e-13  # per event
 WORK_STEPS = 20_000  # contact steps beyond which the slow properties are left out
 REFERENCE_STEPS = 100  # those beyond which the reference, which counts in 25 digits, takes too long
 REFERENCE_SECONDS = 3.0
@@ -99,7 +99,7 @@ def _states(run: Trajectory) -> list[Check]:
     for side in (LEFT, RIGHT, OBJECT):
         kinds = [event.kind for event in run.events if event.side == side]
         broken += sum(not _may_follow(before, after) for before, after in pairwise(kinds))
-    times = run.switches[:, 0]
+    times = run.event_table[:, 0]
     return [
         Check("finite", float(np.count_nonzero(~np.isfinite(run.state[:, there]))), 0.0),
         Check("impact force", float(max((-force.min() for force in forces), default=0.0)), 0.0),
@@ -107,12 +107,13 @@ def _states(run: Trajectory) -> list[Check]:
     ]
 
 
-def _may_follow(before: Event, after: Event) -> bool:
-    """Whether one pair can switch like this."""
+def _may_follow(before: Transition, after: Transition) -> bool:
+    """Whether one pair can change like this."""
     allowed = {
-        Event.TOUCH: (Event.RELEASE, Event.CLAMP), Event.REENTRY: (Event.RELEASE, Event.CLAMP),
-        Event.CLAMP: (Event.REENTRY, Event.RELEASE), Event.RELEASE: (Event.TOUCH,),
-        Event.STICK: (Event.SLIP,), Event.SLIP: (Event.STICK,),
+        Transition.TOUCH: (Transition.RELEASE, Transition.CLAMP),
+        Transition.REENTRY: (Transition.RELEASE, Transition.CLAMP),
+        Transition.CLAMP: (Transition.REENTRY, Transition.RELEASE), Transition.RELEASE: (Transition.TOUCH,),
+        Transition.STICK: (Transition.SLIP,), Transition.SLIP: (Transition.STICK,),
     }
     return after in allowed[before]
 
@@ -161,8 +162,8 @@ def _relations(scene: Scene, run: Trajectory) -> list[Check]:
 
 
 def _divergence(run: Trajectory) -> float:
-    """What rounding at every switch may come to before the scene amplifies it."""
-    return SPLIT * (1 + len(run.switches))
+    """What rounding at every event may come to before the scene amplifies it."""
+    return SPLIT * (1 + len(run.event_table))
 
 
 def _splitting(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
@@ -203,7 +204,7 @@ def _reference(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> li
 
 def _balances(scene: Scene, run: Trajectory) -> list[Check]:
     """Momentum and energy, where the quadrature between the events converges: that of fast swings does not."""
-    times = run.switches[:, 0].tolist()
+    times = run.event_table[:, 0].tolist()
     before: Array | None = None
     for pieces in (8, 32, FINEST):
         if len(times) * pieces > 10_000:

@@ -130,7 +130,7 @@ class Plant(GraspNode):
             self._finish()
             return
         self._inputs = self._line.pass_on(self._take_commands())
-        self._integrator.hold(self._inputs + self._system.external_at(self._tick))
+        self._integrator.set_input(self._inputs + self._system.external_at(self._tick))
         self._integrator.advance(self._scene.period_ns / NANOSECONDS, start=self._scene.time_of(self._tick))
         if self._integrator.status is not Status.DONE:
             self._fail(self._integrator.stop)

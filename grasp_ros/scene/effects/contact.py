@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from grasp_ros.physics.layout import DISSIPATION, HERTZ, LEFT
+from grasp_ros.physics.layout import DISSIPATION, HERTZIAN, LEFT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Output, Sections
@@ -20,7 +20,7 @@ PARAMETERS = (
 def _build(side: str, sections: Sections, system: System) -> None:
     numbers = sections[f"{side}_contact"]
     row = system.pairs[SIDES[side]]
-    row[HERTZ], row[DISSIPATION] = numbers["hertz_N_per_m1_5"], numbers.get("dissipation_s_per_m", 0.0)
+    row[HERTZIAN], row[DISSIPATION] = numbers["hertz_N_per_m1_5"], numbers.get("dissipation_s_per_m", 0.0)
 
 
 def _force(side: int, system: System, _: int, state: Array) -> float:

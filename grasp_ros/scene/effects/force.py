@@ -56,7 +56,7 @@ def _table(section: str, sections: Sections) -> tuple[Callable[[int], float], li
 
 def _add(section: str, force: ExternalForce, system: System) -> None:
     system.external.append(force)
-    system.doubts.append(f"{section} does work")
+    system.caveats.append(f"{section} does work")
 
 
 def _build_steps(steps: Callable[..., tuple[Callable[[int], float], list[int]]], section: str, body: int,

@@ -12,9 +12,9 @@ HELD = "commands are held over control periods and do work of their own"
 def _build(sections: Sections, system: System) -> None:
     system.sampled = True
     system.delay = sections["loop"].get("delay_ticks", 0)
-    system.doubts.append(HELD)
+    system.caveats.append(HELD)
     if system.delay:
-        system.doubts.append(f"commands come {system.delay} control periods late")
+        system.caveats.append(f"commands come {system.delay} control periods late")
 
 
 EFFECTS = (

@@ -17,7 +17,7 @@ def _limit(limit: float, force: float) -> float:
 
 def _build(side: str, sections: Sections, system: System) -> None:
     system.laws[SIDES[side]].actuation.append(partial(_limit, sections[f"{side}_actuator"]["limit_N"]))
-    system.doubts.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
+    system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
 
 
 EFFECTS = tuple(

@@ -50,10 +50,10 @@ def _build(side: str, sections: Sections, system: System) -> None:
     steps = numbers.get("position_step_m", 0.0), numbers.get("velocity_step_m_per_s", 0.0)
     if any(deviations):
         stages.append(partial(_add_noise, numbers["noise_seed"], int(SIDES[side]), deviations))
-        system.doubts.append(f"the {side} arm is measured with noise")
+        system.caveats.append(f"the {side} arm is measured with noise")
     if any(steps):
         stages.append(partial(_round, steps))
-        system.doubts.append(f"the {side} arm is measured in steps")
+        system.caveats.append(f"the {side} arm is measured in steps")
 
 
 EFFECTS = tuple(

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status, SwitchEvent
+from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Event, Status
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
@@ -24,8 +24,8 @@ class Solver(Protocol):
     def states(self, scene: Scene, times: Iterable[float]) -> Array:
         """States (n, 6) with continuous feedback at ascending times in s; raises Unfinished."""
 
-    def events(self, scene: Scene) -> list[SwitchEvent]:
-        """All switches up to the scene's end; raises Unfinished, also if the solver does not look for them."""
+    def events(self, scene: Scene) -> list[Event]:
+        """All events up to the scene's end; raises Unfinished, also if the solver does not look for them."""
 
 
 @dataclass
@@ -66,8 +66,8 @@ class Product:
         """States (n, 6) at ascending times."""
         return self.run(scene, times).state
 
-    def events(self, scene: Scene) -> list[SwitchEvent]:
-        """All switches."""
+    def events(self, scene: Scene) -> list[Event]:
+        """All events."""
         return self.run(scene, [scene.duration]).events
 
 
@@ -91,7 +91,7 @@ class Case:
     product_only : bool
         Whether the figure needs more than states and events, which other solvers do not have.
     max_events, max_work : int
-        Budgets of contact switches and of work.
+        Budgets of contact events and of work.
     """
 
     family: str

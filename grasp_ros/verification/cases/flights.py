@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from grasp_ros.physics.layout import Event
+from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.verification.cases.case import Case, Solver
 from grasp_ros.verification.cases.scenes import AWAY, FREE, STANDARD, grasp
@@ -35,7 +35,7 @@ def _long_wait(speed: float, distance: float, solver: Solver) -> float:
     seconds = distance / speed
     scene = grasp([-distance, speed, 0.0, 0.0, AWAY, 0.0], 1.1 * seconds, left=FREE, contact=Contact(1e4, 0.0),
                   mass=1.0)
-    touches = [event.time for event in solver.events(scene) if event.kind is Event.TOUCH]
+    touches = [event.time for event in solver.events(scene) if event.kind is Transition.TOUCH]
     return abs(touches[0] / seconds - 1.0) if len(touches) == 1 else np.inf
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.layout import LEFT, Event
+from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product, Solver
@@ -31,7 +31,7 @@ def _energy(seconds: float, points: int, solver: Solver) -> float:
 def _periodic(periods: int, solver: Solver) -> float:
     """Phase of the periodic motion, from the time of its last touch, in s."""
     scene = grasp([-0.3, 0, 0, 0, 0.3, 0], periods * PERIOD, left=ELASTIC, contact=Contact(1e4, 0.0))
-    touches = [event.time for event in solver.events(scene) if event.kind is Event.TOUCH and event.side == LEFT]
+    touches = [event.time for event in solver.events(scene) if event.kind is Transition.TOUCH and event.side == LEFT]
     if len(touches) != periods:
         return np.inf
     return abs(touches[-1] - touches[0] - (periods - 1) * PERIOD)
@@ -39,11 +39,11 @@ def _periodic(periods: int, solver: Solver) -> float:
 
 def _tail(seconds: float, solver: Solver) -> float:
     """V_c beside its law, relative; contacts that are soft enough for the law to set in at once."""
-    C, K, hertz, mass = 0.7, 15.0, 10.0, 5.0
-    scene = grasp([-0.3, 0.0, 0.0, 0.0, 0.5, 0.0], seconds, contact=Contact(hertz, 0.0), mass=mass)
+    C, K, hertzian, mass = 0.7, 15.0, 10.0, 5.0
+    scene = grasp([-0.3, 0.0, 0.0, 0.0, 0.5, 0.0], seconds, contact=Contact(hertzian, 0.0), mass=mass)
     V_c = float(energy(scene.system, solver.states(scene, [scene.duration])).V_c[0])
-    rate = 9.0 / 5.0 * (C * hertz**2 / (K**2 * mass)) * KAPPA
-    return float(abs(V_c / (0.8 * hertz * (rate * seconds) ** -2.5) - 1.0))
+    rate = 9.0 / 5.0 * (C * hertzian**2 / (K**2 * mass)) * KAPPA
+    return float(abs(V_c / (0.8 * hertzian * (rate * seconds) ** -2.5) - 1.0))
 
 
 def _ends(name: str, solver: Solver) -> float:

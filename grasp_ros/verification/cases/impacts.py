@@ -10,7 +10,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import EPS
-from grasp_ros.physics.layout import LEFT, Event
+from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Contact
 from grasp_ros.verification.cases.case import Case, Solver
 from grasp_ros.verification.cases.scenes import AWAY, FREE, distance, grasp, reference
@@ -20,15 +20,16 @@ LOSSES = (0.0, 0.1, 1.0, 10.0, 100.0)  # p v
 LAW = "O1, O2: exit speed and duration of a free impact, relative"
 
 
-def impact_error(m1: float, m2: float, hertz: float, losses: tuple[float, ...], speed: float, solver: Solver) -> float:
+def impact_error(m1: float, m2: float, hertzian: float, losses: tuple[float, ...], speed: float,
+                 solver: Solver) -> float:
     """Error of the exit speed and of the duration, both read from the states behind the impact."""
     worst = 0.0
     for loss in losses:
         p = loss / speed
-        duration, restitution = impact_numbers(m1, m2, hertz, p, speed)
+        duration, restitution = impact_numbers(m1, m2, hertzian, p, speed)
         scene = grasp(
             [0.0, speed, 0.0, 0.0, AWAY, 0.0], 2.0 * duration, left=FREE._replace(mass=m1),
-            right=FREE, contact=Contact(hertz, p), mass=m2,
+            right=FREE, contact=Contact(hertzian, p), mass=m2,
         )
         end = scene.duration
         x_l, v_l, x_o, v_o, _, _ = solver.states(scene, [end])[0]
@@ -38,11 +39,11 @@ def impact_error(m1: float, m2: float, hertz: float, losses: tuple[float, ...], 
     return worst
 
 
-def _chain(masses: tuple[float, float, float], gap: float, hertz: float, p: float, seconds: float,
+def _chain(masses: tuple[float, float, float], gap: float, hertzian: float, p: float, seconds: float,
            expected: tuple[float, float, float], solver: Solver) -> float:
     left, middle, right = masses
     scene = grasp([-gap, 1.0, 0.0, 0.0, gap, 0.0], seconds, left=FREE._replace(mass=left),
-                  right=FREE._replace(mass=right), contact=Contact(hertz, p), mass=middle)
+                  right=FREE._replace(mass=right), contact=Contact(hertzian, p), mass=middle)
     return float(np.abs(solver.states(scene, [scene.duration])[0, 1::2] - expected).max())
 
 
@@ -53,20 +54,20 @@ def _short(solver: Solver) -> float:
     return distance(solver.states(scene, times)[1:], reference(scene, times)[1:])
 
 
-def _creeps(p: float, speed: float, hertz: float, solver: Solver) -> float:
-    duration, _ = impact_numbers(1.0, 1.0, hertz, p, speed)
-    scene = grasp([0.0, speed, 0.0, 0.0, AWAY, 0.0], 1.5 * duration, left=FREE, contact=Contact(hertz, p), mass=1.0)
-    end = [event.time for event in solver.events(scene) if event.kind is Event.RELEASE and event.side == LEFT]
+def _creeps(p: float, speed: float, hertzian: float, solver: Solver) -> float:
+    duration, _ = impact_numbers(1.0, 1.0, hertzian, p, speed)
+    scene = grasp([0.0, speed, 0.0, 0.0, AWAY, 0.0], 1.5 * duration, left=FREE, contact=Contact(hertzian, p), mass=1.0)
+    end = [event.time for event in solver.events(scene) if event.kind is Transition.RELEASE and event.side == LEFT]
     return abs(end[0] / duration - 1.0) if len(end) == 1 else np.inf
 
 
 def cases() -> Iterator[Case]:
     """All impacts."""
-    for hertz, speed in product((1.0, 1e4, 1e8, 1e12), (1e-6, 1.0, 1e3)):
+    for hertzian, speed in product((1.0, 1e4, 1e8, 1e12), (1e-6, 1.0, 1e3)):
         yield Case(
-            "impact", f"H = {hertz:g}, v = {speed:g} m/s, p v = 0 to 100",
+            "impact", f"H = {hertzian:g}, v = {speed:g} m/s, p v = 0 to 100",
             "u^(3/2) is only once differentiable; durations from 1e-5 s to 1e2 s", LAW,
-            partial(impact_error, 1.0, 1.0, hertz, LOSSES, speed), 1e-11,
+            partial(impact_error, 1.0, 1.0, hertzian, LOSSES, speed), 1e-11,
         )
     for m1, m2 in ((1.0, 1e-6), (1.0, 1e6), (1e-6, 1.0), (1e6, 1.0)):
         yield Case(
@@ -94,10 +95,10 @@ def cases() -> Iterator[Case]:
         )
     yield Case("impact", "a fast one, then one at 1e-9 m/s", "nine decades of speed in one scene",
                "reference with 25 digits", _short, 1e-10)
-    for p, speed, hertz in ((1e4, 1.0, 1e4), (1e6, 1.0, 1e4), (1e9, 1e3, 1e12), (1e12, 1e-6, 1.0)):
+    for p, speed, hertzian in ((1e4, 1.0, 1e4), (1e6, 1.0, 1e4), (1e9, 1e3, 1e12), (1e12, 1e-6, 1.0)):
         yield Case(
             "impact", f"p = {p:g} s/m, v = {speed:g} m/s",
             "creeps open along u' = -1/p, which rounding cannot tell from the surface itself",
             "duration from the first integral of (6); promised are 4 roundings of the speeds, whose difference is 1/p",
-            partial(_creeps, p, speed, hertz), 4.0 * EPS * p * speed, limit=Status.STALLED,
+            partial(_creeps, p, speed, hertzian), 4.0 * EPS * p * speed, limit=Status.STALLED,
         )

@@ -12,7 +12,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product
 from grasp_ros.verification.cases.scenes import composed, part
 
-PUSH, HERTZ, RATE = 1.0, 1e4, 10.0  # N, N/m^1.5, 1/s
+PUSH, HERTZIAN, RATE = 1.0, 1e4, 10.0  # N, N/m^1.5, 1/s
 GRAVITY, ANGLE = 9.81, 0.3  # m/s^2, rad
 BODIES = 1.0, 2.0  # kg, arm and object
 
@@ -24,7 +24,7 @@ def _touching(seconds: float, stiffness: float, added: Mapping[str, Mapping[str,
         "time": {"duration_s": seconds, "control_period_s": 0.001},
         "left_arm": {"mass_kg": arm, "stiffness_N_per_m": stiffness, "position_m": 0.0, "velocity_m_per_s": 0.0},
         "object": {"mass_kg": mass, "position_m": 0.0, "velocity_m_per_s": 0.0},
-        "left_contact": {"hertz_N_per_m1_5": HERTZ}, **added,
+        "left_contact": {"hertz_N_per_m1_5": HERTZIAN}, **added,
     })
 
 
@@ -38,7 +38,7 @@ def _energy(states: np.ndarray, stiffness: float, push: tuple[float, float]) -> 
     """Energy (n,) of an elastic contact under constant forces on arm and object."""
     x_l, v_l, x_o, v_o = states[:, :4].T
     kinetic = 0.5 * (BODIES[0] * v_l**2 + BODIES[1] * v_o**2)
-    impact = 0.4 * HERTZ * np.maximum(x_l - x_o, 0.0) ** 2.5
+    impact = 0.4 * HERTZIAN * np.maximum(x_l - x_o, 0.0) ** 2.5
     energy: np.ndarray = kinetic + 0.5 * stiffness * x_l**2 + impact - push[0] * x_l - push[1] * x_o
     return energy
 

@@ -57,7 +57,7 @@ def grasp(state: Sequence[float] | Array, seconds: float, *, left: Arm = STANDAR
         sections[f"{side}_feedback"] = {
             "position_gain_N_per_m": arm.position_gain, "velocity_gain_Ns_per_m": arm.velocity_gain,
         }
-        sections[f"{side}_contact"] = {"hertz_N_per_m1_5": pair.hertz, "dissipation_s_per_m": pair.dissipation}
+        sections[f"{side}_contact"] = {"hertz_N_per_m1_5": pair.hertzian, "dissipation_s_per_m": pair.dissipation}
     return composed(name, sections)
 
 

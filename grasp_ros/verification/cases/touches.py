@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from grasp_ros.physics.layout import LEFT, RIGHT, Event
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.verification.cases.case import Case, Product, Solver
 from grasp_ros.verification.cases.scenes import AWAY, FREE, STANDARD, distance, grasp, library, part, reference
@@ -20,7 +20,7 @@ STIFF = Arm(1.0, 10.0, 0.2, 50.0, 5.0)
 
 def _first_touch(name: str, damping: float, solver: Solver) -> float:
     """Time of the first touch of both sides."""
-    times = [event.time for event in solver.events(library(name, 0.5)) if event.kind is Event.TOUCH]
+    times = [event.time for event in solver.events(library(name, 0.5)) if event.kind is Transition.TOUCH]
     if len(times) < 2:
         return np.inf
     expected = float(first_touch_from_rest(1, 15, damping))
@@ -69,7 +69,7 @@ def _during(seconds: float, right: Arm, mass: float, touches: int, solver: Solve
     error = distance(solver.states(scene, times), reference(scene, times))
     if isinstance(solver, Product):
         kinds = [(event.kind, event.side) for event in solver.runs[-1].events]
-        if kinds.count((Event.TOUCH, RIGHT)) != touches or (Event.RELEASE, LEFT) in kinds:
+        if kinds.count((Transition.TOUCH, RIGHT)) != touches or (Transition.RELEASE, LEFT) in kinds:
             return np.inf
     return error
 

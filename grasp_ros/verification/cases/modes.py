@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.layout import Event
+from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Solver
@@ -38,7 +38,7 @@ def _states(scene: Scene, solver: Solver) -> float:
 
 def _height(name: str, time: float, depth: float, solver: Solver) -> float:
     """Time and depth of the first re-entry."""
-    back = [event for event in solver.events(library(name, 1.0)) if event.kind is Event.REENTRY]
+    back = [event for event in solver.events(library(name, 1.0)) if event.kind is Transition.REENTRY]
     return max(abs(back[0].time / time - 1.0), abs(back[0].u / depth - 1.0))
 
 
