@@ -285,7 +285,7 @@ def test_run_notices_a_plant_that_was_stopped(tmp_path: Path) -> None:
 
 WRONG_PLANT = """
 import sys
-from grasp_ros.nodes import start
+from grasp_ros.graph.nodes import start
 from grasp_ros.exact.integrator import Integrator
 hold = Integrator.hold
 Integrator.hold = lambda self, forces: hold(self, 1.5 * forces)
