@@ -14,7 +14,7 @@ from conftest import grasp
 
 from grasp_ros import scene, simulation
 
-README = Path(__file__).parent.parent / "README.md"
+README = Path(__file__).parents[2] / "README.md"
 
 
 def test_readme_commands_work_in_their_order(tmp_path: Path) -> None:

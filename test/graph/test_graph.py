@@ -287,8 +287,8 @@ WRONG_PLANT = """
 import sys
 from grasp_ros.graph.nodes import start
 from grasp_ros.exact.integrator import Integrator
-hold = Integrator.hold
-Integrator.hold = lambda self, forces: hold(self, 1.5 * forces)
+set_input = Integrator.set_input
+Integrator.set_input = lambda self, forces: set_input(self, 1.5 * forces)
 sys.exit(start.main("plant"))
 """
 

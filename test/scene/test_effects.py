@@ -370,7 +370,7 @@ def test_only_the_paper_s_grasp_is_called_one() -> None:
     assert scenes.load("case_05").grasp.left.mass == 10.0
 
 
-DOCUMENT = Path(__file__).parents[1] / "docs" / "effects.md"
+DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"
 
 
 def test_the_example_of_the_documentation_works(monkeypatch: pytest.MonkeyPatch) -> None:
