@@ -1,5 +1,6 @@
 """Running a scene without ROS, and what comes of it."""
 
+from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.simulate import GRID_POINTS, Trajectory, load, simulate
 
-__all__ = ["GRID_POINTS", "Trajectory", "load", "simulate"]
+__all__ = ["GRID_POINTS", "SampledPlant", "Trajectory", "load", "simulate"]
