@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.graph.bag import Recording
-from grasp_ros.methods.registry import EXACT, METHODS, UNITS
+from grasp_ros.methods.contract import UNITS
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
@@ -33,14 +34,14 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
         ("status", trajectory.stop or trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
-        ("touches left, right", _touches(trajectory) if method.finds_contacts else "not looked for"),
+        ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
         ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
     ]
     if len(trajectory.t):
         rows.append(("V_c at both ends", _ends(level.V_c)))
     rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
-    if trajectory.method != EXACT and len(trajectory.t):  # nobody guards the steps of the others
+    if not method.energy_check and len(trajectory.t):
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
     return _with_watch(trajectory.scene, rows)

@@ -13,15 +13,17 @@ from oracles import ELASTIC, FREE, STANDARD, energy, flight_array, impact, make_
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import discrete_gradient, fixed_step, library
-from grasp_ros.methods.equations import Solution, parameters
-from grasp_ros.methods.registry import EXACT, METHODS, STEP
+from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Problem, Solution
+from grasp_ros.methods.equations import parameters
+from grasp_ros.methods.registry import EXACT, METHODS, check
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Grasp, acceleration
+from grasp_ros.physics.system import System
 from grasp_ros.simulation import Trajectory, load, simulate
 
 SEVERAL = 10_000
 STEPPING = [name for name in METHODS if name != EXACT]
-LOCATING = [name for name in STEPPING if METHODS[name].finds_contacts]
+LOCATING = [name for name in STEPPING if METHODS[name].events]
 PRECISE = {STEP: 2e-5, "tolerance": 1e-11}
 
 
@@ -30,8 +32,13 @@ def horizon(name: str, seconds: float, *settings: str) -> scenes.Scene:
 
 
 def fixed(rule: int, grasp: Grasp, state: Any, grid: Any, step: float) -> Solution:
-    grid = np.asarray(grid, dtype=float)
-    return fixed_step.solve(rule, grasp, np.asarray(state, dtype=float), float(grid[-1]), grid, step, SEVERAL)
+    return fixed_step.solve(rule, problem_of(grasp, state, grid, step))
+
+
+def problem_of(grasp: Grasp, state: Any, grid: Any, step: float) -> Problem:
+    """Up to the last output time."""
+    times = np.asarray(grid, dtype=float)
+    return Problem(System.of(grasp, state), float(times[-1]), times, step, SEVERAL)
 
 
 def slope(steps: Any, errors: Any) -> float:
@@ -80,7 +87,7 @@ def test_discrete_gradient_is_of_order_2() -> None:
     times = np.linspace(0.0, 0.5, 34)
     steps = [0.5 / n for n in (16, 32, 64, 128)]
     errors = [
-        swing_error(discrete_gradient.solve(SWING, AWAY, 0.5, times, h, SEVERAL), times) for h in steps
+        swing_error(discrete_gradient.solve(problem_of(SWING, AWAY, times, h)), times) for h in steps
     ]
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
 
@@ -235,7 +242,7 @@ def test_restitution_of_one_impact(name: str) -> None:
 
 
 def test_jacobian_is_the_derivative_of_the_right_hand_side() -> None:
-    q = parameters(make_grasp(p=0.3, right=STANDARD._replace(mass=2.0)))
+    q = parameters(System.of(make_grasp(p=0.3, right=STANDARD._replace(mass=2.0)), np.zeros(6)))
     y = np.array([0.01, 0.4, 0.002, -0.1, -0.003, 0.2])
     eps = 1e-7
     numeric = np.array([
@@ -255,21 +262,137 @@ def test_a_coarse_method_misses_contacts_and_does_not_hide_it() -> None:
     assert 0 < found < 54
 
 
-def test_output_does_not_depend_on_the_grid_or_its_repetitions() -> None:
-    scene = horizon("case_01", 1.0)
-    for name in ("paper", "rk4", "rk4_events", "discrete_gradient", "dop853_events"):
-        fine = simulate(scene, method=name, setting=1e-3, grid=np.array([0.0, 0.3, 0.3, 0.5123, 1.0]))
-        coarse = simulate(scene, method=name, setting=1e-3, grid=np.array([0.5123]))
-        assert (fine.state[1] == fine.state[2]).all()
-        assert (fine.state[3] == coarse.state[0]).all()
+# The contract of `grasp_ros.methods`, by its numbers; every method is held to all of it.
+
+COARSE = {STEP: 0.1, TOLERANCE: 1e-6, ACCURACY_KNOB: 1e-16}  # steps in which a pair changes more than once
+TIMES = np.array([0.0, 0.1, 0.3, 0.3, 0.5123, 1.0, 1.5])
 
 
-@pytest.mark.parametrize("name", ["paper", "rk4_events"])
-def test_event_budget_is_a_status(name: str) -> None:
-    motion = simulate(horizon("case_01", 5.0), method=name, setting=1e-3, max_events=3)
-    assert motion.status is Status.EVENT_BUDGET
-    assert len(motion.event_table) == 3
-    assert 0 < len(motion.t) < 2001
+def ask(name: str, grid: Any = TIMES, seconds: float = 1.5, **options: Any) -> Solution:
+    """Case 1 over some contacts, from a start that is not symmetric."""
+    method, scene = METHODS[name], horizon("case_01", seconds, "left_arm.position_m=-0.25")
+    return method.solve(Problem(scene.system, scene.duration, np.array(grid), COARSE[method.knob], **options))
+
+
+def steps_of(name: str, solution: Solution) -> list[int]:
+    """Counters that output times must not touch."""
+    counters = METHODS[name].counters
+    return [int(solution.work[entry]) for entry in counters if entry.name in ("STEPS", "FLIGHTS", "CONTACT_STEPS")]
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_1_and_2_a_problem_is_only_read_and_its_solution_is_new(name: str) -> None:
+    scene, method = horizon("case_01", 1.0), METHODS[name]
+    arrays = (scene.system.bodies, scene.system.pairs, scene.system.state, np.array([0.2, 1.0]))
+    before = [array.tobytes() for array in arrays]
+    problem = Problem(scene.system, scene.duration, arrays[-1], COARSE[method.knob])
+    first = method.solve(problem)
+    assert [array.tobytes() for array in arrays] == before
+    kept = [array.tobytes() for array in first[:3]]
+    for array in first[:3]:
+        array[:] = 0
+    again = method.solve(problem)
+    assert [array.tobytes() for array in again[:3]] == kept
+    assert (again.state.shape, again.state.dtype) == ((2, 6), np.float64)
+    assert (again.status, again.stop) == (Status.DONE, "")
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_3_no_state_and_no_event_depends_on_the_other_output_times(name: str) -> None:
+    whole = ask(name)
+    assert whole.state[0].tolist() == [-0.25, 0.0, 0.0, 0.0, 0.5, 0.0]
+    for grid in ([], TIMES, TIMES[4:5], TIMES[2:4], np.linspace(0.01, 1.49, 33)):
+        other = ask(name, grid)
+        assert other.state.shape == (len(grid), 6)
+        assert other.event_table.tobytes() == whole.event_table.tobytes()
+        assert steps_of(name, other) == steps_of(name, whole)
+        for row, time in enumerate(grid):
+            for place in np.flatnonzero(time == TIMES):
+                assert other.state[row].tobytes() == whole.state[place].tobytes()
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_4_events_ascend_or_are_none(name: str) -> None:
+    table = ask(name).event_table
+    assert table.shape[1] == 5
+    assert (np.diff(table[:, 0]) >= 0.0).all()
+    both = {(side, kind) for side in (LEFT, RIGHT) for kind in (Transition.TOUCH, Transition.RELEASE)}
+    assert {(side, kind) for side, kind in table[:, 1:3].tolist()} == (both if METHODS[name].events else set())
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_5_a_budget_of_events_ends_a_run_with_its_status(name: str) -> None:
+    times = np.linspace(0.0, 3.0, 601)
+    whole = ask(name, times, 3.0)
+    total = len(whole.event_table)
+    for budget in range(total + 2):
+        cut = ask(name, times, 3.0, max_events=budget)
+        assert cut.status is (Status.EVENT_BUDGET if budget < total else Status.DONE)
+        assert cut.event_table.tobytes() == whole.event_table[: len(cut.event_table)].tobytes()
+        assert cut.state.tobytes() == whole.state[: len(cut.state)].tobytes()
+        if budget < total:
+            beyond = whole.event_table[budget, 0]
+            assert len(cut.event_table) >= budget
+            assert (cut.event_table[budget:, 0] == beyond).all()
+            assert np.searchsorted(times, beyond, side="right") >= len(cut.state)
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if METHODS[name].work_budget])
+def test_5_a_budget_of_work_ends_a_run_with_its_status(name: str) -> None:
+    whole, cut = ask(name), ask(name, max_work=20)
+    assert cut.status is Status.WORK_BUDGET
+    assert cut.stop.startswith(cut.status.value)
+    assert len(cut.state) < len(whole.state)
+    assert cut.state.tobytes() == whole.state[: len(cut.state)].tobytes()
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_6_counters_are_whole_numbers_with_names(name: str) -> None:
+    work = ask(name).work
+    assert np.issubdtype(work.dtype, np.integer)
+    assert work.shape == (len(METHODS[name].counters),)
+    assert work.sum() > 0
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_7_and_9_settings_are_in_their_range_or_refused(name: str) -> None:
+    method, scene = METHODS[name], horizon("case_01", 2.0)
+    assert check(name, scene, None) == method.default
+    assert [check(name, scene, setting) for setting in method.ladder] == list(method.ladder)
+    assert list(method.ladder) == sorted(method.ladder, reverse=True)
+    for setting in (0.0, -1.0, math.nan, math.inf, 1e-30):
+        with pytest.raises(ValueError, match=f"^{name}: {method.knob} {setting!r} is not allowed; allowed: "):
+            simulate(scene, method=name, setting=setting)
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_8_and_9_what_a_method_does_not_declare_is_refused(name: str) -> None:
+    method, scene = METHODS[name], horizon("case_01", 0.02)
+    offset = scenes.load("preload").changed({"time.duration_s": 0.02})
+    pushed = scenes.load("pulse").changed({"time.duration_s": 0.02, "object_pulse.start_s": 0.01})
+    for able, asked, options in (
+        (method.sampled, scene, {"sampled": True}), (method.effects, pushed, {}), (method.effects, offset, {}),
+        (method.work_budget, scene, {"max_work": 10**6}),
+    ):
+        if able:
+            assert simulate(asked, method=name, **options).status is Status.DONE
+        else:
+            with pytest.raises(ValueError, match=f"{name}.*allowed.*: {EXACT}$"):
+                simulate(asked, method=name, **options)
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if METHODS[name].sampled])
+def test_8_a_drive_gets_an_integrator_and_gives_the_states(name: str) -> None:
+    """Nobody sets an input: with the controllers in the drive the arms swing by themselves."""
+    scene, times = scenes.load("no_contact", ["time.duration_s=1"]), np.linspace(0.0, 1.0, 11)
+    problem = Problem(
+        scene.system, 1.0, times, METHODS[name].default, drive=lambda integrator: integrator.advance(1.0, times)
+    )
+    x, v = scene.initial_state[:2]
+    for sampled, stiffness, damping in ((False, 15.0, 0.7), (True, 10.0, 0.2)):
+        found = METHODS[name].solve(problem._replace(sampled=sampled))
+        exact = flight_array((1.0, stiffness, damping, 0.0), x, v, times)
+        assert np.abs(found.state[:, :2] - np.array(exact).T).max() < 1e-14
 
 
 def test_a_step_that_is_unstable_ends_with_a_status() -> None:
@@ -296,7 +419,8 @@ def test_saved_with_method_setting_and_its_own_counters(tmp_path: Any) -> None:
         ({"method": "paper", "setting": math.nan}, "paper: step nan is not allowed"),
         ({"method": "dop853", "setting": 1e-15}, "dop853: tolerance 1e-15 is not allowed; allowed: 2.3e-14 to 0.01"),
         ({"method": "paper", "sampled": True}, "paper: only continuous feedback"),
-        ({"method": "exact", "setting": 1e-20}, "accuracy: 1e-20 is outside"),
+        ({"method": "exact", "setting": 1e-20}, "exact: accuracy 1e-20 is not allowed; allowed: 1e-16 to 0.001"),
+        ({"method": "rk4", "max_work": 100}, "rk4: has no budget of work; allowed with one: exact"),
     ],
 )
 def test_what_a_method_cannot_do_is_refused(options: dict[str, Any], complaint: str) -> None:
