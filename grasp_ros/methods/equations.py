@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.exact.jit import kernel
-from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, Pair, Transition
+from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, Body, Pair, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
@@ -90,10 +90,10 @@ def kind_of(before: int, after: int) -> int:
 
 
 @kernel
-def note(events: Any, count: int, time: float, side: int, kind: int, y: Any) -> None:
+def note(events: Any, count: int, time: float, side: Body, kind: int, y: Any) -> None:
     """Write one row of the record of events."""
     u, d = relative(y, side)
-    events[count, 0], events[count, 1], events[count, 2] = time, side, kind
+    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind
     events[count, 3], events[count, 4] = u, d
 
 

@@ -11,7 +11,7 @@ def solve(problem: Problem) -> Solution:
 
     Raises
     ------
-    ValueError
+    Refused
         If the accuracy is outside its range or the initial state is not finite.
     """
     integrator = Integrator(

@@ -10,6 +10,7 @@ from grasp_ros.methods import discrete_gradient, exact, fixed_step, library
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method
 from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import PAPER, Scene
 
 EXACT = "exact"
@@ -87,11 +88,11 @@ def find(name: str) -> Method:
 
     Raises
     ------
-    ValueError
+    Refused
         If there is none.
     """
     if name not in METHODS:
-        raise ValueError(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
+        raise Refused(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
     return METHODS[name]
 
 
@@ -113,7 +114,7 @@ def check(
 
     Raises
     ------
-    ValueError
+    Refused
         If the name or the setting is not allowed, a package is missing, or the scene or the run needs what the method
         does not declare.
     """
@@ -124,18 +125,18 @@ def check(
         low, high = scene.duration / MOST_STEPS, scene.duration
         value = min(value, high) if setting is None else value
     if not low <= value <= high:
-        raise ValueError(f"{name}: {method.knob} {value!r} is not allowed; allowed: {low:g} to {high:g}")
+        raise Refused(f"{name}: {method.knob} {value!r} is not allowed; allowed: {low:g} to {high:g}")
     if sampled and not method.sampled:
-        raise ValueError(f"{name}: only continuous feedback; allowed for sampled feedback: {_able('sampled')}")
+        raise Refused(f"{name}: only continuous feedback; allowed for sampled feedback: {_able('sampled')}")
     if max_work != MAX_WORK and not method.work_budget:
-        raise ValueError(f"{name}: has no budget of work; allowed with one: {_able('work_budget')}")
+        raise Refused(f"{name}: has no budget of work; allowed with one: {_able('work_budget')}")
     if not method.effects and (odd := _beside_the_paper(scene)):
-        raise ValueError(
+        raise Refused(
             f"{scene.name}: {', '.join(odd)}: {name} knows two arms, an object and their contacts, no more and no less;"
             f" allowed here: {_able('effects')}"
         )
     if method.package is not None and importlib.util.find_spec(method.package) is None:
-        raise ValueError(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
+        raise Refused(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
     return value
 
 

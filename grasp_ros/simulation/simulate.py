@@ -11,6 +11,7 @@ from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK
 from grasp_ros.methods import registry
 from grasp_ros.methods.contract import ACCURACY_KNOB, Problem
 from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
@@ -62,7 +63,7 @@ def simulate(
 
     Raises
     ------
-    ValueError
+    Refused
         If the grid is not ascending within the horizon, the changes are not those of a running graph, or the method
         cannot do what is asked, see `methods.registry.check`.
     """
@@ -92,6 +93,6 @@ def simulate(
 def _check_grid(scene: Scene, grid: Array) -> None:
     """Refuse output times that do not ascend or lie outside the horizon."""
     if not ((grid[1:] >= grid[:-1]).all() and np.isfinite(grid[[0, -1]] if len(grid) else grid).all()):
-        raise ValueError("grid: allowed: ascending finite times")
+        raise Refused("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
-        raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+        raise Refused(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")

@@ -14,6 +14,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, Event, Status, to_events
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -156,7 +157,7 @@ def load(path: Path) -> Trajectory:
 
     Raises
     ------
-    ValueError
+    Refused
         If the file is not such a file.
     """
     try:
@@ -168,4 +169,4 @@ def load(path: Path) -> Trajectory:
                 Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["stop"]),
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
-        raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
+        raise Refused(f"{path}: not a file of `grasp simulate`: {error}") from None
