@@ -197,7 +197,7 @@ def test_methods_agree_with_exact_for_some_contacts(name: str) -> None:
 
 @pytest.mark.parametrize("name", LOCATING)
 def test_condition_10_is_an_event_in_both_directions(name: str) -> None:
-    """Oracles' scene (a): both pairs pass u' = -1/p at once, come back through it, and then release."""
+    """The scene v_jump_symmetric: both pairs pass u' = -1/p at once, come back through it, and then release."""
     settings = [
         f"{key}={value}"
         for side in ("left", "right")
@@ -248,7 +248,7 @@ def test_jacobian_is_the_derivative_of_the_right_hand_side() -> None:
 
 
 def test_a_coarse_method_misses_contacts_and_does_not_hide_it() -> None:
-    """design.md: order 8 with events reports success on case 2 with most of the 54 touches missed."""
+    """Order 8 with events reports success on case 2 with most of the 54 touches missed."""
     motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=1e-5)
     found = sum(len(motion.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     assert motion.status is Status.DONE

@@ -205,7 +205,7 @@ def test_discrete_gradient_does_not_drift_with_the_roundings_of_its_matrix(tmp_p
 
 
 def test_what_a_scene_can_hold() -> None:
-    """design.md: case 1 amplifies by some 4e2 in 20 s, case 3 by 7e6."""
+    """Case 1 amplifies by some 4e2 in 20 s, case 3 by 7e6."""
     tame, wild = predictability.run([scenes.load("case_01"), scenes.load("case_03")], 60.0)
     assert 1e2 < tame.growth < 1e4
     assert 1e6 < wild.growth < 1e8
@@ -217,7 +217,7 @@ def test_what_a_scene_can_hold() -> None:
     assert (np.diff(wild.distance) >= 0.0).all()
 
 
-# Stability of the sampled loop: oracles.md, "Sampled control".
+# Stability of the sampled loop.
 
 
 @pytest.mark.parametrize(
