@@ -37,3 +37,8 @@ def scene_of(name: str, *settings: str, without: tuple[str, ...] = ()) -> Scene:
 def case_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001, *settings: str) -> Scene:
     """A case with another length and control period."""
     return scenes.load(name, [f"time.duration_s={duration!r}", f"time.control_period_s={period!r}", *settings])
+
+
+def horizon(name: str, seconds: float, *settings: str) -> Scene:
+    """A scene over another time."""
+    return scenes.load(name, [f"time.duration_s={seconds}", *settings])
