@@ -14,6 +14,8 @@ from grasp_ros.physics.model import Arm
 from grasp_ros.verification.cases.scenes import contacts
 from grasp_ros.verification.reference import integrate
 
+pytestmark = pytest.mark.slow  # references with 20 and 25 digits
+
 LONG = ("case_01", "case_02", "case_03", "case_04", "case_06", "case_09")  # 20 s of reference; 5 s for the others
 FORGETFUL = ("case_03", "case_06", "case_09")  # these amplify most
 TOUCHES = {"case_01": (22, 22), "case_02": (29, 25), "case_03": (27, 21)}

@@ -144,6 +144,7 @@ for name in ("case_01", "case_05"):
 """
 
 
+@pytest.mark.slow
 def test_uncompiled_source_gives_the_same_numbers() -> None:
     outputs = []
     for disabled in ("0", "1"):

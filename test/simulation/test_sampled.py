@@ -155,6 +155,7 @@ def test_saturation_limits_what_the_law_asks_for() -> None:
     assert (np.abs(asked) > 1.0).any()
 
 
+@pytest.mark.slow
 def test_noise_is_seeded_and_as_large_as_it_says() -> None:
     settings = ("time.duration_s=60.0",)
     steps = ("position_step_m", "velocity_step_m_per_s")

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
-from conftest import grasp
+import pytest
+
+pytestmark = pytest.mark.slow  # whole studies, though quick ones
 
 SHORT = "time.duration_s=2"
 
 
-def test_accuracy_quick_writes_records_and_figures(tmp_path: Path) -> None:
-    result = grasp("study", "accuracy", "case_01", "--set", SHORT, "--quick", "-o", "out", cwd=tmp_path)
+def test_accuracy_quick_writes_records_and_figures(command: Any, tmp_path: Path) -> None:
+    result = command("study", "accuracy", "case_01", "--set", SHORT, "--quick", "-o", "out")
     assert result.returncode == 0, result.stderr
     assert {"journal.jsonl", "records.csv", "error_against_time.png", "contacts_missed.png"} <= {
         path.name for path in (tmp_path / "out").iterdir()
@@ -19,8 +22,8 @@ def test_accuracy_quick_writes_records_and_figures(tmp_path: Path) -> None:
     assert "largest absolute error over six states" in result.stdout
 
 
-def test_page_quick_has_all_sections_and_figures(tmp_path: Path) -> None:
-    result = grasp("study", "page", "--quick", "--docs", "docs", "-o", "journal", cwd=tmp_path)
+def test_page_quick_has_all_sections_and_figures(command: Any, tmp_path: Path) -> None:
+    result = command("study", "page", "--quick", "--docs", "docs", "-o", "journal")
     assert result.returncode == 0, result.stderr
     text = (tmp_path / "docs" / "accuracy.md").read_text()
     for title in ("Which method", "What the paper's method costs", "Energy in the elastic case", "over topics",
@@ -32,14 +35,14 @@ def test_page_quick_has_all_sections_and_figures(tmp_path: Path) -> None:
     assert "275.0566374 ms" in text
 
 
-def test_advise_answers_with_a_command(tmp_path: Path) -> None:
+def test_advise_answers_with_a_command(command: Any) -> None:
     wish = ("study", "advise", "case_01", "--set", "time.duration_s=0.5", "--quick", "-o", "out")
-    result = grasp(*wish, "--error", "1e-6", cwd=tmp_path)
+    result = command(*wish, "--error", "1e-6")
     assert result.returncode == 0, result.stderr
     assert "\nthat is: grasp simulate case_01 --method " in result.stdout
-    too_much = grasp(*wish, "--error", "1e-30", cwd=tmp_path)
+    too_much = command(*wish, "--error", "1e-30")
     assert too_much.returncode == 1
     assert "no method reaches it; closest: " in too_much.stdout
-    neither = grasp(*wish, cwd=tmp_path)
+    neither = command(*wish)
     assert neither.returncode == 2
     assert "--error, --budget: allowed: exactly one of them" in neither.stderr

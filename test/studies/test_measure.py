@@ -42,6 +42,7 @@ def test_error_contacts_and_work_are_measured_not_believed(tmp_path: Path) -> No
     assert (again.state == target.state).all()
 
 
+@pytest.mark.slow
 def test_a_method_that_misses_contacts_is_shown_with_its_count(tmp_path: Path) -> None:
     case = scenes.load("case_02")
     records = accuracy.run([case], tmp_path, QUICK, [contender("dop853_events", 1e-5, 1e-4)])

@@ -10,7 +10,11 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.verification.cases.case import Case, Product, judge
 from grasp_ros.verification.cases.registry import cases
 
-PARAMETERS = [pytest.param(case, id=f"{case.family}: {case.name}") for case in cases()]
+REFERENCE = [pytest.mark.slow]  # 25 digits
+PARAMETERS = [
+    pytest.param(case, id=f"{case.family}: {case.name}", marks=REFERENCE if "reference" in case.oracle else ())
+    for case in cases()
+]
 
 
 def test_names_are_unique_and_families_are_many() -> None:
@@ -38,6 +42,7 @@ def test_announced_ends_do_come(status: Status) -> None:
     assert len(product.runs[-1].state) == len(product.runs[-1].t)
 
 
+@pytest.mark.slow
 def test_oracles_notice_a_coarse_solver() -> None:
     """With an accuracy of 1e-3 nearly all the cases with contacts fail."""
     families = ("touch", "clamp", "start", "extreme")

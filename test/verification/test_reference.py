@@ -13,6 +13,8 @@ from gmpy2 import mpfr
 from grasp_ros.physics.model import Arm, Contact, Grasp
 from grasp_ros.verification.reference import Reference, integrate
 
+pytestmark = pytest.mark.slow  # 20 s in 30 digits
+
 FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING = Contact(0.0, 0.0)
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
