@@ -160,6 +160,7 @@ def test_short_and_long_form_meet() -> None:
 
 @pytest.mark.parametrize("amplitude", [0.3, 0.5, 1e-9, 1e9])
 def test_first_touch_from_rest_does_not_depend_on_the_amplitude(amplitude: float) -> None:
+    """O4."""
     t, _ = root(GRAZING_ARM, STILL, (-amplitude, 0.0, 0.0, 0.0), 100.0)
     assert t == pytest.approx(float(first_touch_from_rest(1.0, 15.0, 0.7)), rel=1e-15)
     mirrored, _ = root(GRAZING_ARM, STILL, (amplitude, 0.0, 0.0, 0.0), 100.0, sign=-1.0)
