@@ -36,7 +36,7 @@ class Product:
     ----------
     max_events, max_work : int
     accuracy : float
-        See `physics.integrator.Integrator`.
+        See `exact.integrator.Integrator`.
     runs : list of Trajectory
         All runs so far; what was reached is in them even if a run was stopped.
     """
@@ -69,6 +69,11 @@ class Product:
     def events(self, scene: Scene) -> list[Event]:
         """All events."""
         return self.run(scene, [scene.duration]).events
+
+
+def recorded(solver: Solver) -> list[Event] | None:
+    """Events that the product recorded in its last run; None of another solver, which need not look for them."""
+    return solver.runs[-1].events if isinstance(solver, Product) else None
 
 
 @dataclass(frozen=True)
