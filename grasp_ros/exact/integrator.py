@@ -15,6 +15,7 @@ from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.modes import SPARE, UNKNOWN
 from grasp_ros.exact.series import Tables, new_tables, series_order
 from grasp_ros.physics.energy import energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Outcome, Transition, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
@@ -90,7 +91,7 @@ class Integrator:
 
     Raises
     ------
-    ValueError
+    Refused
         If the accuracy is outside its range or the state is not finite.
     """
 
@@ -99,10 +100,10 @@ class Integrator:
         max_work: int = MAX_WORK,
     ) -> None:
         if not FINEST <= accuracy <= COARSEST:
-            raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+            raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
         state = system.state
         if state.shape != (6,) or not np.isfinite(state).all():
-            raise ValueError(f"state: {state!r} is not an array of six finite numbers")
+            raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._accuracy = system, accuracy
@@ -175,11 +176,11 @@ class Integrator:
 
         Raises
         ------
-        ValueError
+        Refused
             If the duration is negative or not finite.
         """
         if not (math.isfinite(duration) and duration >= 0.0):
-            raise ValueError(f"duration: {duration!r} is not a finite number of seconds >= 0")
+            raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = np.zeros(0) if grid is None else np.ascontiguousarray(grid, dtype=float)
         out = np.empty((len(times), 6))
         clock = np.zeros(2)

@@ -12,6 +12,7 @@ import numpy as np
 from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST
 from grasp_ros.methods import discrete_gradient, fixed_step, library
 from grasp_ros.methods.equations import Solution
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array, Grasp
 from grasp_ros.scene import PAPER, Scene
 
@@ -111,12 +112,12 @@ def check(name: str, scene: Scene, setting: float | None, sampled: bool = False)
 
     Raises
     ------
-    ValueError
+    Refused
         If the name or the setting is not allowed, a package is missing, or the scene has something, or lacks
         something, that only `exact` knows how to treat.
     """
     if name not in METHODS:
-        raise ValueError(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
+        raise Refused(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
     method = METHODS[name]
     value = method.default if setting is None else setting
     if name == EXACT:
@@ -126,16 +127,16 @@ def check(name: str, scene: Scene, setting: float | None, sampled: bool = False)
         low, high = scene.duration / MOST_STEPS, scene.duration
         value = min(value, high) if setting is None else value
     if not low <= value <= high:
-        raise ValueError(f"{name}: {method.knob} {value!r} is not allowed; allowed: {low:g} to {high:g}")
+        raise Refused(f"{name}: {method.knob} {value!r} is not allowed; allowed: {low:g} to {high:g}")
     if sampled:
-        raise ValueError(f"{name}: only continuous feedback; allowed for sampled feedback: {EXACT}")
+        raise Refused(f"{name}: only continuous feedback; allowed for sampled feedback: {EXACT}")
     if odd := sorted(set(scene.values) ^ PAPER):
-        raise ValueError(
+        raise Refused(
             f"{scene.name}: {', '.join(odd)}: {name} knows two arms, an object and their contacts, no more and no less;"
             f" allowed here: {EXACT}"
         )
     if method.package is not None and importlib.util.find_spec(method.package) is None:
-        raise ValueError(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
+        raise Refused(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
     return value
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.control import DelayLine
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -23,18 +24,18 @@ def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
 
     Raises
     ------
-    ValueError
+    Refused
         Names the first of them.
     """
     if not changes:
         return
     if not held:
-        raise ValueError("changes: not allowed under continuous feedback; allowed: sampled=True")
+        raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
     live = scene.live
     for tick, numbers in changes.items():
         for name in numbers:
             if name not in live or not 0 <= tick <= scene.ticks:
-                raise ValueError(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
+                raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
 def tick_times(scene: Scene) -> Array:

@@ -14,6 +14,7 @@ from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Event, In
 from grasp_ros.methods import equations, registry
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -121,7 +122,7 @@ def load(path: Path) -> Trajectory:
 
     Raises
     ------
-    ValueError
+    Refused
         If the file is not such a file.
     """
     try:
@@ -133,7 +134,7 @@ def load(path: Path) -> Trajectory:
                 Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["stop"]),
             )
     except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
-        raise ValueError(f"{path}: not a file of `grasp simulate`: {error}") from None
+        raise Refused(f"{path}: not a file of `grasp simulate`: {error}") from None
 
 
 def simulate(
@@ -178,7 +179,7 @@ def simulate(
 
     Raises
     ------
-    ValueError
+    Refused
         If the accuracy is outside its range, the grid is not ascending within the horizon, the changes are not those
         of a running graph, or the method cannot do what is asked, see `methods.registry.check`.
     """
@@ -189,9 +190,9 @@ def simulate(
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = np.asarray(grid, dtype=float)
     if not ((grid[1:] >= grid[:-1]).all() and np.isfinite(grid[[0, -1]] if len(grid) else grid).all()):
-        raise ValueError("grid: allowed: ascending finite times")
+        raise Refused("grid: allowed: ascending finite times")
     if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
-        raise ValueError(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+        raise Refused(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
     if method != EXACT:
         found = registry.solve(method, scene, grid, setting, min(max_events, registry.MOST_EVENTS))
         return Trajectory(
