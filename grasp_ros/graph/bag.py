@@ -68,8 +68,8 @@ class Recorder:
 
     def __init__(self, path: Path, scene: scenes.Scene, versions: dict[str, str]) -> None:
         self._path = path
-        self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
         try:
+            self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
         except (WriterError, OSError) as error:
             raise BagError(f"{path}: cannot be written: {error}") from None

@@ -106,6 +106,8 @@ def save(figure: Figure, path: Path, dpi: int = 150) -> None:
             raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
         with writing(path):
             figure.savefig(path, dpi=dpi)
+    except RuntimeError as error:  # a .pgf where there is no TeX
+        raise Refused(f"{path}: {error}") from None
     finally:
         plt.close(figure)
 
