@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from oracles import CASES, flight_array
 
 from grasp_ros import scene as scenes
@@ -27,9 +26,8 @@ OTHERS = [name for name in scenes.names() if name not in CASES]
 
 def scene_of(name: str, *settings: str, without: tuple[str, ...] = ()) -> Scene:
     """A scene of the package with other numbers, or without some of its sections."""
-    document = yaml.safe_load(scenes.load(name, settings).to_yaml())
-    kept = {key: value for key, value in document.items() if key not in without}
-    return scenes.parse(yaml.safe_dump(kept, sort_keys=False), name, name)
+    scene = scenes.load(name, settings)
+    return scenes.compose(name, {key: numbers for key, numbers in scene.values.items() if key not in without})
 
 
 def test_every_effect_has_a_scene() -> None:
@@ -128,7 +126,7 @@ def test_an_absent_arm_is_one_that_is_out_of_reach() -> None:
     document = {**scenes.load("case_01", ["right_arm.position_m=1e3", "right_arm.stiffness_N_per_m=0",
                                           "right_feedback.position_gain_N_per_m=0"]).values}
     document.update(scenes.load("hammer").values)
-    far = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **document}), "far", "far")
+    far = scenes.compose("far", document)
     assert simulate(far).state[:, :4].tobytes() == motion.state[:, :4].tobytes()
     assert np.isnan(motion.state[:, 4:]).all()
 
@@ -222,9 +220,9 @@ def test_a_set_point_is_a_constant_force() -> None:
     ],
 )
 def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]], impulse: float) -> None:
-    document = {"title": "", "readings": [], "time": {"duration_s": 1.0, "control_period_s": 0.01},
+    document = {"time": {"duration_s": 1.0, "control_period_s": 0.01},
                 "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 1.0}, **section}
-    scene = scenes.parse(yaml.safe_dump(document), "push", "push")
+    scene = scenes.compose("push", document)
     for sampled in (False, True):
         motion = simulate(scene, sampled=sampled)
         assert motion.state[-1, 3] == pytest.approx(1.0 + impulse / 2.0, rel=1e-14)
@@ -235,10 +233,10 @@ def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]
 
 
 def test_a_sine_force_is_a_staircase_with_the_values_of_the_sine() -> None:
-    document = {"title": "", "readings": [], "time": {"duration_s": 1.0, "control_period_s": 0.001},
+    document = {"time": {"duration_s": 1.0, "control_period_s": 0.001},
                 "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
                 "object_sine": {"amplitude_N": 2.0, "frequency_Hz": 3.0, "phase_rad": 0.5}}
-    scene = scenes.parse(yaml.safe_dump(document), "shake", "shake")
+    scene = scenes.compose("shake", document)
     turn = 2 * np.pi * 3.0
     exact = 2.0 / turn * (np.cos(0.5) - np.cos(turn * tick_times(scene) + 0.5))
     found = simulate(scene, sampled=True).state[:, 3]
@@ -281,9 +279,9 @@ def test_delay_costs_the_stability_that_theory_says(factor: float, grows: bool) 
     """Spectral radius 1 of the sampled arm with one period of delay is at 0.08878 s."""
     period = round(0.0887780231816513 * factor * 1e6) / 1e6
     settings = [f"time.control_period_s={period!r}", f"time.duration_s={period * 2000:.9f}", "loop.delay_ticks=1"]
-    document = {key: value for key, value in yaml.safe_load(scenes.load("delay").to_yaml()).items()
-                if not key.startswith(("right", "object", "left_contact"))}
-    scene = scenes.parse(yaml.safe_dump(document), "d", "d", settings)
+    sections = scenes.load("delay", settings).values
+    scene = scenes.compose("alone", {key: numbers for key, numbers in sections.items()
+                                     if not key.startswith(("right", "object", "left_contact"))})
     swings = np.abs(simulate(scene).state[:, 0])
     assert (swings[-200:].max() > swings[:200].max()) == grows
 
@@ -303,7 +301,7 @@ def test_noise_is_seeded_and_as_large_as_it_says() -> None:
     for key in ("left_sensor", "right_sensor"):
         for step in steps:
             del sections[key][step]
-    smooth = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **sections}), "smooth", "smooth")
+    smooth = scenes.compose("smooth", sections)
     motion = simulate(smooth)
     assert simulate(smooth).state.tobytes() == motion.state.tobytes()
     other = simulate(smooth.changed({"left_sensor.noise_seed": 3}))
@@ -321,7 +319,7 @@ def test_quantised_measurements_are_whole_steps() -> None:
     document = {**scenes.load("noise").values}
     for side in ("left", "right"):
         document[f"{side}_sensor"] = {"noise_seed": 0, "position_step_m": 0.01}
-    scene = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **document}), "steps", "steps")
+    scene = scenes.compose("steps", document)
     motion = simulate(scene)
     measured = (motion.command[:, 0] + 0.5 * motion.state[:, 1]) / -5.0
     assert np.abs(measured / 0.01 - np.round(measured / 0.01)).max() < 1e-9
@@ -408,13 +406,13 @@ def test_the_documentation_lists_every_effect() -> None:
 
 def against_the_slope(gap: float, friction: float = 1.0) -> Scene:
     """An arm at rest beside an object that friction holds on a slope."""
-    document = {"title": "", "readings": [], "time": {"duration_s": 3.0, "control_period_s": 0.001},
+    document = {"time": {"duration_s": 3.0, "control_period_s": 0.001},
                 "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": 5.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
                 "left_feedback": {"position_gain_N_per_m": 1.0, "velocity_gain_Ns_per_m": 0.0, "set_point_m": 0.001},
                 "object": {"mass_kg": 1.0, "position_m": gap, "velocity_m_per_s": 0.0},
                 "object_friction": {"coulomb_N": friction}, "left_contact": {"hertz_N_per_m1_5": 1e4},
                 "tilt": {"angle_rad": 0.2, "gravity_m_per_s2": 9.81}}
-    return scenes.parse(yaml.safe_dump(document), "slope", "slope")
+    return scenes.compose("slope", document)
 
 
 def test_a_pair_that_touches_at_rest_is_judged_with_the_friction() -> None:
@@ -438,10 +436,10 @@ def test_impacts_die_out_against_a_stuck_object_without_a_stall() -> None:
 
 def test_a_weak_spring_under_a_constant_force_raises_no_alarm() -> None:
     for stiffness in (1e-6, 1e-4, 1e-2):
-        document = {"title": "", "readings": [], "time": {"duration_s": 2.0, "control_period_s": 0.001},
+        document = {"time": {"duration_s": 2.0, "control_period_s": 0.001},
                     "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": stiffness, "position_m": 0.0,
                                  "velocity_m_per_s": 0.0}, "tilt": {"angle_rad": 0.1, "gravity_m_per_s2": 9.81}}
-        motion = simulate(scenes.parse(yaml.safe_dump(document), "weak", "weak"), sampled=True)
+        motion = simulate(scenes.compose("weak", document), sampled=True)
         assert not any(row.alarm for row in balance(motion))
 
 
@@ -460,9 +458,9 @@ def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bo
 
 def sliding(**friction: float) -> Scene:
     """An object of 2 kg alone with 1.5 m/s."""
-    document = {"title": "", "readings": [], "time": {"duration_s": 10.0, "control_period_s": 0.01},
+    document = {"time": {"duration_s": 10.0, "control_period_s": 0.01},
                 "object": {"mass_kg": 2.0, "position_m": 0.25, "velocity_m_per_s": 1.5}, "object_friction": friction}
-    return scenes.parse(yaml.safe_dump(document), "slide", "slide")
+    return scenes.compose("slide", document)
 
 
 def test_dry_friction_stops_the_object_where_and_when_it_must() -> None:
@@ -493,11 +491,11 @@ def test_viscous_friction_alone_never_stops_it() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_stuck_object_gives_way_only_to_more_than_the_friction(sign: float) -> None:
-    document = {"title": "", "readings": [], "time": {"duration_s": 4.0, "control_period_s": 0.01},
+    document = {"time": {"duration_s": 4.0, "control_period_s": 0.01},
                 "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
                 "object_friction": {"coulomb_N": 1.0},
                 "object_table": {"time_s": [0.0, 1.0, 2.0], "force_N": [sign, 1.5 * sign, 0.5 * sign]}}
-    motion = simulate(scenes.parse(yaml.safe_dump(document), "pull", "pull"))
+    motion = simulate(scenes.compose("pull", document))
     slip, stick = motion.events
     assert (slip.kind, stick.kind) == (Transition.SLIP, Transition.STICK)
     assert slip.time == 1.0
@@ -508,10 +506,10 @@ def test_a_stuck_object_gives_way_only_to_more_than_the_friction(sign: float) ->
 def test_friction_holds_the_object_against_the_slope() -> None:
     """It slides if tan(angle) > F / (m g cos(angle)): here m g sin(angle) against F."""
     for angle, moves in ((0.05, False), (0.06, True)):
-        document = {"title": "", "readings": [], "time": {"duration_s": 2.0, "control_period_s": 0.01},
+        document = {"time": {"duration_s": 2.0, "control_period_s": 0.01},
                     "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
                     "object_friction": {"coulomb_N": 1.1}, "tilt": {"angle_rad": angle, "gravity_m_per_s2": 9.81}}
-        end = simulate(scenes.parse(yaml.safe_dump(document), "slope", "slope")).state[-1]
+        end = simulate(scenes.compose("slope", document)).state[-1]
         pull = 9.81 * np.sin(angle) - 0.55
         assert end[2] == (pytest.approx(-0.5 * pull * 4.0, rel=1e-13) if moves else 0.0)
 
