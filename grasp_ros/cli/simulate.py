@@ -19,9 +19,9 @@ from grasp_ros.cli.arguments import (
     whole,
 )
 from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status
-from grasp_ros.methods.registry import ACCURACY_KNOB, EXACT, METHODS, STEP, TOLERANCE, UNITS
+from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
+from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.files import writing
 from grasp_ros.simulation import GRID_POINTS, simulate
 
 
@@ -76,8 +76,7 @@ def _simulate(options: argparse.Namespace) -> int:
         )
     print(table(describe_trajectory(trajectory)))
     if options.output is not None:
-        with writing(options.output):
-            trajectory.save(options.output)
+        trajectory.save(options.output)
         print(f"written to {options.output}")
     return 0 if trajectory.status is Status.DONE else 1
 

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact import hybrid
-from grasp_ros.exact.friction import PUSH
 from grasp_ros.exact.jit import with_deep_stack
-from grasp_ros.exact.modes import SPARE, UNKNOWN
-from grasp_ros.exact.series import Tables, new_tables, series_order
+from grasp_ros.exact.outputs import SPARE
+from grasp_ros.exact.records import Tables
+from grasp_ros.exact.series import new_tables, series_order
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import FORCE, MASS, OBJECT, U_L, U_R, Outcome, Transition, Work
+from grasp_ros.physics.layout import EVENT_TIME, FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Transition, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -42,7 +42,7 @@ class Event(NamedTuple):
     """One event of one pair, or of the object."""
 
     time: float  # s
-    side: int  # layout.LEFT or RIGHT; OBJECT for what friction does
+    side: Body  # LEFT or RIGHT; OBJECT for what friction does
     kind: Transition
     u: float  # penetration, m; 0 for the object
     u_rate: float  # m/s; 0 for the object
@@ -51,10 +51,14 @@ class Event(NamedTuple):
 def to_events(table: Array) -> list[Event]:
     """Records of rows (m, 5)."""
     time, side, kind, u, u_rate = table.T.tolist()
-    return list(map(Event, time, map(int, side), map(_KINDS.__getitem__, map(int, kind)), u, u_rate))
+    bodies = map(_BODIES.__getitem__, map(int, side))
+    kinds = map(_KINDS.__getitem__, map(int, kind))
+    return list(map(Event, time, bodies, kinds, u, u_rate))
 
 
-_KINDS = tuple(Transition)
+_KINDS, _BODIES = tuple(Transition), tuple(Body)
+_OUTPUTS, _EVENTS = (int(counter) for counter in Filled)
+_NO_TIMES = np.zeros(0)
 _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
@@ -109,13 +113,14 @@ class Integrator:
         self._system, self._accuracy = system, accuracy
         self._max_events, self._max_work = max_events, max_work
         self._time = 0.0
-        self._bodies = system.closed_loop if continuous else system.bodies.copy()
-        self._bodies[self._bodies[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
-        self._own_forces = self._bodies[:, FORCE].copy()
+        self._given = system.closed_loop if continuous else system.bodies.copy()
+        self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
+        self._own_forces = self._given[:, FORCE].copy()
+        self._bodies = self._given.copy()
         self._pairs = system.pairs
-        self._friction = np.array([system.coulomb, self._bodies[OBJECT, MASS], self._own_forces[OBJECT]])
+        self._coulomb = float(system.coulomb)
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
-        self._mode = np.full(3, UNKNOWN, dtype=np.int64)
+        self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._tables, self._event_rows = _workspace(accuracy)
         self._events: list[Array] = []
         self._event_count = 0
@@ -132,7 +137,8 @@ class Integrator:
 
     @property
     def _spent(self) -> int:
-        return int(self.work[Work.FLIGHTS] + self.work[Work.CONTACT_STEPS] + self.work[Work.ROOT_ITERATIONS])
+        flights, steps, _, iterations = self.work.tolist()  # enums cost a sampled tick more than the list
+        return int(flights + steps + iterations)
 
     @property
     def stop(self) -> str:
@@ -155,8 +161,7 @@ class Integrator:
 
     def set_input(self, forces: Array) -> None:
         """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
-        self._bodies[:, FORCE] = self._own_forces + forces
-        self._friction[PUSH] = self._bodies[OBJECT, FORCE]
+        self._given[:, FORCE] = self._own_forces + forces
 
     def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
         """Integrate for `duration` seconds.
@@ -181,22 +186,22 @@ class Integrator:
         """
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
-        times = np.zeros(0) if grid is None else np.ascontiguousarray(grid, dtype=float)
+        times = _NO_TIMES if grid is None else np.ascontiguousarray(grid, dtype=float)
         out = np.empty((len(times), 6))
-        clock = np.zeros(2)
-        filled = np.zeros(2, dtype=np.int64)
+        clock, filled = np.zeros(2), np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
             allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
             outcome = hybrid.advance(
-                self._tables, self._bodies, self._pairs, self._friction, self._y, self._mode, clock, duration,
-                self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled, self.work,
+                *self._tables, self._given, self._bodies, self._pairs, self._coulomb, self._y, self._mode, clock,
+                duration, self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled,
+                self.work,
             )
-            if filled[1]:
-                rows = self._event_rows[: filled[1]].copy()
-                rows[:, 0] += start
+            if count := int(filled[_EVENTS]):
+                rows = self._event_rows[:count].copy()
+                rows[:, EVENT_TIME] += start
                 self._events.append(rows)
                 self._event_count += len(rows)
-                filled[1] = 0
+                filled[_EVENTS] = 0
             if outcome == Outcome.EVENTS_FULL:
                 if self._event_count > self._max_events:
                     self.status = Status.EVENT_BUDGET
@@ -204,7 +209,7 @@ class Integrator:
                 self.status = _STATUS[Outcome(outcome)]
                 break
         self._time = start + float(clock[0] + clock[1])
-        return out[: filled[0]]
+        return out[: filled[_OUTPUTS]]
 
 
 @with_deep_stack

@@ -1,245 +1,247 @@
-"""What a pair of arm and object does: its mode from its state, the scales of its impact, and its switches."""
+"""The hybrid automaton: the mode of each pair and of the object, and every transition between modes.
 
-import math
-from typing import Any
+A pair, by condition (10):
 
-from grasp_ros.exact.flight import EPS, PROBE, parting
+             TOUCH u up 0                CLAMP u' down -1/p
+      OPEN --------------> CONTACT ---------------------------> CLAMPED
+       ^  <--------------    | ^   <---------------------------   |
+       |    RELEASE u down 0 | |        REENTRY u' up -1/p        |
+       |                     v | both at u = 0: BALLISTIC, LEAVING|
+       +----------------------- RELEASE --------------------------+
+
+The object, by dry friction:
+
+      RIGHTWARD, LEFTWARD --STICK v to 0, push within F--> STUCK --SLIP push beyond F--> RIGHTWARD, LEFTWARD
+
+A mode is frozen within a segment. An event counts in (0, t] of a segment, once, and never again from an exact zero.
+At an event, u = 0 and v_o = 0 are set exactly. Where the state alone does not decide, these rules do:
+
+* At u = 0 the sign of u' decides, and at u' = 0 the sign of the first derivative of u that differs from zero: pressed
+  together it is BALLISTIC, otherwise OPEN. Where none differs, it follows the other pair: it is pressed as soon as
+  that one is in contact.
+* Such a resting pair is judged again when the inputs change and whenever the other pair is in contact.
+* Both pairs at u = 0 at once, where w_l w_r = 0 would stop the regularised time: approaching, both go BALLISTIC,
+  without force for a time in which the impulse left out is below the tolerance; separating, both go LEAVING, without
+  the rest of their impulse.
+* An object at rest sticks if friction can balance what pushes it. One that stops while more pushes it turns around
+  without a rest, and nothing is recorded.
+"""
+
+from __future__ import annotations
+
+from grasp_ros.exact.flight import displacement, launch
+from grasp_ros.exact.friction import apply_friction, impact_on_object, lift_friction
+from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.kinematics import approach, arm_of, other, relative_motion
+from grasp_ros.exact.outputs import record
+from grasp_ros.exact.records import Array, Candidate, Output, Plant, Settings, SlideCandidate, State
+from grasp_ros.exact.scales import probe_time, scales, sliver
 from grasp_ros.physics.layout import (
-    DAMPING,
     DISSIPATION,
+    EPS,
     FORCE,
     HERTZIAN,
     LEFT,
-    MASS,
     OBJECT,
     RIGHT,
-    STIFFNESS,
     U_L,
-    V_L,
     V_O,
-    V_R,
-    X_L,
     X_O,
-    X_R,
+    Body,
     Pair,
+    Slide,
     Transition,
 )
 
-OPEN, CONTACT, CLAMPED, LEAVING, HELD, ABSENT = (int(p) for p in Pair)
-TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = (int(e) for e in Transition)
-GRID, EVENTS = 0, 1  # entries of `filled`, the rows in use of the outputs and of the events
-SPARE = 8  # events that one segment can have: three per pair, and two of the object
-UNKNOWN = -1  # mode of a pair before the first call
-TOGETHER = 1.0 + 4.0 * EPS  # events closer than this fire together
+TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together
 
 
-@inlined
-def relative_motion(bodies: Any, y: Any, side: int) -> Any:
-    """u' and the u'' that both bodies would have without impact forces."""
-    x, v = (y[X_L], y[V_L]) if side == LEFT else (y[X_R], y[V_R])
-    sign = 1.0 if side == LEFT else -1.0
-    arm, body = bodies[side], bodies[OBJECT]
-    a = (arm[FORCE] - arm[STIFFNESS] * x - arm[DAMPING] * v) / arm[MASS]
-    a_o = (body[FORCE] - body[STIFFNESS] * y[X_O] - body[DAMPING] * y[V_O]) / body[MASS]
-    return sign * (v - y[V_O]), sign * (a - a_o)
+# Consistent initialisation: modes from the state.
 
 
 @kernel
-def judge(bodies: Any, pairs: Any, y: Any, side: int, pace: float, other_in_contact: bool) -> int:
-    """Mode of a pair from its state alone: condition (10), and at u = 0 the direction of the motion.
+def leaning(plant: Plant, y: Array, settings: Settings, side: Body) -> float:
+    """u of a pair at rest at u = 0 a little later: its sign tells whether it is pressed together; 0: neither."""
+    x, v, sign = arm_of(y, side)
+    t = probe_time(settings, 1.0)
+    far = displacement(launch(plant.bodies[side], x, v), t)
+    far_o = displacement(launch(plant.bodies[OBJECT], y[X_O], y[V_O]), t)
+    return sign * (far - far_o) if abs(far - far_o) > 4.0 * EPS * (abs(far) + abs(far_o)) else 0.0
 
-    At rest there the first derivative that differs decides. Gravity, for one, pulls both bodies alike.
-    """
-    if pairs[side, HERTZIAN] == 0.0:
-        return ABSENT
-    u = y[U_L + side]
-    d, _ = relative_motion(bodies, y, side)
+
+@kernel
+def mode_of(plant: Plant, y: Array, settings: Settings, side: Body, beside_contact: bool) -> Pair:
+    """Mode of a pair from its state alone; `beside_contact`: whether the other pair is in contact."""
+    if plant.pairs[side, HERTZIAN] == 0.0:
+        return Pair.ABSENT
+    u, d = y[U_L + side], approach(y, side)
     if u < 0.0:
-        return OPEN
+        return Pair.OPEN
     if u > 0.0:
-        return CONTACT if 1.0 + pairs[side, DISSIPATION] * d >= 0.0 else CLAMPED
+        return Pair.CONTACT if damping_factor(plant.pairs[side, DISSIPATION], d) >= 0.0 else Pair.CLAMPED
     if d == 0.0:
-        lean = leaning(bodies, y, side, pace)
-        return HELD if lean > 0.0 or (lean == 0.0 and other_in_contact) else OPEN
-    return CONTACT if d > 0.0 else OPEN
+        lean = leaning(plant, y, settings, side)
+        return Pair.BALLISTIC if lean > 0.0 or (lean == 0.0 and beside_contact) else Pair.OPEN
+    return Pair.CONTACT if d > 0.0 else Pair.OPEN
 
 
 @kernel
-def leaning(bodies: Any, y: Any, side: int, pace: float) -> float:
-    """u of a pair at rest at u = 0 a little later, in any unit: its sign tells whether it is pressed together."""
-    x, v, sign = (y[X_L], y[V_L], 1.0) if side == LEFT else (y[X_R], y[V_R], -1.0)
-    return sign * parting(bodies[side], x, v, bodies[OBJECT], y[X_O], y[V_O], PROBE / pace if pace > 0.0 else 1.0)
+def initial_modes(plant: Plant, state: State, settings: Settings) -> None:
+    """Modes of both pairs for a run that starts here."""
+    y, mode = state.y, state.mode
+    mode[LEFT] = mode_of(plant, y, settings, LEFT, False)
+    mode[RIGHT] = mode_of(plant, y, settings, RIGHT, mode[LEFT] == Pair.CONTACT)
+    if mode[RIGHT] == Pair.CONTACT:
+        mode[LEFT] = mode_of(plant, y, settings, LEFT, True)
 
 
 @kernel
-def classify(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float) -> None:
-    """Modes of both pairs for a run that starts at y."""
-    mode[LEFT] = judge(bodies, pairs, y, LEFT, pace, False)
-    mode[RIGHT] = judge(bodies, pairs, y, RIGHT, pace, mode[LEFT] == CONTACT)
-    if mode[LEFT] == OPEN and mode[RIGHT] == CONTACT:
-        mode[LEFT] = judge(bodies, pairs, y, LEFT, pace, True)
-
-
-@kernel
-def press(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, now: float, events: Any,
-          filled: Any) -> None:
-    """A pair that rests at u = 0 touches if what acts now presses it together."""
-    if mode[side] == OPEN and y[U_L + side] == 0.0 and relative_motion(bodies, y, side)[0] == 0.0:
-        mode[side] = judge(bodies, pairs, y, side, pace, mode[1 - side] == CONTACT)
-        if mode[side] != OPEN:
-            record(now, side, TOUCH, 0.0, 0.0, events, filled)
-
-
-@kernel
-def root_of_two(x: float, degree: int) -> float:
-    """The power of two above the root of x >= 0; comparing exponents is cheaper than taking the root."""
-    return math.ldexp(1.0, (math.frexp(x)[1] - 1) // degree + 1) if x > 0.0 else 0.0
-
-
-@inlined
-def impact_scales(hertzian: float, mu: float, u: float, d: float, a: float) -> Any:
-    """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
-
-    The energy is that of the present motion and penetration, and of the motion that an acceleration a > 0 from
-    outside will bring: it presses the pair to the depth (mu a / H)^(2/3).
-    """
-    energy = 0.5 * mu * d * d + 0.4 * hertzian * u * u * math.sqrt(u)
-    if a > 0.0:
-        energy += mu * a * (mu * a / hertzian) ** (2.0 / 3.0)
-    return root_of_two(2.5 * energy / hertzian, 5), root_of_two(2.0 * energy / mu, 2)
-
-
-@inlined
-def scales(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float) -> Any:
-    """Scales of w and u' of one pair's impact; the other pair's impact may push it.
-
-    An impact that would last longer than the bodies take to turn by themselves gets no deeper than they let it.
-    """
-    d, a = relative_motion(bodies, y, side)
-    other = 1 - side
-    if mode[other] in (CONTACT, HELD):
-        w, v = impact_scales(pairs[other, HERTZIAN], reduced_mass(bodies, other), y[U_L + other],
-                             relative_motion(bodies, y, other)[0], 0.0)
-        if w > 0.0:
-            a = max(a, 0.0) + v * v / (w * w) * (reduced_mass(bodies, other) / bodies[OBJECT, MASS])
-    w, v = impact_scales(pairs[side, HERTZIAN], reduced_mass(bodies, side), y[U_L + side], d, a)
-    if pace > 0.0:
-        reach = root_of_two(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / pace) / pace), 2)
-        w = min(w, reach) if w > 0.0 else reach  # 0 where the energy of a motion that died out underflows
-    return w, max(v, root_of_two(abs(d), 1))
-
-
-@kernel
-def reduced_mass(bodies: Any, side: int) -> float:
-    """mu of one pair."""
-    m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
-    return m / (1.0 + m / m_o)  # m_o is infinite if the object sticks
-
-
-@kernel
-def fastest_rate(bodies: Any) -> float:
-    """Power of two above the rates, in 1/s, at which the bodies move by themselves."""
-    rate = 0.0
-    for i in range(3):
-        body = bodies[i]
-        rate = max(rate, body[DAMPING] / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
-    return root_of_two(rate, 1)
-
-
-@kernel
-def sliver(tolerance: float) -> float:
-    """Part of an impact's depth whose impulse, of relative size sliver^2.5, is below the tolerance."""
-    return 0.3 * tolerance**0.4
-
-
-@kernel
-def hold_time(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, tolerance: float) -> float:
-    """How long a pair that starts at u = 0 may stay without force: a sliver of its impact.
-
-    At most half a time constant of the bodies, for `flight.displacement`; then it is held again.
-
-    The impulse lost relative to the impact's is of order (time)^2.5 if the pair approaches, and (time)^4 if it
-    starts at rest and is pushed together.
-    """
-    d, _ = relative_motion(bodies, y, side)
-    w, v = scales(bodies, pairs, y, mode, side, pace)
-    if w == 0.0 or v == 0.0:  # only a higher derivative presses it together
-        return PROBE / pace if pace > 0.0 else 0.0
-    return min((sliver(tolerance) if d > 0.0 else 0.3 * tolerance**0.25) * w * w / v, 0.5 / pace)
-
-
-@kernel
-def resume(bodies: Any, pairs: Any, y: Any, mode: Any, side: int, pace: float, tolerance: float, now: float,
-           events: Any, filled: Any) -> None:
-    """End the hold of a pair, unless it is still so shallow that its force is below rounding."""
-    w, _ = scales(bodies, pairs, y, mode, side, pace)
-    d, _ = relative_motion(bodies, y, side)
-    u = y[U_L + side]
-    if d <= 0.0 or u < 0.0 or u > 1e-3 * sliver(tolerance) * w * w:
-        mode[side] = judge(bodies, pairs, y, side, pace, mode[1 - side] == CONTACT)
-        if mode[side] == OPEN:
-            record(now, side, RELEASE, y[U_L + side], d, events, filled)
-
-
-@inlined
-def settle(bodies: Any, pairs: Any, y: Any, mode: Any, pace: float, tolerance: float, now: float, events: Any,
-           filled: Any) -> None:
-    """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time.
-
-    At a simultaneous touch both are held for a sliver; at a simultaneous release both leave a sliver early. A pair
-    that rests at u = 0 is held when the other one begins to push.
-    """
-    for side in (LEFT, RIGHT):
-        if mode[1 - side] == CONTACT:
-            press(bodies, pairs, y, mode, side, pace, now, events, filled)
-    if mode[LEFT] != CONTACT or mode[RIGHT] != CONTACT:
+def initial_slide(plant: Plant, state: State) -> None:
+    """Mode of the object from its state: at rest it sticks if friction can balance what pushes it."""
+    if plant.coulomb == 0.0:
         return
-    shallow = sliver(tolerance)
-    approaching = 0
-    leaving = 0
+    direction = state.y[V_O]
+    if direction == 0.0:
+        push = impact_on_object(plant, state) + plant.given[OBJECT, FORCE]
+        direction = push if abs(push) > plant.coulomb else 0.0
+    if direction == 0.0:
+        state.mode[OBJECT] = Slide.STUCK
+    else:
+        state.mode[OBJECT] = Slide.RIGHTWARD if direction > 0.0 else Slide.LEFTWARD
+    apply_friction(plant, state.mode)
+
+
+@kernel
+def begin_interval(plant: Plant, state: State, settings: Settings, out: Output) -> None:
+    """Modes under the inputs of a new interval, which may be discontinuous here; a run that starts gets its first.
+
+    An interval that goes on after it has handed over its events keeps its modes.
+    """
+    mode = state.mode
+    lift_friction(plant)
+    if mode[LEFT] == Pair.UNKNOWN:
+        mode[OBJECT] = Slide.FREE
+        initial_modes(plant, state, settings)
+        initial_slide(plant, state)
+        initial_modes(plant, state, settings)  # a pair at rest at u = 0 moves as friction lets it
+    if state.clock[0] > 0.0:
+        apply_friction(plant, mode)
+        return
+    stuck = mode[OBJECT] == Slide.STUCK
+    initial_slide(plant, state)
+    if stuck and mode[OBJECT] != Slide.STUCK:
+        record(state, OBJECT, Transition.SLIP, 0.0, 0.0, out)
     for side in (LEFT, RIGHT):
-        d, a = relative_motion(bodies, y, side)
-        w, _ = scales(bodies, pairs, y, mode, side, pace)
+        close_resting_pair(plant, state, settings, side, out)
+
+
+# Rules between segments.
+
+
+@kernel
+def close_resting_pair(plant: Plant, state: State, settings: Settings, side: Body, out: Output) -> None:
+    """A pair that rests at u = 0 touches if what acts now presses it together."""
+    y, mode = state.y, state.mode
+    if mode[side] == Pair.OPEN and y[U_L + side] == 0.0 and approach(y, side) == 0.0:
+        mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
+        if mode[side] != Pair.OPEN:
+            record(state, side, Transition.TOUCH, 0.0, 0.0, out)
+
+
+@inlined
+def leave_corner(plant: Plant, state: State, settings: Settings, out: Output) -> None:
+    """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time."""
+    mode, y = state.mode, state.y
+    for side in (LEFT, RIGHT):
+        if mode[other(side)] == Pair.CONTACT:
+            close_resting_pair(plant, state, settings, side, out)
+    if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT:
+        return
+    shallow = sliver(settings.tolerance)
+    approaching = 0
+    separating = 0
+    for side in (LEFT, RIGHT):
+        d, a = relative_motion(plant, y, side)
+        w, _ = scales(plant, state, settings, side)
         u = y[U_L + side]
         if d >= 0.0 and u < 0.3 * shallow * w * w:
             approaching += 1
         elif d < 0.0 and u < shallow * w * w and 20.0 * u * abs(a) < d * d:
-            leaving += 1
+            separating += 1
     if approaching == 2:
-        mode[LEFT] = mode[RIGHT] = HELD
-    elif leaving == 2:
-        mode[LEFT] = mode[RIGHT] = LEAVING
+        mode[LEFT] = mode[RIGHT] = Pair.BALLISTIC
+    elif separating == 2:
+        mode[LEFT] = mode[RIGHT] = Pair.LEAVING
 
 
 @kernel
-def fire(y: Any, mode: Any, side: int, kind: int, now: float, events: Any, filled: Any) -> None:
-    """Switch one pair and record the event.
+def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -> bool:
+    """Give ballistic pairs a mode again, unless one is still so shallow that its force is below rounding.
+
+    Returns whether there were any: what they left out comes at once.
+    """
+    y, mode = state.y, state.mode
+    found = False
+    for side in (LEFT, RIGHT):
+        if mode[side] != Pair.BALLISTIC:
+            continue
+        found = True
+        u, d = y[U_L + side], approach(y, side)
+        if u >= 0.0 and d > 0.0:
+            w, _ = scales(plant, state, settings, side)
+            if u <= 1e-3 * sliver(settings.tolerance) * w * w:
+                continue
+        mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
+        if mode[side] == Pair.OPEN:
+            record(state, side, Transition.RELEASE, u, d, out)
+    return found
+
+
+# Transitions at the end of a segment.
+
+
+@inlined
+def make_transitions(plant: Plant, state: State, left: Candidate, right: Candidate, slide: SlideCandidate, end: float,
+                     out: Output) -> None:
+    """Make all transitions within a few roundings of the end of a segment."""
+    if left.when <= end * TOGETHER:
+        make_transition(state, LEFT, left.what, out)
+    if right.when <= end * TOGETHER:
+        make_transition(state, RIGHT, right.what, out)
+    if slide.when <= end * TOGETHER:
+        make_slide_transition(plant, state, slide.what, out)
+
+
+@kernel
+def make_transition(state: State, side: Body, kind: Transition, out: Output) -> None:
+    """The reset map of a pair: its next mode, u = 0 at a touch and a release, and the record of the event.
 
     A touch that rounding invents at the turning point of a grazing approach has u' <= 0 and is no event.
     """
-    d = y[V_L] - y[V_O] if side == LEFT else y[V_O] - y[V_R]
-    if kind in (TOUCH, RELEASE):
+    y, mode, d = state.y, state.mode, approach(state.y, side)
+    if kind in (Transition.TOUCH, Transition.RELEASE):
         y[U_L + side] = 0.0
-    if kind == TOUCH and d <= 0.0:
-        mode[side] = OPEN
+    if kind == Transition.TOUCH and d <= 0.0:
         return
-    mode[side] = OPEN if kind == RELEASE else (CLAMPED if kind == CLAMP else CONTACT)
-    record(now, side, kind, y[U_L + side], d, events, filled)
+    if kind == Transition.RELEASE:
+        mode[side] = Pair.OPEN
+    else:
+        mode[side] = Pair.CLAMPED if kind == Transition.CLAMP else Pair.CONTACT
+    record(state, side, kind, y[U_L + side], d, out)
 
 
 @kernel
-def record(now: float, side: int, kind: int, u: float, d: float, events: Any, filled: Any) -> None:
-    """Append a row to the events."""
-    n = filled[EVENTS]
-    filled[EVENTS] = n + 1
-    events[n, 0], events[n, 1], events[n, 2], events[n, 3], events[n, 4] = now, side, kind, u, d
-
-
-@kernel
-def tick(clock: Any, step: float) -> None:
-    """Add to the compensated clock (two-sum), so that long runs do not drift."""
-    total = clock[0] + step
-    back = total - clock[0]
-    clock[1] += (clock[0] - (total - back)) + (step - back)
-    clock[0] = total
+def make_slide_transition(plant: Plant, state: State, following: Slide, out: Output) -> None:
+    """The reset map of the object: it stops, or slips into the mode that follows; v_o = 0, and the record."""
+    mode = state.mode
+    stopped = mode[OBJECT] != Slide.STUCK
+    state.y[V_O] = 0.0
+    if stopped:
+        initial_slide(plant, state)
+    else:
+        mode[OBJECT] = following
+        apply_friction(plant, mode)
+    if stopped and mode[OBJECT] != Slide.STUCK:  # it turns without a rest
+        return
+    record(state, OBJECT, Transition.STICK if stopped else Transition.SLIP, 0.0, 0.0, out)

@@ -4,21 +4,23 @@ Coefficient k of a lane stands at LANES k + lane, so that one pass evaluates all
 are even: the even and the odd powers are summed side by side, which halves the time until the result is there.
 """
 
+from __future__ import annotations
+
 import math
 from typing import Any
 
 import numpy as np
 
-from grasp_ros.exact.flight import EPS, safe_step
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.physics.layout import LANES, TIME, V_L, V_O, V_R, Z_L, Z_R
+from grasp_ros.exact.records import Array, Step, Tables
+from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R, Work
 
 MAX_ITERATIONS = 100_000
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 
 
 @kernel
-def lanes(c: Any, k: int) -> Any:
+def lanes(c: Array, k: int) -> Any:
     """The coefficients k."""
     i = np.uint64(LANES) * np.uint64(k)  # unsigned indices spare the test for negative ones
     return (
@@ -28,7 +30,7 @@ def lanes(c: Any, k: int) -> Any:
 
 
 @kernel
-def sizes(c: Any, k: int) -> Any:
+def sizes(c: Array, k: int) -> Any:
     """The absolute coefficients k."""
     x = lanes(c, k)
     return (
@@ -47,7 +49,7 @@ def horner(total: Any, s: float, x: Any) -> Any:
 
 
 @inlined
-def values(c: Any, n: int, s: float, at: Any) -> None:
+def values(c: Array, n: int, s: float, at: Array) -> None:
     """Write the lanes' values at s, of the even degree n, to `at`.
 
     The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
@@ -62,7 +64,7 @@ def values(c: Any, n: int, s: float, at: Any) -> None:
 
 
 @inlined
-def curvatures(c: Any, n: int, s: float, size: Any) -> None:
+def curvatures(c: Array, n: int, s: float, size: Array) -> None:
     """Write the lanes' sums of |c_k| s^k over k >= 2 to `size`."""
     square = s * s
     even, odd = sizes(c, n), sizes(c, n - 1)
@@ -74,18 +76,32 @@ def curvatures(c: Any, n: int, s: float, size: Any) -> None:
 
 
 @inlined
-def lane_range(c: Any, lane: int, s: float, at: Any, size: Any) -> Any:
+def lane_range(tables: Tables, lane: int, s: float) -> tuple[float, float]:
     """Bounds (low, high) of a lane in (0, s], in proportion to the distance from its value c_0 at 0.
 
     With at = f(s) and size = sum of |c_k| s^k over k >= 2, the terms of one sign beyond the linear one lie between 0
     and half of their signed and absolute sums: f stays between the lines from c_0 to `low` and to `high`.
     """
-    line = c[lane] + s * c[LANES + lane]
-    middle, width = 0.5 * (line + at[lane]), 0.5 * size[lane] + NOISE * (abs(c[lane]) + abs(line) + size[lane])
+    begin, size = tables.c[lane], tables.size[lane]
+    line = begin + s * tables.c[LANES + lane]
+    middle, width = 0.5 * (line + tables.at[lane]), 0.5 * size + NOISE * (abs(begin) + abs(line) + size)
     return middle - width, middle + width
 
+
 @kernel
-def value_and_rate(f: Any, n: int, s: float) -> Any:
+def safe_step(g: float, g_rate: float, curvature: float) -> float:
+    """Smallest h > 0 with g + g' h + M h^2 / 2 = 0 for g <= 0; inf if there is none.
+
+    An exact zero at the start does not count: for g = 0 and g' < 0 the second root is returned.
+    """
+    if curvature <= 0.0:
+        return -g / g_rate if g_rate > 0.0 else math.inf
+    root = math.sqrt(g_rate * g_rate - 2.0 * curvature * g)
+    return (root - g_rate) / curvature if g_rate <= 0.0 else -2.0 * g / (root + g_rate)
+
+
+@kernel
+def value_and_rate(f: Array, n: int, s: float) -> tuple[float, float]:
     """One polynomial of degree n, and its derivative, at s."""
     value = f[n]
     rate = 0.0
@@ -96,7 +112,7 @@ def value_and_rate(f: Any, n: int, s: float) -> Any:
 
 
 @kernel
-def curvature_bound(f: Any, n: int, r: float) -> float:
+def curvature_bound(f: Array, n: int, r: float) -> float:
     """Bound on the second derivative of a polynomial in [0, r]."""
     total = 0.0
     for k in range(n, 1, -1):
@@ -105,7 +121,7 @@ def curvature_bound(f: Any, n: int, r: float) -> float:
 
 
 @kernel
-def root_of_rise(f: Any, n: int, low: float, high: float, noise: float, work: Any) -> float:
+def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: Array) -> float:
     """The root of a polynomial that increases in [low, high] and is negative at low; inf if there is none.
 
     Newton with bisection, from the upper end. Its error is squared by each iteration, so a correction of 1e-9 is
@@ -124,7 +140,7 @@ def root_of_rise(f: Any, n: int, low: float, high: float, noise: float, work: An
         if high - low <= 2.0 * EPS * high:
             return following
         s = following
-        work[3] += 1
+        work[Work.ROOT_ITERATIONS] += 1
         value, rate = value_and_rate(f, n, s)
         if value > 0.0:
             high = s
@@ -134,7 +150,7 @@ def root_of_rise(f: Any, n: int, low: float, high: float, noise: float, work: An
 
 
 @kernel
-def first_rise(f: Any, n: int, h: float, noise: float, work: Any) -> float:
+def first_rise(f: Array, n: int, h: float, noise: float, work: Array) -> float:
     """First s in (0, h] at which a polynomial f, with f(0) <= 0, rises through zero; inf if there is none.
 
     The second derivative is bounded by sums of |f_k|, so the steps of `safe_step` cannot jump over a root, until f
@@ -149,7 +165,7 @@ def first_rise(f: Any, n: int, h: float, noise: float, work: Any) -> float:
     value, rate = f[0], f[1]
     last = 0.0
     for _ in range(MAX_ITERATIONS):
-        work[3] += 1
+        work[Work.ROOT_ITERATIONS] += 1
         if value < -noise and rate > curvature * (h - s):
             return root_of_rise(f, n, s, h, noise, work)
         step = safe_step(min(value, -noise), rate, curvature)
@@ -168,13 +184,13 @@ def first_rise(f: Any, n: int, h: float, noise: float, work: Any) -> float:
 
 
 @inlined
-def invert_time(c: Any, n: int, unit: float, tau: float, high: float, total: float, left: bool, right: bool,
-                at: Any) -> float:
-    """The s / unit in [0, high] at which the time since the beginning of a step is tau; `total` is the time at high.
+def invert_time(tables: Tables, step: Step, tau: float, high: float, total: float) -> float:
+    """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
 
     dt = 2 G ds with G = w_l w_r of the sides in contact. Halley's iteration with bisection: its error is cubed each
     time, so a correction of 1e-6 is the last one needed. It starts from the parabola through both ends.
     """
+    c, at, n, unit = tables.c, tables.at, step.order, step.unit
     slope = c[LANES + TIME]
     bend = (total - slope * high) / (high * high)
     s = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))
@@ -183,8 +199,8 @@ def invert_time(c: Any, n: int, unit: float, tau: float, high: float, total: flo
         s = 0.5 * high
     for _ in range(200):
         values(c, n, s, at)
-        w_l, d_l = (at[Z_L], at[V_L] - at[V_O]) if left else (1.0, 0.0)
-        w_r, d_r = (at[Z_R], at[V_O] - at[V_R]) if right else (1.0, 0.0)
+        w_l, d_l = (at[Z_L], at[V_L] - at[V_O]) if step.left else (1.0, 0.0)
+        w_r, d_r = (at[Z_R], at[V_O] - at[V_R]) if step.right else (1.0, 0.0)
         rest = at[TIME] - tau
         if rest > 0.0:
             high = s

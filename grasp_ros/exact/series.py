@@ -18,13 +18,13 @@ means of high-order Taylor methods, Experimental Mathematics 14 (2005), sections
 
 import itertools
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_ros.exact.flight import FLIGHT_ORDER
 from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.records import Array, Tables
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -61,7 +61,7 @@ def series_order(tolerance: float) -> int:
 
 
 @kernel
-def convolve(f: Any, k: int, lane: int, skip: int) -> Any:
+def convolve(f: Array, k: int, lane: int, skip: int) -> Any:
     """Coefficients k of eight products of series, without the terms that hold a coefficient below `skip`.
 
     f has FACTORS numbers for each order. Eight sums in one loop, written out, become one vector instruction each;
@@ -85,7 +85,7 @@ def convolve(f: Any, k: int, lane: int, skip: int) -> Any:
 
 
 @kernel
-def per_mass(body: Any) -> Any:
+def per_mass(body: Array) -> Any:
     """Inverse mass, k / m, c / m and f / m of a body."""
     inverse = 1.0 / body[MASS]
     return inverse, body[STIFFNESS] * inverse, body[DAMPING] * inverse, body[FORCE] * inverse
@@ -103,7 +103,7 @@ def accelerations(left: Any, right: Any, middle: Any, one: float, x_o: float, u_
 
 
 @kernel
-def put(table: Any, i: int, x0: float, x1: float, x2: float, x3: float, x4: float, x5: float, x6: float,
+def put(table: Array, i: int, x0: float, x1: float, x2: float, x3: float, x4: float, x5: float, x6: float,
         x7: float) -> None:
     """Store eight neighbouring numbers."""
     table[i], table[i + 1], table[i + 2], table[i + 3] = x0, x1, x2, x3
@@ -118,7 +118,7 @@ def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: flo
 
 
 @inlined
-def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, n: int) -> None:
+def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
 
     Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, H g (1 + p u'). Their terms with coefficients
@@ -171,7 +171,7 @@ def expand_one(c: Any, f: Any, bodies: Any, pairs: Any, side: int, unit: float, 
 
 
 @inlined
-def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) -> None:
+def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with both sides in contact: G = w_l w_r. The series are in s / unit.
 
     Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
@@ -219,7 +219,7 @@ def expand_both(c: Any, f: Any, bodies: Any, pairs: Any, unit: float, n: int) ->
 
 
 @inlined
-def step_size(c: Any, left: bool, right: bool, w_l: float, w_r: float, v: float, n: int, tolerance: float) -> float:
+def step_size(c: Array, left: bool, right: bool, w_l: float, w_r: float, v: float, n: int, tolerance: float) -> float:
     """Step in s / unit at which the first neglected term is `tolerance` times the scales of the impact.
 
     The radius of convergence is estimated from the last TAIL coefficients of w and of the velocities. A state at
@@ -236,20 +236,6 @@ def step_size(c: Any, left: bool, right: bool, w_l: float, w_r: float, v: float,
         if size > 0.0:
             growth = max(growth, math.log(size) / k)
     return math.exp(math.log(tolerance) / (n + 1) - growth) if growth > -math.inf else math.inf
-
-
-class Tables(NamedTuple):
-    """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
-
-    The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
-    the beginning of the step, and CHECK for the product w w or w_l w_r as far as it is expanded.
-    """
-
-    c: NDArray[np.float64]
-    f: NDArray[np.float64]
-    at: NDArray[np.float64]  # (LANES,) values of the lanes at some s
-    size: NDArray[np.float64]  # (LANES,) their sums of |c_k| s^k, k >= 2
-    row: NDArray[np.float64]  # (orders,) one polynomial
 
 
 def new_tables(order: int) -> Tables:

@@ -15,7 +15,7 @@ from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, MASS, OBJECT, RIGHT, 
 from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force, in_contact, penetration
 from grasp_ros.physics.system import COLUMN, System
 
-FLAGS = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
+FLAGS: dict[int, Mode] = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
 EPS = 2.220446049250313e-16
 ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
@@ -155,5 +155,5 @@ def _power(system: System, bodies: Array, state: Array, external: Array | None) 
 
 def _pairs(system: System, state: Array) -> list[tuple[int, Array, Array]]:
     u_l, d_l, u_r, d_r = penetration(state)
-    found = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
+    found: dict[int, tuple[Array, Array]] = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
     return [(side, *found[side]) for side in system.contacts]

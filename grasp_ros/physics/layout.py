@@ -1,4 +1,4 @@
-"""Array layouts shared by the compiled kernels: one place for every index, mode, event and status.
+"""Array layouts shared by everything: one place for every index, mode, transition and status.
 
 The state y (8,) is x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r. The penetrations are carried beside the positions
 because x_l - x_o loses the digits of a shallow contact. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
@@ -6,17 +6,23 @@ pairs are rows LEFT, RIGHT of an array (2, 2).
 """
 
 from enum import IntEnum
-from typing import Any
 
-import numpy as np
+EPS = 2.220446049250313e-16  # distance from 1.0 to the next double
 
-# Typed integers: numba would compile every function once per literal side.
-LEFT: Any = np.int64(0)
-RIGHT: Any = np.int64(1)
-OBJECT: Any = np.int64(2)
-MASS, STIFFNESS, DAMPING, FORCE = 0, 1, 2, 3  # columns of bodies: kg, N/m, N s/m, N
-HERTZIAN, DISSIPATION = 0, 1  # columns of pairs: N/m^1.5, s/m
+
+class Body(IntEnum):
+    """Rows of the bodies; the first two are also the sides, and the rows of the pairs."""
+
+    LEFT = 0
+    RIGHT = 1
+    OBJECT = 2
+
+
+LEFT, RIGHT, OBJECT = Body
+MASS, STIFFNESS, DAMPING, FORCE = range(4)  # columns of bodies: kg, N/m, N s/m, N
+HERTZIAN, DISSIPATION = range(2)  # columns of pairs: N/m^1.5, s/m
 X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)
+EVENT_TIME, EVENT_BODY, EVENT_KIND, EVENT_U, EVENT_RATE = range(5)  # columns of events: s, Body, Transition, m, m/s
 LANES = 8  # of a table of polynomials: order k holds the coefficients k at LANES k
 TIME, CHECK = X_L, X_R  # in contact x_l and x_r follow from the others
 Z_L, Z_R = U_L, U_R  # w = sqrt(u) of a pair in contact, u of an open one
@@ -25,11 +31,12 @@ Z_L, Z_R = U_L, U_R  # w = sqrt(u) of a pair in contact, u of an open one
 class Pair(IntEnum):
     """What one pair of arm and object does during a segment; frozen until the next event."""
 
+    UNKNOWN = -1  # before the first interval
     OPEN = 0  # u <= 0, no force
     CONTACT = 1  # condition (10) holds
     CLAMPED = 2  # u > 0 and u' < -1/p: no force, may re-enter
     LEAVING = 3  # u > 0, separating, the rest of its impulse is below the tolerance
-    HELD = 4  # u = 0 with no direction yet, the first of its impulse is below the tolerance
+    BALLISTIC = 4  # starts at u = 0 without force, while the impulse left out is below the tolerance
     ABSENT = 5  # a body is missing, or its contact: never any force
 
 
@@ -43,7 +50,7 @@ class Slide(IntEnum):
 
 
 class Transition(IntEnum):
-    """Switches of one pair, and of the object."""
+    """Events of one pair, and of the object."""
 
     TOUCH = 0  # u rises through 0
     RELEASE = 1  # u falls through 0
@@ -56,12 +63,20 @@ class Transition(IntEnum):
 class Outcome(IntEnum):
     """Why the kernel returned."""
 
+    GO_ON = -1  # it did not
     DONE = 0
     EVENTS_FULL = 1
     NOT_FINITE = 2
     STALLED = 3
     ENERGY_RISES = 4
     WORK_USED = 5
+
+
+class Filled(IntEnum):
+    """Counters of the rows in use."""
+
+    OUTPUTS = 0
+    EVENTS = 1
 
 
 class Work(IntEnum):

@@ -17,6 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.physics.impact_law import damping_factor, elastic_force
+
 Array = NDArray[np.float64]
 
 
@@ -63,13 +65,12 @@ def feedback(arm: Arm, x: float, v: float) -> float:
 
 def in_contact(contact: Contact, u: Array, u_rate: Array) -> NDArray[np.bool_]:
     """Condition (10): penetration, and not separating faster than 1/p."""
-    return (u >= 0.0) & (1.0 + contact.dissipation * u_rate >= 0.0)
+    return np.asarray((u >= 0.0) & (damping_factor(contact.dissipation, u_rate) >= 0.0))
 
 
 def hertzian_force(contact: Contact, u: Array) -> Array:
     """The elastic part H u^(3/2) of the impact force in N; 0 without penetration."""
-    depth = np.maximum(u, 0.0)
-    return contact.hertzian * (depth * np.sqrt(depth))
+    return np.asarray(elastic_force(contact.hertzian, np.maximum(u, 0.0)))
 
 
 def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
@@ -82,7 +83,7 @@ def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
         Penetration (8); negative is a gap.
     u_rate : array, m/s
     """
-    force = (1.0 + contact.dissipation * u_rate) * hertzian_force(contact, u)
+    force = damping_factor(contact.dissipation, u_rate) * hertzian_force(contact, u)
     return np.where(in_contact(contact, u, u_rate), force, 0.0)
 
 

@@ -17,8 +17,8 @@ from grasp_ros.physics.layout import DAMPING, FORCE, HERTZIAN, LEFT, MASS, OBJEC
 from grasp_ros.physics.model import Array, Grasp
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
-NAMES = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
-COLUMN = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of a body's position in a state (6,); its velocity is the next one
+NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
+COLUMN: dict[int, int] = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of the position in a state (6,); the velocity is the next
 
 
 class ExternalForce(NamedTuple):

@@ -11,8 +11,8 @@ from zipfile import BadZipFile
 from grasp_ros.physics.errors import Refused
 
 DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that were damaged at random
-    OSError, EOFError, MemoryError, ValueError, TypeError, LookupError, OverflowError, NotImplementedError,
-    RecursionError, struct.error, zlib.error, BadZipFile,
+    OSError, EOFError, MemoryError, ValueError, TypeError, LookupError, OverflowError, RuntimeError, struct.error,
+    zlib.error, BadZipFile,
 )
 
 

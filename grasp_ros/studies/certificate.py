@@ -12,9 +12,9 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import HERTZIAN, LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import HERTZIAN, Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
-from grasp_ros.physics.system import System
+from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import page_figures
 from grasp_ros.studies.document import put, read, write
@@ -190,7 +190,7 @@ def scenes_table() -> str:
         scene = scenes.load(name)
         for jump in jumps(scene.system, scene.duration):
             level = float(simulate(scene, grid=np.array([jump.time])).energy.V_c[0])
-            side = {LEFT: "left", RIGHT: "right"}[jump.side]
+            side = NAMES[jump.side]
             rows.append(f"| `{name}` | {jump.time:.6f} | {side} | {1e3 * jump.u:.4f} | {jump.height:.6f} |"
                         f" {level:.6f} |")
     return "\n".join(rows)

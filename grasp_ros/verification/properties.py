@@ -92,7 +92,7 @@ def _states(run: Trajectory) -> list[Check]:
     """Finite, all there, forces never negative, events in order and alternating."""
     system = run.scene.system
     u_l, d_l, u_r, d_r = penetration(run.state)
-    motion = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
+    motion: dict[int, tuple[Array, Array]] = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
     forces = [impact_force(Contact(*system.pairs[side]), *motion[side]) for side in system.contacts]
     there = [COLUMN[body] + k for body in system.present for k in (0, 1)]
     broken = 0

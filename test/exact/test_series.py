@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from grasp_ros.exact.modes import impact_scales
 from grasp_ros.exact.polynomial import curvatures, first_rise, invert_time, lane_range, values
-from grasp_ros.exact.series import Tables, expand_both, expand_one, new_tables, series_order, step_size
+from grasp_ros.exact.records import Step, Tables
+from grasp_ros.exact.scales import impact_scales
+from grasp_ros.exact.series import expand_both, expand_one, new_tables, series_order, step_size
 from grasp_ros.physics.layout import (
     CHECK,
     DISSIPATION,
@@ -74,6 +75,12 @@ def at(table: Array, s: float) -> Array:
     out = np.zeros(LANES)
     values(table.ravel(), len(table) - 1, s, out)
     return out
+
+
+def tables_of(table: Array, value: Array | None = None, size: Array | None = None) -> Tables:
+    """A workspace with a finished table, and what was computed from it."""
+    empty = np.zeros(LANES)
+    return Tables(table.ravel(), empty, empty if value is None else value, empty if size is None else size, empty)
 
 
 def sides(name: str) -> tuple[bool, bool]:
@@ -191,7 +198,7 @@ def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
             tables.c[Z_R if left else Z_L] = START["both"][5 if left else 4]
             expand_one(tables.c, tables.f, BODIES, PAIRS, LEFT if left else RIGHT, 1.0, n)
             start = tables.c[: LANES * (n + 1)].reshape(n + 1, LANES)
-        s = invert_time(start.ravel(), n, 1.0, tau, high, at(start, high)[TIME], *touching, np.zeros(LANES))
+        s = invert_time(tables_of(start), Step(n, 1.0, *touching), tau, high, at(start, high)[TIME])
         end = at(start, s)
         end[[Z_L, Z_R]] **= np.where(touching, 2, 1)
         ends.append(end[[V_L, X_O, V_O, V_R, Z_L, Z_R]])
@@ -320,7 +327,7 @@ def test_time_is_inverted_to_rounding(name: str) -> None:
     c, high = expand(name, n, unit=unit), 0.3 if "both" in name else 0.2
     for s in (1e-9, 0.03, 0.17, high):
         tau, total = at(c, s)[TIME], at(c, high)[TIME]
-        found = invert_time(c.ravel(), n, unit, tau, high, total, *sides(name), np.zeros(LANES))
+        found = invert_time(tables_of(c), Step(n, unit, *sides(name)), tau, high, total)
         assert at(c, found)[TIME] == pytest.approx(tau, rel=1e-15, abs=1e-17)
 
 
@@ -335,7 +342,7 @@ def test_ranges_hold_and_are_not_idle(seed: int) -> None:
     share = np.linspace(0.0, 1.0, 201)[:, None]
     inside = np.array([at(c, h * float(part)) for part in share[:, 0]])
     for lane in range(LANES):
-        low, high = lane_range(c.ravel(), lane, h, value, size)
+        low, high = lane_range(tables_of(c, value, size), lane, h)
         assert (inside[:, lane] >= c[0, lane] + share[:, 0] * (low - c[0, lane])).all()
         assert (inside[:, lane] <= c[0, lane] + share[:, 0] * (high - c[0, lane])).all()
         assert high - low == pytest.approx(size[lane], rel=1e-10)

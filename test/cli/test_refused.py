@@ -102,7 +102,8 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (f"simulate case_01 --grid {10**30}", "is not allowed; allowed: as many as fit into memory"),
         ("simulate case_01 --sampled --set time.duration_s=1e9 --set time.control_period_s=1e-9",
          "case_01: control periods: 1000000000000000000 is not allowed"),
-        ("simulate case_01 --accuracy nan", "accuracy: nan"),
+        ("simulate case_01 --accuracy nan", "exact: accuracy nan is not allowed"),
+        ("simulate case_01 --method rk4 --max-work 7", "rk4: has no budget of work"),
         ("simulate case_01 --method rk4 --step nan", "rk4: step nan is not allowed"),
         ("simulate case_01 --method rk4 --accuracy 1e-8", "--accuracy is not allowed; allowed for rk4: --step"),
         ("simulate hammer --method rk4", "hammer: right_arm, right_contact, right_feedback: rk4 knows"),
@@ -317,6 +318,38 @@ def test_a_damaged_bag_is_refused_or_read(tmp_path: Path, seed: int) -> None:
             refused += 1
         file.write_bytes(whole)
     assert refused > 20
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_damaged_simulation_is_refused_or_read(tmp_path: Path, seed: int) -> None:
+    path, rng = tmp_path / "a.npz", np.random.default_rng(seed)
+    simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
+    whole, refused = path.read_bytes(), 0
+    for _ in range(60):
+        path.write_bytes(damaged(whole, rng))
+        with contextlib.suppress(Refused):
+            simulation.load(path)
+            continue
+        refused += 1
+    assert refused > 30
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(["a"] * 5)),
+        ("t", np.array(0.0)), ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))),
+        ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
+        ("scene", "title: 5"), ("setting", "fine"), ("setting", np.zeros(2)),
+    ],
+)
+def test_a_simulation_of_another_shape_is_refused(tmp_path: Path, name: str, value: Any) -> None:
+    path = tmp_path / "a.npz"
+    simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
+    with np.load(path) as data:
+        np.savez(path, **{**data, name: value})
+    with pytest.raises(Refused, match=r"a\.npz: not a file of `grasp simulate`: "):
+        simulation.load(path)
 
 
 def test_a_bag_that_can_no_longer_be_written_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -762,7 +762,7 @@ def test_held_forces_obey_the_work_theorem() -> None:
 SCRIPT = """
 import sys, numpy as np
 from grasp_ros import scene as scenes
-from grasp_ros.physics.integrator import Integrator
+from grasp_ros.exact.integrator import Integrator
 for name in ("case_01", "case_05"):
     scene = scenes.load(name)
     integrator = Integrator(scene.system, continuous=True)

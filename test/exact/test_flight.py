@@ -11,46 +11,35 @@ import pytest
 from mpmath import mp, mpf
 from oracles import first_touch_from_rest, flight, flight_array
 
-from grasp_ros.exact.flight import (
-    DRIFT,
-    NEAR,
-    OVER,
-    REENTRY_ROOT,
-    RELEASE_ROOT,
-    TOUCH_ROOT,
-    UNDER,
-    bound,
-    flight_root,
-    fly,
-    launch,
-    safe_step,
-)
-from grasp_ros.exact.modes import fastest_rate
-from grasp_ros.physics.layout import Work
+from grasp_ros.exact.flight import fly, launch
+from grasp_ros.exact.flight_segment import Motion, PairFlight, bound, first_root
+from grasp_ros.exact.polynomial import safe_step
+from grasp_ros.exact.records import Regime
+from grasp_ros.physics.layout import Transition, Work
 
 Body = tuple[float, float, float, float]  # m, k, c, f
 CRITICAL = 2.0 * math.sqrt(15.0)
-BODIES: dict[str, tuple[Body, float]] = {
-    "rest and nothing": ((2.0, 0.0, 0.0, 0.0), DRIFT),
-    "constant force": ((2.0, 0.0, 0.0, 3.0), DRIFT),
-    "under-damped": ((1.0, 15.0, 0.7, 0.0), UNDER),
-    "undamped with force": ((1.0, 15.0, 0.0, 2.0), UNDER),
-    "barely damped": ((1.0, 15.0, 1e-12, 2.0), UNDER),
-    "critical": ((1.0, 4.0, 4.0, 1.0), NEAR),
-    "above critical by 1e-12": ((1.0, 15.0, CRITICAL * (1 + 1e-12), 1.0), NEAR),
-    "below critical by 1e-12": ((1.0, 15.0, CRITICAL * (1 - 1e-12), 1.0), UNDER),
-    "above critical by 1e-6": ((1.0, 15.0, CRITICAL * (1 + 1e-6), 1.0), NEAR),
-    "below critical by 1e-6": ((1.0, 15.0, CRITICAL * (1 - 1e-6), 1.0), UNDER),
-    "above critical by 10 %": ((1.0, 15.0, CRITICAL * 1.1, 1.0), NEAR),
-    "over-damped": ((1.0, 15.0, 40.0, 1.0), NEAR),
-    "hardly a spring": ((1.0, 1e-12, 5.0, 1.0), OVER),
-    "weak spring under force": ((1.0, 1e-30, 0.0, 2.0), UNDER),
-    "weak spring, damped, under force": ((1.0, 1e-30, 0.5, 2.0), OVER),
-    "drag": ((3.0, 0.0, 0.5, 0.0), OVER),
-    "drag under force": ((3.0, 0.0, 0.5, 2.0), OVER),
-    "hardly any drag": ((3.0, 0.0, 1e-14, 2.0), OVER),
-    "stiff and light": ((1e-6, 1e6, 0.1, 0.0), UNDER),
-    "heavy and soft": ((1e6, 1e-3, 1.0, 0.0), UNDER),
+BODIES: dict[str, tuple[Body, Regime]] = {
+    "rest and nothing": ((2.0, 0.0, 0.0, 0.0), Regime.DRIFT),
+    "constant force": ((2.0, 0.0, 0.0, 3.0), Regime.DRIFT),
+    "under-damped": ((1.0, 15.0, 0.7, 0.0), Regime.UNDER),
+    "undamped with force": ((1.0, 15.0, 0.0, 2.0), Regime.UNDER),
+    "barely damped": ((1.0, 15.0, 1e-12, 2.0), Regime.UNDER),
+    "critical": ((1.0, 4.0, 4.0, 1.0), Regime.NEAR),
+    "above critical by 1e-12": ((1.0, 15.0, CRITICAL * (1 + 1e-12), 1.0), Regime.NEAR),
+    "below critical by 1e-12": ((1.0, 15.0, CRITICAL * (1 - 1e-12), 1.0), Regime.UNDER),
+    "above critical by 1e-6": ((1.0, 15.0, CRITICAL * (1 + 1e-6), 1.0), Regime.NEAR),
+    "below critical by 1e-6": ((1.0, 15.0, CRITICAL * (1 - 1e-6), 1.0), Regime.UNDER),
+    "above critical by 10 %": ((1.0, 15.0, CRITICAL * 1.1, 1.0), Regime.NEAR),
+    "over-damped": ((1.0, 15.0, 40.0, 1.0), Regime.NEAR),
+    "hardly a spring": ((1.0, 1e-12, 5.0, 1.0), Regime.OVER),
+    "weak spring under force": ((1.0, 1e-30, 0.0, 2.0), Regime.UNDER),
+    "weak spring, damped, under force": ((1.0, 1e-30, 0.5, 2.0), Regime.OVER),
+    "drag": ((3.0, 0.0, 0.5, 0.0), Regime.OVER),
+    "drag under force": ((3.0, 0.0, 0.5, 2.0), Regime.OVER),
+    "hardly any drag": ((3.0, 0.0, 1e-14, 2.0), Regime.OVER),
+    "stiff and light": ((1e-6, 1e6, 0.1, 0.0), Regime.UNDER),
+    "heavy and soft": ((1e6, 1e-3, 1.0, 0.0), Regime.UNDER),
 }
 TIMES = [1e-12, 1e-3, 0.05, 0.3, 1.0, 7.0, 40.0]
 GRAZING_ARM: Body = (1.0, 15.0, 0.7, 0.0)
@@ -68,7 +57,7 @@ def root(
     at: tuple[float, float, float, float],
     span: float,
     *,
-    kind: int = TOUCH_ROOT,
+    kind: Transition = Transition.TOUCH,
     sign: float = 1.0,
     inverse_p: float = 0.0,
 ) -> tuple[float, int]:
@@ -76,10 +65,9 @@ def root(
     x, v, x_o, v_o = at
     rows = np.array(arm), np.array(body)
     work = np.zeros(len(Work), dtype=np.int64)
-    flights = launch(rows[0], x, v), launch(rows[1], x_o, v_o)
-    start = sign * (x - x_o), sign * (v - v_o)
-    pace = fastest_rate(np.array([*rows, rows[1]]))
-    found = flight_root(kind, *rows, *flights, start, sign, inverse_p, pace, span, work)
+    pair = PairFlight(*rows, launch(rows[0], x, v), launch(rows[1], x_o, v_o), sign, inverse_p)
+    start = Motion(x, v, x_o, v_o, sign * (x - x_o), sign * (v - v_o))
+    found = first_root(kind, pair, 0.0, start, span, work)
     return found, int(work[Work.ROOT_ITERATIONS])
 
 
@@ -279,7 +267,7 @@ def test_grazing_is_neither_missed_nor_invented(eps: float, sign: float) -> None
     assert sign * (solve(GRAZING_ARM, -0.3 * sign, 0.0, inside)[0] - face * sign) > 0.0
     # the way out again is the release of the same arc
     y = solve(GRAZING_ARM, -0.3 * sign, 0.0, inside)
-    out, _ = root(GRAZING_ARM, STILL, (*y, face * sign, 0.0), 0.5, kind=RELEASE_ROOT, sign=sign)
+    out, _ = root(GRAZING_ARM, STILL, (*y, face * sign, 0.0), 0.5, kind=Transition.RELEASE, sign=sign)
     assert inside + out == pytest.approx(2 * float(t_peak) - t, rel=0, abs=float(true_eps) + 1e-15 / float(approach))
 
 
@@ -333,7 +321,7 @@ def test_the_end_of_the_span_belongs_to_it() -> None:
 def test_reentry_of_a_separating_pair() -> None:
     arm: Body = (1.0, 10.0, 0.2, 3.0)
     inverse_p = 0.5
-    t, _ = root(arm, STILL, (-0.1, -1.5, -0.2, 0.0), 10.0, kind=REENTRY_ROOT, inverse_p=inverse_p)
+    t, _ = root(arm, STILL, (-0.1, -1.5, -0.2, 0.0), 10.0, kind=Transition.REENTRY, inverse_p=inverse_p)
     with mp.workdps(25):
         expected = mp.findroot(lambda s: flight(arm, -0.1, -1.5, s)[1] + mpf("0.5"), 0.3)
     assert 0.0 < t == pytest.approx(float(expected), rel=1e-14)

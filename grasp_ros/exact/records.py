@@ -1,0 +1,128 @@
+"""The records that the kernels hand to each other: what a plant is, where it stands, what a run writes.
+
+A record crosses from Python at a price, about half a microsecond each, so `hybrid.advance` takes flat arrays and makes
+its records inside, where they cost nothing.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.physics.layout import Slide, Transition
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+class Plant(NamedTuple):
+    """What moves and what pushes, see `layout`."""
+
+    given: Array  # (3, 4) by body: m kg, k N/m, c N s/m, f N, as the scene and the inputs of this interval say
+    bodies: Array  # (3, 4) the same as it acts in this mode: friction in f, an infinite mass where the object sticks
+    pairs: Array  # (2, 2) by side: H N/m^1.5, p s/m; H = 0: no such pair
+    coulomb: float  # dry friction of the object, N
+
+
+class State(NamedTuple):
+    """Where a run stands; updated in place."""
+
+    y: Array  # (8,) x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r; m and m/s
+    mode: Integers  # (3,) Pair, Pair, Slide; frozen within a segment
+    clock: Array  # (2,) time since the begin of the interval, and what its roundings left out, s
+
+
+class Settings(NamedTuple):
+    """What the accuracy of a run rests on."""
+
+    tolerance: float  # first neglected Taylor term, relative to the impact
+    order: int  # of the Taylor series
+    rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `scales.rate_bound`
+
+
+class Output(NamedTuple):
+    """What a run writes, and how much of it; updated in place."""
+
+    grid: Array  # (n,) ascending output times on the clock, s
+    rows: Array  # (n, 6) states at them
+    events: Array  # (m, 5) time s, body, Transition, u m, u' m/s
+    filled: Integers  # (2,) rows in use, see `layout.Filled`
+    work: Integers  # (4,) counters, see `layout.Work`
+
+
+class Tables(NamedTuple):
+    """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
+
+    The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
+    the begin of the step, and CHECK for the product w w or w_l w_r as far as it is expanded.
+    """
+
+    c: Array  # (LANES (order + 1),)
+    f: Array  # (FACTORS (order + 1),)
+    at: Array  # (LANES,) values of the lanes at some s
+    size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
+    row: Array  # (order + 1,) one polynomial
+
+
+class Step(NamedTuple):
+    """A Taylor step: what its series stand for."""
+
+    order: int
+    unit: float  # of s, such that the radius of convergence is about 1
+    left: bool  # whether the left pair is in contact
+    right: bool
+
+
+class Regime(IntEnum):
+    """Form of the closed solution of a flight, see `flight.fly`."""
+
+    DRIFT = 0  # no spring, no damper
+    UNDER = 1  # under-damped
+    NEAR = 2  # critical or over-damped, around a rest position that is near
+    OVER = 3  # over-damped, with a rest position far away or none
+
+
+class Flight(NamedTuple):
+    """One body in free flight from (x, v), see `flight.launch`."""
+
+    regime: Regime
+    x: float  # m
+    v: float  # m/s
+    swing: float  # x - x_e, m
+    x_e: float  # rest position, m; 0 where the regime does not need it
+    push: float  # (f - k x) / m, m/s^2
+    sigma: float  # c / 2 m, 1/s
+    rate: float  # damped frequency, or the half difference of the real roots, 1/s
+    omega0_2: float  # k / m, 1/s^2
+
+
+class Flights(NamedTuple):
+    """All bodies in free flight."""
+
+    left: Flight
+    right: Flight
+    object: Flight
+
+
+class Candidate(NamedTuple):
+    """The first event of a pair in a segment."""
+
+    when: float  # time in s in a flight, s in units of the step in contact; inf: none, nan: the search does not end
+    what: Transition
+
+
+class SlideCandidate(NamedTuple):
+    """The first event of the object in a segment."""
+
+    when: float
+    what: Slide  # the mode that follows; after a stop `modes.slide_of` decides
+
+
+class Level(NamedTuple):
+    """An energy, and what its digits are relative to."""
+
+    value: float  # J of V
+    size: float  # J, sum of the sizes of its terms

@@ -1,0 +1,33 @@
+"""The impact law: Hertz stiffness with Hunt-Crossley damping, its tension cut off by condition (10).
+
+    fw = H u^(3/2) (1 + p u')   if u >= 0 and u' >= -1/p, else 0     (6), (7), (10)
+
+u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function works on floats and on NumPy arrays, and
+`exact.impact` compiles the same source for the kernels: the only other statements of the law are those that prove it,
+in `verification`. `model.impact_force` puts the parts together for any u and u'.
+
+References
+----------
+H. Hertz, Ueber die Beruehrung fester elastischer Koerper, J. reine angew. Math. 92 (1882): the exponent 3/2.
+K. H. Hunt, F. R. E. Crossley, Coefficient of restitution interpreted as damping in vibroimpact, J. Appl. Mech. 42
+(1975): the damping in proportion to the elastic force.
+"""
+
+from typing import Any
+
+import numpy as np
+
+
+def elastic_force(hertzian: Any, u: Any) -> Any:
+    """H u^(3/2) in N, for u >= 0 in m. Two factors: a product of halves scales by powers of 4 without rounding."""
+    return hertzian * (u * np.sqrt(u))
+
+
+def damping_factor(dissipation: Any, u_rate: Any) -> Any:
+    """1 + p u': what the damping multiplies the elastic force by. Its sign is condition (10)'s second half."""
+    return 1.0 + dissipation * u_rate
+
+
+def stored_energy(hertzian: Any, u: Any) -> Any:
+    """Elastic energy (2/5) H u^(5/2) in J, for u >= 0 in m; V counts it twice, (19)."""
+    return 0.4 * hertzian * u * u * np.sqrt(u)

@@ -1,0 +1,62 @@
+"""The automaton stays readable: few parameters, short functions, short files, names for indices."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from grasp_ros import exact
+
+PARAMETERS, BODY, LINES = 8, 40, 250
+DOOR = "advance"  # of hybrid: flat arrays, see its docstring
+# The recurrences of `series` are written out for the compiler's vectors; a test by Picard iteration watches them.
+FILES = sorted(path for path in Path(exact.__file__).parent.glob("*.py") if path.name != "series.py")
+NAMED = {"work", "filled", "mode", "rows", "bodies", "given", "pairs", "y"}  # arrays whose places have names
+
+
+def functions(path: Path) -> list[ast.FunctionDef]:
+    """All functions and methods of a file."""
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
+
+
+def body_lines(function: ast.FunctionDef) -> int:
+    """Lines of a function behind its signature and docstring."""
+    first = function.body[1] if ast.get_docstring(function) and len(function.body) > 1 else function.body[0]
+    assert function.end_lineno is not None
+    return function.end_lineno - first.lineno + 1
+
+
+def literal_indices(path: Path) -> list[str]:
+    """Subscripts like work[3] or out.filled[0]."""
+    found = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Subscript):
+            name = node.value.attr if isinstance(node.value, ast.Attribute) else getattr(node.value, "id", "")
+            index = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            if name in NAMED and any(isinstance(part, ast.Constant) for part in index):
+                found.append(ast.unparse(node))
+    return found
+
+
+def test_the_search_sees_what_it_looks_for(tmp_path: Path) -> None:
+    source = tmp_path / "long.py"
+    source.write_text("def f(a):\n    '''Text.'''\n    out.work[3] += 1\n    y[0] = mode[a]\n    return a\n")
+    assert body_lines(functions(source)[0]) == 3
+    assert literal_indices(source) == ["out.work[3]", "y[0]"]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_functions_and_files_are_small(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= LINES
+    for function in functions(path):
+        arguments = function.args
+        count = len(arguments.posonlyargs) + len(arguments.args) + len(arguments.kwonlyargs)
+        assert count <= PARAMETERS or function.name == DOOR, function.name
+        assert body_lines(function) <= BODY, function.name
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_no_number_stands_for_a_place(path: Path) -> None:
+    assert literal_indices(path) == []
