@@ -22,5 +22,6 @@ w, s, G         w, s, g                           regularised variables of a con
 ==============  =====================  =========  ==========================================================
 
 `model` states the equations, `control` the law of a controller, `system` puts a scene into arrays, `layout` says what
-stands where in them, `energy` computes V and its balance, `sampled` the limits of a loop of held commands.
+stands where in them, `energy` computes V and its balance, `sampled` the limits of a loop of held commands. `errors`
+holds the base of everything that is refused, here and in the rooms above.
 """

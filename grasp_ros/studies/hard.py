@@ -16,7 +16,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.versions import versions
 from grasp_ros.studies import page_figures
-from grasp_ros.studies.document import put
+from grasp_ros.studies.document import put, read, write
 from grasp_ros.verification.cases.case import Case, Outcome, Product, Unfinished, judge
 from grasp_ros.verification.cases.registry import cases
 from grasp_ros.verification.deadline import Deadline, deadline
@@ -59,10 +59,10 @@ def run(document: Path | None, *, alone: bool) -> int:
 
     Raises
     ------
-    ValueError
-        If the document has no marks.
+    Refused
+        If the document cannot be read or written, or has no marks.
     """
-    text = "" if document is None else put(document.read_text(encoding="utf-8"), PART, "")
+    text = "" if document is None else put(read(document), PART, "")
     rows: list[Row] = []
     others = [] if alone else [Other(name, setting) for name, setting in OTHERS]
     for case in tqdm(cases(), desc="hard", file=sys.stderr):
@@ -76,7 +76,7 @@ def run(document: Path | None, *, alone: bool) -> int:
                  for row in rows]
         page_figures.hard_cases(drawn, [name for name, _ in OTHERS], figure)
         block = f"{table}\n\n![figures of the hard cases]({figure.name})"
-        document.write_text(put(text, PART, block), encoding="utf-8")
+        write(document, put(text, PART, block))
     return 0 if all(row.own.right(row.case) for row in rows) else 1
 
 

@@ -8,11 +8,12 @@ from functools import partial
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product, Solver, recorded
-from grasp_ros.verification.cases.scenes import ELASTIC, composed, distance, grasp, library, part
+from grasp_ros.verification.cases.scenes import ELASTIC, distance, grasp, library, part
 
 SWAPPED = [4, 5, 2, 3, 0, 1]
 FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
@@ -29,7 +30,7 @@ def mirrored(scene: Scene) -> Scene:
         values[f"{PAIRED[side]}_{rest}" if side in PAIRED else section] = {
             key: -value if key in DIRECTED else value for key, value in numbers.items()
         }
-    return composed(scene.name, values)
+    return scenes.compose(scene.name, values)
 
 
 def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
@@ -44,7 +45,7 @@ def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
         "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
         "gravity_m_per_s2": length / time**2,
     }
-    return composed(scene.name, {
+    return scenes.compose(scene.name, {
         section: {key: value * factors[key] for key, value in numbers.items()}
         for section, numbers in scene.values.items()
     })
@@ -105,7 +106,7 @@ def _grid(scene: Scene, product: Product) -> float:
 def _absent(product: Product) -> float:
     """An arm and a contact that meet nobody, and not being there at all."""
     full = grasp([-0.3, 0.0, 0.0, 0.0, 1e6, 0.0], 5.0, right=Arm(1.0, 0.0, 0.0, 0.0, 0.0))
-    bare = composed("bare", {key: numbers for key, numbers in full.values.items() if not key.startswith("right")})
+    bare = scenes.compose("bare", {key: numbers for key, numbers in full.values.items() if not key.startswith("right")})
     times = part(full, 201)
     return float(np.abs(product.run(full, times).state[:, :4] - product.run(bare, times).state[:, :4]).max())
 
@@ -113,7 +114,7 @@ def _absent(product: Product) -> float:
 def _order(product: Product) -> float:
     """The order of the sections of a file."""
     scene = library("case_04", 5.0)
-    other = composed("case_04", dict(reversed(list(scene.values.items()))))
+    other = scenes.compose("case_04", dict(reversed(list(scene.values.items()))))
     times = part(scene, 201)
     return float(np.abs(product.run(scene, times).state - product.run(other, times).state).max())
 

@@ -17,9 +17,11 @@ from grasp_ros.graph.bag import Recorder
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode, run
 from grasp_ros.physics.energy import energy, ledger
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.files import reading
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE, Topic, state_of
 from grasp_ros.simulation.versions import versions
 
@@ -54,8 +56,9 @@ class Monitor(GraspNode):
         super().__init__("monitor")
         default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
         self._path = Path(self.read_only("bag", default, "directory of the bag; it must not exist"))
-        if self._path.exists():
-            raise ValueError(f"bag: {str(self._path)!r} exists; allowed: a directory that does not exist yet")
+        with reading(self._path):
+            if self._path.exists():
+                raise Refused(f"bag: {str(self._path)!r} exists; allowed: a directory that does not exist yet")
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
         self._pending: dict[Topic, deque[tuple[int, bytes]]] = {}

@@ -15,7 +15,7 @@ from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Case, Product
-from grasp_ros.verification.cases.scenes import STANDARD, composed, reference
+from grasp_ros.verification.cases.scenes import STANDARD, reference
 
 HALF = 200  # control periods
 LEAST = 1e-300  # J, against 0/0 where nothing moves
@@ -28,7 +28,7 @@ def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]], 
     for name, number in numbers.items():
         for side in ("left", "right"):
             values[f"{side}_feedback"][name] = number
-    return composed("case_01", {**values, **{key: dict(content) for key, content in added.items()}})
+    return scenes.compose("case_01", {**values, **{key: dict(content) for key, content in added.items()}})
 
 
 def unexplained(trajectory: Trajectory) -> float:
@@ -47,7 +47,7 @@ def _alone(period: float, delay: int, ticks: int) -> Scene:
     scene = scenes.load("arm_alone").changed({
         "time.control_period_s": period, "time.duration_s": round(ticks * period, 9), "left_feedback.set_point_m": 0.0,
     })
-    return composed("alone", {**scene.values, "loop": {"delay_ticks": delay}})
+    return scenes.compose("alone", {**scene.values, "loop": {"delay_ticks": delay}})
 
 
 def _growth(period: float, delay: int, product: Product) -> float:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product
-from grasp_ros.verification.cases.scenes import composed, part
+from grasp_ros.verification.cases.scenes import part
 
 PUSH, HERTZIAN, RATE = 1.0, 1e4, 10.0  # N, N/m^1.5, 1/s
 GRAVITY, ANGLE = 9.81, 0.3  # m/s^2, rad
@@ -20,7 +21,7 @@ BODIES = 1.0, 2.0  # kg, arm and object
 def _touching(seconds: float, stiffness: float, added: Mapping[str, Mapping[str, Any]]) -> Scene:
     """An arm and an object, both at rest at 0."""
     arm, mass = BODIES
-    return composed("touching", {
+    return scenes.compose("touching", {
         "time": {"duration_s": seconds, "control_period_s": 0.001},
         "left_arm": {"mass_kg": arm, "stiffness_N_per_m": stiffness, "position_m": 0.0, "velocity_m_per_s": 0.0},
         "object": {"mass_kg": mass, "position_m": 0.0, "velocity_m_per_s": 0.0},
