@@ -40,7 +40,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     if len(trajectory.t):
         rows.append(("V_c at both ends", _ends(level.V_c)))
     rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
-    if trajectory.method != EXACT and len(trajectory.t):  # nobody guards the steps of the others
+    if trajectory.method != EXACT and len(trajectory.t):  # only `exact` checks the energy of its steps
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
     return _with_watch(trajectory.scene, rows)
@@ -77,7 +77,7 @@ def describe_recording(recording: Recording) -> list[Row]:
         rows.insert(6, ("V at both ends", _ends(recording.lyapunov[:, 0])))
         rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
         rows.insert(8, ("certificate", scene.certificate_in_words(sampled=True)))
-        rows.insert(9, ("energy from nowhere", f"{recording.alarms} alarms" if recording.alarms else "none"))
+        rows.insert(9, ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"))
     return _with_watch(scene, rows)
 
 

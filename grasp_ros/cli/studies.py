@@ -53,7 +53,7 @@ def add_to(
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
     sub = add("certificate", _certificate, "where the paper's V jumps, from which p on, and limits of the period")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put tables and figure into this text")
-    sub = add("hard", _hard, "hard cases: what decides, the figure reached, and other solvers beside it")
+    sub = add("hard", _hard, "hard cases, family by family: the error reached, and other solvers beside it")
     sub.add_argument("-o", "--output", type=Path, metavar="FILE.md", help="put table and figure into this text")
     sub.add_argument("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten")
     sub = add("fuzz", _fuzz, "random scenes against all properties")

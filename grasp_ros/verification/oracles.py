@@ -1,6 +1,31 @@
-"""Exact relations that decide hard cases, in mpmath with 40 digits; nothing here calls a kernel.
+"""Exact relations that decide tests and hard cases, in mpmath with 40 digits; nothing here calls a kernel.
 
-Numbers O1, O2, ... in comments and titles of cases count these relations. Derivations stand with them.
+O1 to O15 in cases, tests and pages are these relations. K = k + Kp, C = c + Kv; continuous feedback unless said.
+
+O1   Impact of two free bodies with p = 0, reduced mass mu, approach speed v: depth (5 mu v^2 / (4 H))^(2/5),
+     duration (4/5) B(2/5, 1/2) depth / v, exit speed v.
+O2   The same with p > 0: exit speed (1 + W0(-(1 + z) e^-(1 + z))) / p with z = p v, below 1/p whatever v; depth and
+     duration from the first integral mu u' du' = -H u^(3/2) (1 + p u') du.
+O3   Balances along any motion. Momentum: the sums of m v, C x and the integral of K x - f are constant together.
+     Energy: V_c + 2 W is, with W' = C v^2 of each arm, p H u^(3/2) u'^2 of a pair in contact, -H u^(3/2) u' of a
+     clamped one. Under held commands: the energy of the plant changes by their work less W.
+O4   An under-damped arm released at rest first passes 0 at (pi - atan2(w, s)) / w, s = C / 2m, w = sqrt(K/m - s^2),
+     wherever it started; one that is not under-damped never does.
+O5   In a symmetric scene the object stays at exactly 0.
+O6   Sides swapped and signs changed: the mirror image, bit for bit.
+O7   Lengths times L, times times S, masses times A: K A/S^2, C A/S, H A/(S^2 sqrt L), p S/L; bit for bit for L a
+     power of 4, S and A powers of 2.
+O8   For C = p = 0 the motion backwards in time is a motion.
+O9   Equal arms with C > 0: in the end V_c = (4/5) H (kappa t)^(-5/2) with
+     kappa = (9/5) C H^2 / (K^2 m_o) 0.240369360865381648; infinitely many contacts, about t^(3/4).
+O10  Three free bodies with gaps, the left one comes with speed 1: their impacts one after the other, by O1 or O2.
+O11  The same without gaps, p = 0: final speeds that depend on the ratios of the masses alone.
+O12  Symmetric arms with C = p = 0, m = 1, K = 15, H = 1e4, released at 0.3 m: period 0.88931643572931156661 s.
+O13  An arm whose peak overshoots a face at rest by e, p = 0, deceleration a: contact for 2 sqrt(2 e / a), impulse
+     (3 pi / 8) H e^2 sqrt(2 / a), both up to O(e^(3/2)); no event for e < 0.
+O14  Rest points that overlap by d hold the object with the force f of
+     f/K_l + f/K_r + (f/H_l)^(2/3) + (f/H_r)^(2/3) = d.
+O15  Two touches a short d apart (K = C = 0): the final speed of the object is proportional to d.
 """
 
 from __future__ import annotations
@@ -22,7 +47,7 @@ mp.dps = 40
 
 
 def first_touch_from_rest(m: Any, stiffness: Any, damping: Any) -> Any:
-    """O4: when an under-damped arm that is released at rest first passes 0."""
+    """O4, in s."""
     s = mpf(damping) / (2 * mpf(m))
     w = mp.sqrt(mpf(stiffness) / mpf(m) - s * s)
     return (mp.pi - mp.atan2(w, s)) / w
@@ -48,7 +73,7 @@ def _exit(z: Any) -> Any:
 
 
 def impact(mu: Any, hertzian: Any, p: Any, speed: Any) -> Impact:
-    """O1 and O2. mu u' du' = -H u^(3/2) (1 + p u') du gives depth and restitution; the duration is a quadrature."""
+    """O1 and O2: depth and restitution from the first integral, the duration by quadrature."""
     mu, hertzian, p, speed = (mpf(value) for value in (mu, hertzian, p, speed))
     if p == 0:
         depth = (5 * mu * speed**2 / (4 * hertzian)) ** mpf("0.4")
@@ -126,7 +151,7 @@ def flight(body: Sequence[Any], x: Any, v: Any, t: Any) -> tuple[Any, Any]:
 
 
 def holding_force(stiffness: Sequence[Any], hertzian: Sequence[Any], overlap: Any) -> Any:
-    """O14: f/K_l + f/K_r + (f/H_l)^(2/3) + (f/H_r)^(2/3) = d for rest points that overlap by d."""
+    """O14, in N."""
     K, H, d = [mpf(k) for k in stiffness], [mpf(h) for h in hertzian], mpf(overlap)
 
     def excess(f: Any) -> Any:
@@ -135,8 +160,8 @@ def holding_force(stiffness: Sequence[Any], hertzian: Sequence[Any], overlap: An
     return mp.findroot(excess, (d * min(K) / 8, d * min(K)), solver="anderson")
 
 
-class Ledger(NamedTuple):
-    """Momentum and energy balance at the ends of the segments between events; all should vanish."""
+class Balance(NamedTuple):
+    """Errors of the balances of momentum and energy at the ends of the segments between events."""
 
     momentum: Array  # relative to the largest of m, C, K times the largest speed, position and its integral
     energy: Array  # relative to V_c(0)
@@ -146,12 +171,12 @@ NODES = 40
 
 
 def balance(system: System, duration: float, events: Sequence[float], solve: Callable[[Array], Array],
-            pieces: int = 16) -> Ledger:
+            parts: int = 16) -> Balance:
     """O3 along one trajectory with continuous feedback.
 
     m_l v_l + m_o v_o + m_r v_r + sum of C x + integral of sum of (K x - f) is constant, and so is V_c + 2 W with W' the
     dissipation. Between events the integrands are analytic after t = middle - half cos(theta), because u^(3/2) becomes
-    theta^3 times an analytic function; Gauss and Legendre do the rest. Long flights are cut into pieces.
+    theta^3 times an analytic function; Gauss and Legendre do the rest. Long flights are cut into parts.
 
     Parameters
     ----------
@@ -161,12 +186,12 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
         Times of all events.
     solve : callable
         From ascending times to states (n, 6).
-    pieces : int
-        Parts of each segment between events; many where bodies swing fast within one.
+    parts : int
+        Of each segment between events; many where bodies swing fast within one.
     """
     bodies = system.closed_loop
     edges = sorted({0.0, duration, *events})
-    edges = [a + (b - a) * j / pieces for a, b in pairwise(edges) for j in range(pieces)]
+    edges = [a + (b - a) * j / parts for a, b in pairwise(edges) for j in range(parts)]
     edges.append(duration)
     x, weight = np.polynomial.legendre.leggauss(NODES)
     theta = 0.5 * np.pi * (x + 1.0)
@@ -197,7 +222,7 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
     P, scale = momentum + pushed, max(scale, float(np.abs(pushed).max()))
     V_c = energy(system, at_edges).V_c
     E = V_c + 2.0 * integral(_dissipation(system, inside))
-    return Ledger((P - P[0]) / scale, (E - E[0]) / V_c[0])
+    return Balance((P - P[0]) / scale, (E - E[0]) / V_c[0])
 
 
 def _dissipation(system: System, y: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The event-driven integrator against a second method family, closed forms, ledgers and symmetries."""
+"""The event-driven integrator against a second method family, closed forms, balances and symmetries."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from oracles import (
     FREE,
     STANDARD,
     Run,
+    balance_of,
     energy,
     first_touch_from_rest,
     impact,
-    ledger,
     make_grasp,
     reduced_mass,
     reference_of,
@@ -295,16 +295,16 @@ def test_huge_dissipation_creeps_open() -> None:
         (make_grasp(), [0.2, 0.0, 0.0, 0.0, -0.2, 0.0], 5.0),
     ],
 )
-def test_ledgers_of_momentum_and_energy_close(grasp: Grasp, start: Any, duration: float) -> None:
-    book = ledger(grasp, start, duration)
+def test_balances_of_momentum_and_energy_close(grasp: Grasp, start: Any, duration: float) -> None:
+    book = balance_of(grasp, start, duration)
     assert np.abs(book.momentum).max() < 1e-13
     assert np.abs(book.energy).max() < 2e-12
 
 
-def test_ledger_notices_a_wrong_model() -> None:
+def test_balance_notices_a_wrong_model() -> None:
     scene = scenes.load("case_01")
-    good = ledger(scene.grasp, scene.initial_state, 5.0)
-    coarse = ledger(scene.grasp, scene.initial_state, 5.0, accuracy=1e-3)
+    good = balance_of(scene.grasp, scene.initial_state, 5.0)
+    coarse = balance_of(scene.grasp, scene.initial_state, 5.0, accuracy=1e-3)
     assert np.abs(good.energy).max() < 1e-12 < 1e-9 < np.abs(coarse.energy).max()
 
 

@@ -93,7 +93,7 @@ def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Pa
     recording = bag.read(two_runs[0] / "bag")
     level = recording.energy
     assert np.array_equal(recording.lyapunov[:, :4], np.stack([*level[:3], level.mode.astype(float)], axis=1))
-    assert (recording.lyapunov[:, 4] <= 1e-12).all()  # no energy from nowhere
+    assert (recording.lyapunov[:, 4] <= 1e-12).all()  # the energy balance closes
     assert recording.lyapunov[:, 4].sum() < -1.0  # what the impacts and dampers have taken
     assert not recording.lyapunov[:, 5].any()
     assert set(recording.lyapunov[:, 3]) == {0.0, 1.0, 2.0, 3.0}
@@ -293,7 +293,7 @@ sys.exit(start.main("plant"))
 """
 
 
-def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Path) -> None:
+def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(tmp_path: Path) -> None:
     """A plant that pushes its arms harder than the commands say."""
     options = ["--ros-args", "-p", "wait_for_monitor:=true"]
     recording = [*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
@@ -310,7 +310,7 @@ def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Pat
         controller.communicate(timeout=DEADLINE)
     assert (monitor.returncode, others[0].returncode) == (1, 1)
     assert b"the monitor that this run waits for has ended" in last_words
-    assert re.search(r"V_c rose by \S+ J more than the held forces can explain, t = \S+ s, mode 0, state \[", err)
+    assert re.search(r"V_c rose by \S+ J more than the work of the held forces, t = \S+ s, mode 0, state \[", err)
     found = bag.read(tmp_path / "bag")
     assert found.alarms == 1
     assert found.lyapunov[-1, LYAPUNOV_NAMES.index("alarm")] == 1.0

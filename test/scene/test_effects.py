@@ -12,7 +12,7 @@ from oracles import CASES, flight_array
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.energy import ledger
+from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import PAPER, Scene
@@ -58,7 +58,7 @@ def test_every_parameter_has_a_unit_a_range_and_a_text() -> None:
 
 @pytest.mark.parametrize("name", scenes.names())
 def test_certificate_holds_or_says_why_not(name: str) -> None:
-    """Where nothing is in doubt V_c never rises; everywhere the ledger leaves no rise unexplained."""
+    """Where nothing is in doubt V_c never rises; everywhere the energy balance closes."""
     scene = scenes.load(name, ["time.duration_s=4.0"])
     if not scene.sampled and not scene.system.external:
         V_c = simulate(scene, grid=np.linspace(0.0, 4.0, 4001)).energy.V_c
@@ -73,7 +73,7 @@ def test_certificate_holds_or_says_why_not(name: str) -> None:
 
 
 def balance(motion: Trajectory) -> list:
-    """Ledger of every control period of a sampled motion; the inputs come from the commands and the delay."""
+    """Energy balance of every control period of a sampled motion; the inputs come from the commands and the delay."""
     system = motion.scene.system
     line = deque([np.zeros(2)] * system.delay)
     rows = []
@@ -81,22 +81,22 @@ def balance(motion: Trajectory) -> list:
         line.append(motion.command[tick])
         forces = system.external_at(tick)
         forces[: len(line[0])] += line.popleft()
-        rows.append(ledger(system, motion.state[tick], motion.state[tick + 1], forces))
+        rows.append(energy_balance(system, motion.state[tick], motion.state[tick + 1], forces))
     return rows
 
 
-def test_the_ledger_notices_energy_from_nowhere() -> None:
+def test_the_energy_balance_notices_a_gain() -> None:
     motion = simulate(scenes.load("case_01", ["time.duration_s=1.0"]), sampled=True)
     system, before, after = motion.scene.system, motion.state[500], motion.state[501]
     forces = np.array([*motion.command[500], 0.0])
-    fair = ledger(system, before, after, forces)
+    fair = energy_balance(system, before, after, forces)
     assert not fair.alarm
-    assert fair.unexplained < 0.0  # what the dampers took
+    assert fair.residual < 0.0  # what the dampers took
     faster = after.copy()
-    faster[1] = np.sqrt(after[1] ** 2 - fair.unexplained + 1e-10)  # that, and a bit more, is given back
-    assert ledger(system, before, faster, forces).unexplained == pytest.approx(1e-10, rel=1e-2)
-    assert ledger(system, before, faster, forces).alarm
-    assert ledger(system, before, np.full(6, np.nan), forces).alarm
+    faster[1] = np.sqrt(after[1] ** 2 - fair.residual + 1e-10)  # that, and a bit more, is given back
+    assert energy_balance(system, before, faster, forces).residual == pytest.approx(1e-10, rel=1e-2)
+    assert energy_balance(system, before, faster, forces).alarm
+    assert energy_balance(system, before, np.full(6, np.nan), forces).alarm
 
 
 # Bodies and contacts that are not there.

@@ -194,7 +194,7 @@ def test_budget_ends_a_run_with_its_status(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("period", [0.01, 0.1, 0.25])
-def test_work_ledger_of_held_commands(period: float) -> None:
+def test_work_balance_of_held_commands(period: float) -> None:
     scene = scene_of(
         "case_01",
         2.0,
@@ -215,7 +215,7 @@ def test_work_ledger_of_held_commands(period: float) -> None:
     assert np.abs(work).max() > 1e-3
 
 
-def test_dissipation_is_what_the_ledger_lacks() -> None:
+def test_dissipation_is_what_the_balance_lacks() -> None:
     scene = scene_of("case_01", 2.0, 0.05)
     result = simulate(scene, sampled=True)
     passive = scene.grasp._replace(

@@ -10,9 +10,9 @@ from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Solver
+from grasp_ros.verification.cases.families import CLAMP, EXTREME, START
 from grasp_ros.verification.cases.scenes import STANDARD, distance, grasp, library, part, reference
 
-REFERENCE = "reference with 25 digits, all states"
 STARTS: dict[str, tuple[float, ...]] = {
     "in contact": (0.005, 0.3, 0.0, 0.0, 0.5, 0.0),
     "deep, 0.3 m": (0.3, 0.0, 0.0, 0.0, 0.5, 0.0),
@@ -75,19 +75,16 @@ def _huge(p: float, solver: Solver) -> float:
 
 def cases() -> Iterator[Case]:
     """All modes, starts and extremes."""
-    yield Case("clamp", "re-entry of v_jump_symmetric", "the surface is met at u > 0, where nothing else changes sign",
-               "time and depth of the re-entry, computed beforehand to 15 digits",
-               partial(_height, "v_jump_symmetric", 0.363159009501776, 0.006353953744931), 1e-11)
+    yield Case(CLAMP, "re-entry of v_jump_symmetric",
+               partial(_height, "v_jump_symmetric", 0.363159009501776, 0.006353953744931), 1e-11,
+               "time and depth of the re-entry, known to 15 digits, relative")
     for text, scene in _clamped():
-        yield Case("clamp", text, "u' = -1/p is crossed in both directions while u > 0", REFERENCE,
-                   partial(_states, scene), 1e-10)
+        yield Case(CLAMP, text, partial(_states, scene), 1e-10)
     for text, state in STARTS.items():
-        yield Case("start", text, "the mode must follow from the state alone", REFERENCE,
-                   partial(_states, grasp(state, 1.0, mass=2.0)), 1e-11)
+        yield Case(START, text, partial(_states, grasp(state, 1.0, mass=2.0)), 1e-11)
     for text, scene in _extreme():
-        yield Case("extreme", text, "time scales that differ by many decades; some of these scenes amplify errors",
-                   REFERENCE, partial(_states, scene), 1e-11)
+        yield Case(EXTREME, text, partial(_states, scene), 1e-11)
     for p in (300.0, 1e4):
-        yield Case("clamp", f"squeezed with p = {p:g}", "creeps along the surface, pressed and pulled by springs",
-                   REFERENCE, partial(_huge, p), 1e-9, limit=Status.STALLED)
+        yield Case(CLAMP, f"squeezed with p = {p:g}", partial(_huge, p), 1e-9,
+                   "creeps along the surface, pressed and pulled by springs", limit=Status.STALLED)
 
