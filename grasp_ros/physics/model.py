@@ -3,8 +3,14 @@
 Everything here is written with the paper's letters; every function works on scalars and on NumPy arrays.
 The integrators in this package do not call it, so that tests can hold their results against it.
 
+The impact law, (6), (7), is Hunt-Crossley: Hertz stiffness H u^(3/2) with a damping that is proportional to it,
+p u' H u^(3/2). Condition (10) cuts off its tension: a pair that separates faster than 1/p does not pull. How p
+translates to the symbols of other authors stands in the notation, `grasp_ros.physics`.
+
 References
 ----------
+K. H. Hunt, F. R. E. Crossley: Coefficient of Restitution Interpreted as Damping in Vibroimpact. ASME Journal of
+Applied Mechanics 42 (1975), 440-445.
 T. Fukuda, Y. Shoji, M. Inaba: Stable Position/Force Control of Robotic Manipulator with Consideration of
 Collision Phenomena. IFAC 11th World Congress, Tallinn 1990. Equation numbers below are the paper's.
 """
@@ -33,7 +39,7 @@ class Arm(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """One pair of arm and object, (6), (7)."""
+    """One pair of arm and object, with the Hunt-Crossley law (6), (7)."""
 
     hertzian: float  # H, N/m^1.5
     dissipation: float  # p, s/m
@@ -74,7 +80,7 @@ def hertzian_force(contact: Contact, u: Array) -> Array:
 
 
 def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
-    """Impact force fw in N, never negative: (6), (7).
+    """Impact force fw in N, never negative: the Hunt-Crossley law (6), (7), cut off by (10).
 
     Parameters
     ----------
