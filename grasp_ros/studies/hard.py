@@ -97,8 +97,8 @@ def _families(rows: list[Row]) -> str:
     """What was reached in all, and a paragraph and a table for each family."""
     blocks = [_summary(rows)]
     for family, group in groupby(rows, key=lambda row: row.case.family):
-        paragraph = prose(f"{family.why} Decided by: {family.oracle}.")
-        blocks += [f"### {family.name}", paragraph, _cases(list(group))]
+        blocks += [f"### {family.name}", prose(family.why), prose(f"*Decided by* {family.oracle}.")]
+        blocks.append(_cases(list(group)))
     return "\n\n".join(blocks)
 
 

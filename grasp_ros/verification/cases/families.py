@@ -57,11 +57,11 @@ FLIGHT = Family(
 )
 WAIT = Family(
     "wait", "A touch that comes after 1e6 s, or never, while the gap tends to 0.",
-    "O4: nothing touches, so that nothing moves, m and m/s",
+    "O4: nothing touches, so nothing moves, m and m/s",
 )
 HORIZON = Family(
     "horizon", "Up to 50 000 impacts: the motion is unpredictable after 50 s, its energy and its period are not, and"
-    " errors must not add up.", "V_c is constant, relative",
+    " errors must not add up.", "V_c, which is constant, relative",
 )
 TAIL = Family(
     "tail", "Bounces get smaller for ever: no stall, no end, amplitudes below 1e-30 m.",
@@ -77,16 +77,16 @@ LOOP = Family(
     " of what rounding may add",
 )
 GROWTH = Family(
-    "growth", "An unstable loop must grow as fast as it does: neither hidden nor repaired.",
+    "growth", "A loop must decay or grow at its true rate, also where it is unstable.",
     "spectral radius of the sampled loop: growth per period, relative",
 )
-LIMIT = Family("limit", "A run must neither go on for ever nor return infinities.", "the status says so")
+LIMIT = Family("limit", "A run must neither go on for ever nor return infinities.", "the status of the run")
 RELATION = Family(
-    "relation", "Two scenes whose results must be related, whatever they are.", "the same numbers, bit for bit"
+    "relation", "Two scenes whose results must be related, whatever they are.", "equality, bit for bit"
 )
 FOUND = Family(
     "found", "Scenes of random search, with what it found wrong at the time.",
-    "all properties of `grasp study fuzz` hold",
+    "all properties of `grasp study fuzz`",
 )
 ORDER = (
     IMPACT, CHAIN, CREEP, TOUCH, GRAZE, CLAMP, START, EXTREME, REST, FLIGHT, WAIT, HORIZON, TAIL, BALANCE, LOOP, GROWTH,
