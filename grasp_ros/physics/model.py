@@ -3,14 +3,11 @@
 Everything here is written with the paper's letters; every function works on scalars and on NumPy arrays.
 The integrators in this package do not call it, so that tests can hold their results against it.
 
-The impact law, (6), (7), is Hunt-Crossley: Hertz stiffness H u^(3/2) with a damping that is proportional to it,
-p u' H u^(3/2). Condition (10) cuts off its tension: a pair that separates faster than 1/p does not pull. How p
-translates to the symbols of other authors stands in the notation, `grasp_ros.physics`.
+The impact law, (6), (7), is that of Hunt and Crossley, see `impact_law`; how its p translates to the symbols of other
+authors stands in the notation, `grasp_ros.physics`.
 
 References
 ----------
-K. H. Hunt, F. R. E. Crossley: Coefficient of Restitution Interpreted as Damping in Vibroimpact. ASME Journal of
-Applied Mechanics 42 (1975), 440-445.
 T. Fukuda, Y. Shoji, M. Inaba: Stable Position/Force Control of Robotic Manipulator with Consideration of
 Collision Phenomena. IFAC 11th World Congress, Tallinn 1990. Equation numbers below are the paper's.
 """
