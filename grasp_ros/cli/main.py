@@ -27,7 +27,8 @@ from grasp_ros.exact.integrator import (
     compile_kernels,
 )
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
-from grasp_ros.methods.registry import ACCURACY_KNOB, EXACT, METHODS, STEP, TOLERANCE, UNITS
+from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
+from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
 
 Command = Callable[[argparse.Namespace], int]

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.graph.bag import Recording
-from grasp_ros.methods.registry import EXACT, METHODS, UNITS
+from grasp_ros.methods.contract import UNITS
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
@@ -33,14 +34,14 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
         ("status", trajectory.stop or trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
-        ("touches left, right", _touches(trajectory) if method.finds_contacts else "not looked for"),
+        ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
         ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
     ]
     if len(trajectory.t):
         rows.append(("V_c at both ends", _ends(level.V_c)))
     rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
-    if trajectory.method != EXACT and len(trajectory.t):  # only `exact` checks the energy of its steps
+    if not method.energy_check and len(trajectory.t):
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
     return _with_watch(trajectory.scene, rows)
@@ -109,11 +110,23 @@ def compare_recording(recording: Recording, accuracy: float) -> Comparison:
     """Simulate a recorded scene without ROS, with commands that are held and with the paper's continuous feedback."""
     times, scene = recording.t, recording.scene
     same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
-    equal = (same.state.tobytes(), same.command.tobytes()) == (recording.state.tobytes(), recording.command.tobytes())
+    equal = _equal(same, recording)
     if scene.sampled or recording.changes:
         return Comparison(equal, None)
     ideal = simulate(scene, grid=times, accuracy=accuracy)
     return Comparison(equal, np.abs(ideal.state - recording.state).max(axis=0))
+
+
+def _equal(same: Trajectory, recording: Recording) -> bool:
+    """Whether states, commands and the inputs that the bag knows have the same bits."""
+    if len(same.t) != len(recording.t):
+        return False
+    known = ~np.isnan(recording.inputs).any(axis=1)  # not at the last tick
+    pairs = (
+        (same.state, recording.state), (same.command, recording.command),
+        (same.inputs[known], recording.inputs[known]),
+    )
+    return all(simulated.tobytes() == recorded.tobytes() for simulated, recorded in pairs)
 
 
 def _ends(values: Array) -> str:

@@ -92,7 +92,7 @@ def initial_modes(plant: Plant, state: State, settings: Settings) -> None:
     y, mode = state.y, state.mode
     mode[LEFT] = mode_of(plant, y, settings, LEFT, False)
     mode[RIGHT] = mode_of(plant, y, settings, RIGHT, mode[LEFT] == Pair.CONTACT)
-    if mode[LEFT] == Pair.OPEN and mode[RIGHT] == Pair.CONTACT:
+    if mode[RIGHT] == Pair.CONTACT:
         mode[LEFT] = mode_of(plant, y, settings, LEFT, True)
 
 
@@ -187,12 +187,14 @@ def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -
         if mode[side] != Pair.BALLISTIC:
             continue
         found = True
-        w, _ = scales(plant, state, settings, side)
         u, d = y[U_L + side], approach(y, side)
-        if d <= 0.0 or u < 0.0 or u > 1e-3 * sliver(settings.tolerance) * w * w:
-            mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
-            if mode[side] == Pair.OPEN:
-                record(state, side, Transition.RELEASE, u, d, out)
+        if u >= 0.0 and d > 0.0:
+            w, _ = scales(plant, state, settings, side)
+            if u <= 1e-3 * sliver(settings.tolerance) * w * w:
+                continue
+        mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
+        if mode[side] == Pair.OPEN:
+            record(state, side, Transition.RELEASE, u, d, out)
     return found
 
 
@@ -221,7 +223,6 @@ def make_transition(state: State, side: Body, kind: Transition, out: Output) -> 
     if kind in (Transition.TOUCH, Transition.RELEASE):
         y[U_L + side] = 0.0
     if kind == Transition.TOUCH and d <= 0.0:
-        mode[side] = Pair.OPEN
         return
     if kind == Transition.RELEASE:
         mode[side] = Pair.OPEN

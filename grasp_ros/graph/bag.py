@@ -24,10 +24,20 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.energy import Energy, energy
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic, state_of
+from grasp_ros.scene.effects.force import SECTIONS
+from grasp_ros.scene.topics import (
+    CHANGES,
+    EXTERNAL_FORCES,
+    JOINT_STATES,
+    LYAPUNOV,
+    LYAPUNOV_NAMES,
+    SCENE,
+    Topic,
+    state_of,
+)
 
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
@@ -120,7 +130,8 @@ class Recording:
     state : array (n, 6), m and m/s
         NaN for a body that is not there.
     effort, command : arrays (n, 2), N
-        Input forces applied until the tick, commands answered to it; 0 without a controller, NaN where missing.
+        Forces of the controllers that acted until the tick, commands answered to it, which act later if there is a
+        delay; 0 without a controller, NaN where missing.
     outputs : dict of str to array (n,), N
         Impact and external forces by topic; NaN where missing.
     lyapunov : array (n, 6)
@@ -145,6 +156,22 @@ class Recording:
     def t(self) -> Array:
         """Times in s."""
         return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
+
+    @property
+    def inputs(self) -> Array:
+        """What acted on the bodies from each tick to the next: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
+
+        The commands that had arrived, which the next tick names as its effort, and the external forces. NaN where the
+        bag does not hold the next tick: at its end, and before a gap. `simulation.Trajectory.inputs` is the same.
+        """
+        inputs = np.zeros((len(self.tick), 3))
+        inputs[:-1, [LEFT, RIGHT]] = self.effort[1:]
+        external = {body: EXTERNAL_FORCES[name].name for name, body in SECTIONS.items()}
+        if any(topic in self.outputs for topic in external.values()):
+            nothing = np.zeros(len(self.tick))
+            inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
+        inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
+        return inputs
 
     @property
     def energy(self) -> Energy:

@@ -24,8 +24,8 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import kernel
-from grasp_ros.methods.equations import EPS, SLIVER, Solution, Work, parameters, put
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.methods.contract import Problem, Solution
+from grasp_ros.methods.equations import EPS, SLIVER, Work, parameters, put
 
 DONE, NOT_FINITE, NOT_SOLVED = 0, 1, 2
 _STATUS = (Status.DONE, Status.NOT_FINITE, Status.STALLED)
@@ -33,24 +33,11 @@ MOST_ITERATIONS = 100
 STEPS, IMPLICIT_ITERATIONS = int(Work.STEPS), int(Work.IMPLICIT_ITERATIONS)
 
 
-def solve(
-    grasp: Grasp, state: Array, duration: float, grid: Array, step: float, max_events: int
-) -> Solution:
-    """Integrate with a fixed step; outputs between the steps by the parabola that the method follows.
-
-    Parameters
-    ----------
-    grasp : Grasp
-    state : array (6,), m and m/s
-    duration : float, s
-    grid : array (n,), s
-        Ascending output times in [0, duration].
-    step : float, s
-    max_events : int
-        Budget of contact events.
-    """
-    out, work = np.empty((len(grid), 6)), np.zeros(len(Work), dtype=np.int64)
-    outcome, rows = run(parameters(grasp), tuple(state.tolist()), duration, grid, step, out, work)
+def solve(problem: Problem) -> Solution:
+    """Integrate with a fixed step; outputs between the steps by the parabola that the method follows."""
+    q, y = parameters(problem.system), tuple(problem.system.state.tolist())
+    out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
+    outcome, rows = run(q, y, problem.duration, problem.grid, problem.setting, out, work)
     return Solution(out[:rows], np.empty((0, 5)), work, _STATUS[outcome])
 
 

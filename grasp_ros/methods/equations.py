@@ -1,17 +1,17 @@
-"""What all methods share: the compiled right-hand side, the frozen modes, and the record of a solution."""
+"""What the methods that step in time share: the compiled right-hand side, the frozen modes, and their counters."""
 
 from __future__ import annotations
 
 import math
 from enum import IntEnum
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import kernel
-from grasp_ros.physics.layout import LEFT, Pair, Transition
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, Body, Pair, Transition
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import System
 
 OPEN, CONTACT, CLAMPED = int(Pair.OPEN), int(Pair.CONTACT), int(Pair.CLAMPED)
 EPS = 2.0**-52
@@ -28,23 +28,14 @@ class Work(IntEnum):
     IMPLICIT_ITERATIONS = 3  # Newton iterations, or factorised Jacobians
 
 
-class Solution(NamedTuple):
-    """What a method delivers."""
+def parameters(system: System) -> Array:
+    """m, K, C, H, p of the left and of the right side, then m_o, shape (11,), SI; the feedback is in K and C.
 
-    state: Array  # (n, 6), m and m/s; fewer rows than output times if it stopped early
-    event_table: Array  # (m, 5): time, side, kind, u, u'; none if the method does not look for them
-    work: Any  # int array, columns `Work`
-    status: Status
-
-
-def parameters(grasp: Grasp) -> Array:
-    """m, K, C, H, p of the left and of the right side, then m_o, shape (11,), SI; the feedback is in K and C."""
-    sides = ((grasp.left, grasp.left_contact), (grasp.right, grasp.right_contact))
-    rows = [
-        (arm.mass, arm.stiffness + arm.position_gain, arm.damping + arm.velocity_gain, pair.hertzian, pair.dissipation)
-        for arm, pair in sides
-    ]
-    return np.array([*rows[0], *rows[1], grasp.object_mass])
+    Forces and friction are not in it: the paper's grasp has none.
+    """
+    bodies, pairs = system.closed_loop, system.pairs
+    sides = [part for side in (LEFT, RIGHT) for part in (bodies[side, :FORCE], pairs[side])]
+    return np.concatenate([*sides, bodies[OBJECT, [MASS]]])
 
 
 @kernel
@@ -99,10 +90,10 @@ def kind_of(before: int, after: int) -> int:
 
 
 @kernel
-def note(events: Any, count: int, time: float, side: int, kind: int, y: Any) -> None:
+def note(events: Any, count: int, time: float, side: Body, kind: int, y: Any) -> None:
     """Write one row of the record of events."""
     u, d = relative(y, side)
-    events[count, 0], events[count, 1], events[count, 2] = time, side, kind
+    events[count, 0], events[count, 1], events[count, 2] = time, side.value, kind
     events[count, 3], events[count, 4] = u, d
 
 

@@ -26,13 +26,13 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import allocating, kernel
+from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,
     CONTACT,
     EPS,
     OPEN,
     SLIVER,
-    Solution,
     Work,
     along,
     condition,
@@ -45,9 +45,9 @@ from grasp_ros.methods.equations import (
     relative,
 )
 from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.model import Array, Grasp
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
+MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
 DONE, NOT_FINITE, EVENTS_FULL = 0, 1, 2
 _STATUS = (Status.DONE, Status.NOT_FINITE, Status.EVENT_BUDGET)
 STEPS, RIGHT_HAND_SIDES, EVENT_EVALUATIONS = (
@@ -55,28 +55,19 @@ STEPS, RIGHT_HAND_SIDES, EVENT_EVALUATIONS = (
 )
 
 
-def solve(
-    rule: int, grasp: Grasp, state: Array, duration: float, grid: Array, step: float, max_events: int
-) -> Solution:
+def solve(rule: int, problem: Problem) -> Solution:
     """Integrate with a fixed step; outputs between the steps by cubic Hermite interpolation.
 
     Parameters
     ----------
     rule : int
         PLAIN, PAPER or LOCATED.
-    grasp : Grasp
-    state : array (6,), m and m/s
-    duration : float, s
-    grid : array (n,), s
-        Ascending output times in [0, duration].
-    step : float, s
-    max_events : int
-        Budget of contact events.
+    problem : Problem
     """
-    q, y = parameters(grasp), tuple(state.tolist())
-    out, work = np.empty((len(grid), 6)), np.zeros(len(Work), dtype=np.int64)
-    events = np.empty((0 if rule == PLAIN else max_events, 5))  # memory is only touched where it is written
-    outcome, rows, found = run(rule, q, y, duration, grid, step, out, events, work)
+    q, y = parameters(problem.system), tuple(problem.system.state.tolist())
+    out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
+    events = np.empty((0 if rule == PLAIN else min(problem.max_events, MOST_EVENTS), 5))
+    outcome, rows, found = run(rule, q, y, problem.duration, problem.grid, problem.setting, out, events, work)
     return Solution(out[:rows], events[:found].copy(), work, _STATUS[outcome])
 
 
@@ -193,7 +184,7 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
 
 @kernel
 def renew_modes(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, found: int) -> int:
-    """Evaluate (10) at the beginning of a step of the paper's method; returns the number of events.
+    """Evaluate (10) at the beginning of a step of the paper's method; returns the number of events, -1 if full.
 
     A pair that changes exactly here has u at a rounding error of either sign, and keeps its mode.
     """
@@ -201,7 +192,9 @@ def renew_modes(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, 
         now = condition(q, y, side)
         if now == mode[side] or changed[side] == t:
             continue
-        if (now == CONTACT or mode[side] == CONTACT) and found < events.shape[0]:
+        if now == CONTACT or mode[side] == CONTACT:
+            if found == events.shape[0]:
+                return -1
             note(events, found, t, side, kind_of(mode[side], now), y)
             found += 1
         mode[side] = now
@@ -227,6 +220,8 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
         free[:] = rule != PLAIN
         if rule == PAPER:
             found = renew_modes(q, y, t, mode, changed, events, found)
+            if found < 0:
+                return EVENTS_FULL, row, events.shape[0]
         while t < end:
             h = end - t
             push_l, push_r = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT

@@ -13,11 +13,11 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import allocating
+from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,
     CONTACT,
     OPEN,
-    Solution,
     Work,
     condition,
     kind_of,
@@ -25,8 +25,8 @@ from grasp_ros.methods.equations import (
     rates,
     relative,
 )
-from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.physics.layout import DISSIPATION, LEFT, RIGHT
+from grasp_ros.physics.model import Array
 
 TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's event is an event of both
 MAX_IDLE = 100  # events without progress in time
@@ -65,32 +65,33 @@ def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
     return j
 
 
-def straight(
-    name: str, grasp: Grasp, state: Array, duration: float, grid: Array, tolerance: float, max_events: int
-) -> Solution:
-    """Integrate over everything with rtol = atol."""
-    work = np.zeros(len(Work), dtype=np.int64)
-    result = _integrate(name, (0.0, duration), state, grid, (parameters(grasp), True, True), tolerance, None, work)
-    return Solution(_rows(result), np.empty((0, 5)), work, Status.STALLED if result.status < 0 else Status.DONE)
+def straight(name: str, problem: Problem) -> Solution:
+    """Integrate over everything with one of scipy's solvers, rtol = atol."""
+    system, work = problem.system, np.zeros(len(Work), dtype=np.int64)
+    grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
+    args = (parameters(system), True, True)
+    result = _integrate(name, (0.0, problem.duration), system.state, grid, args, problem.setting, None, work)
+    status = Status.STALLED if result.status < 0 else Status.DONE
+    return Solution(_spread(_rows(result), place), np.empty((0, 5)), work, status)
 
 
-def restarted(
-    name: str, grasp: Grasp, state: Array, duration: float, grid: Array, tolerance: float, max_events: int
-) -> Solution:
-    """Integrate from event to event with rtol = atol."""
-    q, work = parameters(grasp), np.zeros(len(Work), dtype=np.int64)
-    mode = [int(condition(q, tuple(state), side)) for side in SIDES]
-    gaps = [_gaps(LEFT, grasp.left_contact.dissipation, work), _gaps(RIGHT, grasp.right_contact.dissipation, work)]
-    t, y, row, idle, states = 0.0, state, 0, 0, []
+def restarted(name: str, problem: Problem) -> Solution:
+    """Integrate from event to event with one of scipy's solvers, rtol = atol."""
+    q, work = parameters(problem.system), np.zeros(len(Work), dtype=np.int64)
+    grid, place = np.unique(problem.grid, return_inverse=True)
+    t, y, row, idle, states = 0.0, problem.system.state, 0, 0, []
+    mode = [int(condition(q, tuple(y), side)) for side in SIDES]
+    gaps = [_gaps(side, problem.system.pairs[side, DISSIPATION], work) for side in SIDES]
     events: list[tuple[float, ...]] = []
-    while True:
+    status: Status | None = None
+    while status is None:
         active = [*gaps[LEFT][mode[LEFT]], *gaps[RIGHT][mode[RIGHT]]]
         args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
-        result = _integrate(name, (t, duration), y, grid[row:], args, tolerance, active, work)
+        result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem.setting, active, work)
         states.append(_rows(result))
         row += len(states[-1])
-        if status := _status(result, len(events) >= max_events, idle > MAX_IDLE):
-            return Solution(np.concatenate(states), np.array(events).reshape(-1, 5), work, status)
+        if status := _status(result, idle > MAX_IDLE):
+            break
         first = next(gap for gap, times in zip(active, result.t_events, strict=True) if len(times))
         at = result.t_events[active.index(first)][0]
         y = result.y_events[active.index(first)][0]
@@ -100,15 +101,15 @@ def restarted(
         for gap in (first, *(gap for gap in active if gap.side != first.side and gap.fires_too(y, f))):
             events.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
             mode[gap.side] = gap.after
+        status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
+    return Solution(_spread(np.concatenate(states), place), np.array(events).reshape(-1, 5), work, status)
 
 
-def _status(result: Any, spent: bool, idle: bool) -> Status | None:
-    """How the integration ended; None if it goes on behind a event."""
+def _status(result: Any, idle: bool) -> Status | None:
+    """How the integration ended; None if it goes on behind an event."""
     if result.status == 0:
         return Status.DONE
-    if result.status < 0 or idle:
-        return Status.STALLED
-    return Status.EVENT_BUDGET if spent else None
+    return Status.STALLED if result.status < 0 or idle else None
 
 
 class _Gap:
@@ -171,3 +172,8 @@ def _integrate(
 
 def _rows(result: Any) -> Array:
     return np.reshape(result.y, (6, -1)).T
+
+
+def _spread(states: Array, place: Any) -> Array:
+    """Rows of distinct times at the places of all output times, as far as there are rows."""
+    return states[place[place < len(states)]]

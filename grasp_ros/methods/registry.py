@@ -1,46 +1,20 @@
-"""The table of all methods, and the one door to those that step in time."""
+"""The table of all methods, and the one check of what they are asked."""
 
 from __future__ import annotations
 
 import importlib.util
-from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
-import numpy as np
-
-from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST
-from grasp_ros.methods import discrete_gradient, fixed_step, library
-from grasp_ros.methods.equations import Solution
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST, MAX_WORK
+from grasp_ros.methods import discrete_gradient, exact, fixed_step, library
+from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method
+from grasp_ros.methods.equations import Work
+from grasp_ros.physics import layout
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import PAPER, Scene
 
 EXACT = "exact"
-STEP, TOLERANCE, ACCURACY_KNOB = "step", "tolerance", "accuracy"
-UNITS = {STEP: " s", TOLERANCE: "", ACCURACY_KNOB: ""}
 MOST_STEPS = 1e9
-MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
-
-
-class Method(NamedTuple):
-    """One way to integrate a grasp."""
-
-    name: str
-    order: str
-    source: str
-    at_touch: str  # what it does at a touch
-    knob: str  # STEP, TOLERANCE or ACCURACY_KNOB
-    default: float
-    ladder: tuple[float, ...]  # settings worth a measurement, loose to tight
-    low: float  # allowed settings, `low` to `high`; a step is limited by the horizon as well
-    high: float
-    solve: Callable[[Grasp, Array, float, Array, float, int], Solution] | None  # None: `simulation.simulate` itself
-    package: str | None = None  # that must be installed
-
-    @property
-    def finds_contacts(self) -> bool:
-        """Whether touches and releases are part of the result."""
-        return self.solve is None or not self.at_touch.startswith("nothing")
 
 
 def _tens(first: float, last: float, per_decade: int = 1) -> tuple[float, ...]:
@@ -58,14 +32,18 @@ _RESTART = "frozen mode; terminal events of scipy, which it looks for at the end
 
 def _fixed(name: str, order: str, source: str, at_touch: str, rule: int) -> Method:
     return Method(
-        name, order, source, at_touch, STEP, 1e-4, _STEPS, 0.0, 1e9, partial(fixed_step.solve, rule)
+        name, order, source, at_touch, STEP, 1e-4, _STEPS, 0.0, 1e9, partial(fixed_step.solve, rule), Work,
+        events=rule != fixed_step.PLAIN,
     )
 
 
 def _scipy(solver: str, order: str, source: str) -> list[Method]:
     ladder = (*_tens(3, 13), 3e-14)  # solve_ivp takes no less than 100 roundings
     return [
-        Method(name, order, source, text, TOLERANCE, 1e-9, ladder, 2.3e-14, 1e-2, partial(solve, solver), "scipy")
+        Method(
+            name, order, source, text, TOLERANCE, 1e-9, ladder, 2.3e-14, 1e-2, partial(solve, solver), Work,
+            events=solve is library.restarted, package="scipy",
+        )
         for name, text, solve in (
             (solver.lower(), _INSIDE, library.straight), (f"{solver.lower()}_events", _RESTART, library.restarted),
         )
@@ -78,7 +56,8 @@ METHODS: dict[str, Method] = {
         Method(
             EXACT, "any, by the accuracy", "this package: grasp_ros/exact",
             "closed-form flight to the touch, which cannot be missed; Taylor series in w = sqrt(u) through the contact",
-            ACCURACY_KNOB, ACCURACY, _tens(3, 16), FINEST, COARSEST, None,
+            ACCURACY_KNOB, ACCURACY, _tens(3, 16), FINEST, COARSEST, exact.solve, layout.Work,
+            events=True, effects=True, sampled=True, work_budget=True, energy_check=True,
         ),
         _fixed(
             "paper", "2 at a touch, 4 elsewhere", "Fukuda, Shoji, Inaba (1990), Simulation Method",
@@ -94,7 +73,7 @@ METHODS: dict[str, Method] = {
         Method(
             "discrete_gradient", "2", "Gonzalez (1996); Celledoni et al. (2012)",
             "nothing is located: a difference quotient spans the touch and conserves V_c", STEP, 1e-4, _STEPS, 0.0, 1e9,
-            discrete_gradient.solve,
+            discrete_gradient.solve, Work, events=False,
         ),
         *_scipy("RK45", "5(4)", f"Dormand, Prince (1980); {_HAIRER}, II.5; scipy"),
         *_scipy("DOP853", "8(5,3)", f"{_HAIRER}, II.5; scipy"),
@@ -104,58 +83,72 @@ METHODS: dict[str, Method] = {
 }
 
 
-def check(name: str, scene: Scene, setting: float | None, sampled: bool = False) -> float:
-    """The setting of a method, if it can do what is asked; the one place that says what methods can.
-
-    The range of `exact` is checked where it is used, in `physics.integrator.Integrator`.
+def find(name: str) -> Method:
+    """A method by its name.
 
     Raises
     ------
-    ValueError
-        If the name or the setting is not allowed, a package is missing, or the scene has something, or lacks
-        something, that only `exact` knows how to treat.
+    Refused
+        If there is none.
     """
     if name not in METHODS:
-        raise ValueError(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
-    method = METHODS[name]
+        raise Refused(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+def check(
+    name: str, scene: Scene, setting: float | None, *, sampled: bool = False, max_work: int = MAX_WORK
+) -> float:
+    """The setting of a method, if it can do what is asked; the one place that refuses what it cannot.
+
+    Parameters
+    ----------
+    name : str
+    scene : Scene
+    setting : float or None
+        None: the method's default, or the whole horizon as a step if that is shorter.
+    sampled : bool
+        Whether commands are held over control periods.
+    max_work : int
+        Another than MAX_WORK is a budget that someone has set.
+
+    Raises
+    ------
+    Refused
+        If the name or the setting is not allowed, a package is missing, or the scene or the run needs what the method
+        does not declare.
+    """
+    method = find(name)
     value = method.default if setting is None else setting
-    if name == EXACT:
-        return value
     low, high = method.low, method.high
     if method.knob == STEP:
         low, high = scene.duration / MOST_STEPS, scene.duration
         value = min(value, high) if setting is None else value
     if not low <= value <= high:
-        raise ValueError(f"{name}: {method.knob} {value!r} is not allowed; allowed: {low:g} to {high:g}")
-    if sampled:
-        raise ValueError(f"{name}: only continuous feedback; allowed for sampled feedback: {EXACT}")
-    if odd := sorted(set(scene.values) ^ PAPER):
-        raise ValueError(
+        raise Refused(f"{name}: {method.knob} {value!r} is not allowed; allowed: {low:g} to {high:g}")
+    if sampled and not method.sampled:
+        raise Refused(f"{name}: only continuous feedback; allowed for sampled feedback: {_able('sampled')}")
+    if max_work != MAX_WORK and not method.work_budget:
+        raise Refused(f"{name}: has no budget of work; allowed with one: {_able('work_budget')}")
+    if not method.effects and (odd := _beside_the_paper(scene)):
+        raise Refused(
             f"{scene.name}: {', '.join(odd)}: {name} knows two arms, an object and their contacts, no more and no less;"
-            f" allowed here: {EXACT}"
+            f" allowed here: {_able('effects')}"
         )
     if method.package is not None and importlib.util.find_spec(method.package) is None:
-        raise ValueError(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
+        raise Refused(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
     return value
 
 
-def solve(name: str, scene: Scene, grid: Array, setting: float, max_events: int) -> Solution:
-    """Integrate a scene with a method that steps in time.
+def _able(capability: str) -> str:
+    """Names of the methods that declare a capability."""
+    return ", ".join(name for name, method in METHODS.items() if getattr(method, capability))
 
-    Parameters
-    ----------
-    name : str
-        A key of METHODS, not EXACT.
-    scene : Scene
-    grid : array (n,), s
-        Ascending output times within the horizon.
-    setting : float
-        Step in s or tolerance (rtol = atol), as `check` gives it.
-    max_events : int
-        Budget of contact events.
-    """
-    run = METHODS[name].solve
-    assert run is not None
-    times, place = np.unique(grid, return_inverse=True)
-    solution = run(scene.grasp, scene.initial_state, scene.duration, times, setting, max_events)
-    return solution._replace(state=solution.state[place[place < len(solution.state)]])
+
+def _beside_the_paper(scene: Scene) -> list[str]:
+    """What a scene has more, or less, than the paper's grasp and its feedback."""
+    forces = [
+        f"{section}.{key}" for section in ("left_feedback", "right_feedback")
+        for key in ("set_point_m", "feed_forward_N") if scene.values.get(section, {}).get(key)
+    ]
+    return sorted([*set(scene.values) ^ PAPER, *forces])

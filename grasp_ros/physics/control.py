@@ -6,15 +6,9 @@ stages the law is the paper's.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from grasp_ros.physics.model import Array
-
-NO_FORCES = np.zeros(3)
 Sense = Callable[[int, float, float], tuple[float, float]]  # tick, x in m, v in m/s to what is measured
 Actuate = Callable[[float], float]  # command in N to command in N
 
@@ -48,21 +42,3 @@ class ControlLaw:
         for actuate in self.actuation:
             force = actuate(force)
         return force
-
-
-class DelayLine:
-    """Commands on their way to the actuators.
-
-    Parameters
-    ----------
-    delay : int
-        Control periods that a command takes; until the first one arrives nothing acts.
-    """
-
-    def __init__(self, delay: int) -> None:
-        self._waiting = deque([NO_FORCES] * delay)
-
-    def pass_on(self, forces: Array) -> Array:
-        """Take the commands of one tick and return those that act from it on, each (3,) in N by body."""
-        self._waiting.append(forces)
-        return self._waiting.popleft()

@@ -1,4 +1,4 @@
-"""Runs in pieces: commands and external forces that are held from tick to tick."""
+"""What closes the loop around `exact`: sampled controllers, and external forces under continuous feedback."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from itertools import pairwise
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.control import DelayLine
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.simulation.sampled_plant import SampledPlant
+from grasp_ros.simulation.trajectory import Loop, tick_of
 
 Progress = Callable[[float], object] | None
 Changes = Mapping[int, Mapping[str, float]]
@@ -23,77 +25,102 @@ def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
 
     Raises
     ------
-    ValueError
+    Refused
         Names the first of them.
     """
     if not changes:
         return
     if not held:
-        raise ValueError("changes: not allowed under continuous feedback; allowed: sampled=True")
+        raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
     live = scene.live
     for tick, numbers in changes.items():
         for name in numbers:
             if name not in live or not 0 <= tick <= scene.ticks:
-                raise ValueError(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
+                raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
-def tick_times(scene: Scene) -> Array:
-    """Times in s of all control periods of a scene, shape (ticks + 1,)."""
-    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
+class SampledLoop:
+    """Controllers that answer at every tick, around a plant.
+
+    Parameters
+    ----------
+    scene : Scene
+    grid : array (n,), s
+        Ascending output times within the horizon.
+    changes : mapping of int to mapping of str to float
+        Numbers of the controllers that are set while it runs, by the tick from which they act.
+    progress : callable or None
+        Called with the time reached, in s.
+    """
+
+    def __init__(self, scene: Scene, grid: Array, changes: Changes, progress: Progress) -> None:
+        self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
+        self._laws = scene.system
+        self._answers: list[Array] = []  # (3,) for each tick
+        self._inputs: list[Array] = []
+
+    def drive(self, integrator: Integrator) -> Array:
+        """States (n, 6) at the output times; only the rows reached, if the integrator stops."""
+        scene = self._scene
+        plant = SampledPlant(scene.system, scene.period_ns, integrator)
+        offsets, rest = _split(self._grid, range(scene.ticks + 1), scene.period_ns)
+        rows = []
+        with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
+            for within in offsets:
+                rows.append(plant.step(self._answer(plant), within))
+                self._inputs.append(plant.inputs)
+                if plant.status is not Status.DONE:
+                    return np.concatenate(rows)
+            self._answer(plant)
+            self._inputs.append(np.full(3, np.nan))  # nothing has acted yet
+        return np.concatenate([*rows, np.repeat(plant.state[None], rest, axis=0)])
+
+    def _answer(self, plant: SampledPlant) -> Array:
+        """Commands (3,) in N by body, from the laws as they are now."""
+        tick = plant.tick
+        if tick in self._changes:
+            self._scene = self._scene.changed(self._changes[tick])
+            self._laws = self._scene.system
+        answers = self._laws.commands(tick, plant.state)
+        self._answers.append(answers)
+        if self._progress is not None and tick % 100 == 0:
+            self._progress(plant.time)
+        return answers
+
+    def record(self, rows: int) -> Loop:
+        """What was answered and what acted, at the first output times."""
+        ticks = tick_of(self._scene, self._grid[:rows])
+        return Loop(np.array(self._answers)[ticks][:, [LEFT, RIGHT]], np.array(self._inputs)[ticks])
 
 
-def continuous_run(scene: Scene, integrator: Integrator, grid: Array) -> Array:
-    """States (n, 6) under continuous feedback and external forces."""
+def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
+    """States (n, 6) under continuous feedback and external forces; only the rows reached, if the integrator stops.
+
+    An interval lasts until a force changes: cutting it at every tick would only cost time.
+    """
     system = scene.system
-    if not system.external:
-        return integrator.advance(scene.duration, grid)
     changes = {tick for force in system.external for tick in force.changes(scene.ticks)}
-    return _piecewise(scene, integrator, grid, sorted({0, *changes, scene.ticks}), system.external_at)
-
-
-def sampled_run(
-    scene: Scene, integrator: Integrator, grid: Array, changes: Changes, progress: Progress
-) -> tuple[Array, Array]:
-    """States (n, 6), and the commands (n, 2) that the controllers gave last."""
-    system = scene.system
-    line = DelayLine(system.delay)
-    commands = np.empty((scene.ticks + 1, 2))
-
-    def forces(tick: int) -> Array:
-        nonlocal scene, system
-        if tick in changes:
-            scene = scene.changed(changes[tick])
-            system = scene.system
-        answers = system.commands(tick, integrator.state)
-        commands[tick] = answers[LEFT], answers[RIGHT]
-        if progress is not None and tick % 100 == 0:
-            progress(scene.time_of(tick))
-        acting: Array = line.pass_on(answers) + system.external_at(tick)
-        return acting
-
-    with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
-        states = _piecewise(scene, integrator, grid, range(scene.ticks + 1), forces)
-        if integrator.status is Status.DONE:
-            forces(scene.ticks)
-    latest = np.searchsorted(tick_times(scene), grid[: len(states)], side="right") - 1
-    return states, commands[latest]
-
-
-def _piecewise(scene: Scene, integrator: Integrator, grid: Array, ticks: Sequence[int],
-               forces: Callable[[int], Array]) -> Array:
-    """Integrate from tick to tick under forces (3,) that are held; each piece [t, t') delivers its own outputs."""
-    ends = np.asarray(ticks) * scene.period_ns / NANOSECONDS
-    lengths = np.diff(ticks) * scene.period_ns / NANOSECONDS
-    bounds = np.searchsorted(grid, ends, side="left")
-    last = bounds[-1]
-    piece_of = np.searchsorted(ends, grid[:last], side="right") - 1
-    offsets = np.clip(grid[:last] - ends[piece_of], 0.0, lengths[piece_of])
-    rows = [np.empty((0, 6))]
-    pieces = zip(ticks, ends.tolist(), lengths.tolist(), pairwise(bounds.tolist()), strict=False)
-    for tick, begin, length, (first, end) in pieces:
-        integrator.set_input(forces(tick))
-        rows.append(integrator.advance(length, offsets[first:end], begin))
+    ticks = sorted({0, *changes, scene.ticks})
+    offsets, rest = _split(grid, ticks, scene.period_ns)
+    rows = []
+    for (begin, end), within in zip(pairwise(ticks), offsets, strict=True):
+        integrator.set_input(system.external_at(begin))
+        rows.append(integrator.advance((end - begin) * scene.period_ns / NANOSECONDS, within, scene.time_of(begin)))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
-    rows.append(np.repeat(integrator.state[None], len(grid) - last, axis=0))
-    return np.concatenate(rows)
+    return np.concatenate([*rows, np.repeat(integrator.state[None], rest, axis=0)])
+
+
+def _split(grid: Array, ticks: Sequence[int], period_ns: int) -> tuple[list[Array | None], int]:
+    """Output times by the intervals [t, t') between ticks, each from its beginning, and how many lie at the end.
+
+    None stands for an interval without any.
+    """
+    times = np.asarray(ticks) * period_ns / NANOSECONDS
+    lengths = np.diff(ticks) * period_ns / NANOSECONDS
+    bounds = np.searchsorted(grid, times, side="left")
+    last = int(bounds[-1])
+    interval = np.searchsorted(times, grid[:last], side="right") - 1
+    offsets = np.clip(grid[:last] - times[interval], 0.0, lengths[interval])
+    parts = [offsets[first:end] if first < end else None for first, end in pairwise(bounds.tolist())]
+    return parts, len(grid) - last

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from grasp_ros.methods.registry import UNITS
+from grasp_ros.methods.contract import UNITS
 from grasp_ros.scene import Scene
 from grasp_ros.studies import accuracy
 from grasp_ros.studies.contenders import own_contenders

@@ -10,11 +10,10 @@ import numpy as np
 
 from grasp_ros import simulation
 from grasp_ros.exact.integrator import Status
-from grasp_ros.methods import equations
+from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.library import slopes
-from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
-from grasp_ros.physics.layout import Work as ExactWork
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.studies import peer_heyoka, peer_sundials
@@ -43,18 +42,16 @@ def _simulated(name: str, scene: Scene, setting: float) -> Solve:
     package = METHODS[name].package
     if package is not None and importlib.util.find_spec(package) is None:
         raise ImportError(package)
-    finds = METHODS[name].finds_contacts
+    finds = METHODS[name].events
 
     def solve(grid: Array) -> Answer:
         motion = simulation.simulate(scene, grid=grid, method=name, setting=setting)
         left, right = (len(motion.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
         touches = (left, right) if finds else None
         status = "done" if motion.status is Status.DONE else motion.status.value
-        if name == EXACT:
-            steps = int(motion.work[ExactWork.FLIGHTS] + motion.work[ExactWork.CONTACT_STEPS])
-            return Answer(motion.state, touches, status, steps, None)
-        steps, rhs = int(motion.work[equations.Work.STEPS]), int(motion.work[equations.Work.RIGHT_HAND_SIDES])
-        return Answer(motion.state, touches, status, steps, rhs)
+        counts = motion.counters
+        steps = sum(counts.get(counter, 0) for counter in ("steps", "flights", "contact steps"))
+        return Answer(motion.state, touches, status, steps, counts.get("right hand sides"))
 
     return solve
 
@@ -63,7 +60,7 @@ def _odeint(scene: Scene, tolerance: float) -> Solve:
     """LSODA over everything, with its loop over the steps outside Python."""
     from scipy.integrate import odeint
 
-    args = (equations.parameters(scene.grasp), True, True)
+    args = (parameters(scene.system), True, True)
 
     def solve(grid: Array) -> Answer:
         times = grid if grid[0] == 0.0 else np.concatenate([[0.0], grid])

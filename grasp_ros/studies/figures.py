@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from grasp_ros.methods.registry import STEP
+from grasp_ros.methods.contract import STEP
 from grasp_ros.studies.accuracy import by_method, frontier
 from grasp_ros.studies.drift import Drift
 from grasp_ros.studies.loop import Point

@@ -56,7 +56,7 @@ def _solver(formula: str, settings: Any, tolerance: float, **options: Any) -> An
 
 def _straight(formula: str, scene: Scene, tolerance: float) -> Solve:
     """Over everything, with the events inside the right-hand side."""
-    solver = _solver(formula, (parameters(scene.grasp), True, True), tolerance)
+    solver = _solver(formula, (parameters(scene.system), True, True), tolerance)
 
     def solve(grid: Array) -> Answer:
         times = np.unique(np.concatenate([[0.0, 0.5 * grid[-1]], grid]))  # two would ask for the solver's own steps
@@ -69,7 +69,7 @@ def _straight(formula: str, scene: Scene, tolerance: float) -> Solve:
 
 def _restarted(formula: str, scene: Scene, tolerance: float) -> Solve:
     """From touch to release to touch; the mode is frozen in between."""
-    q = parameters(scene.grasp)
+    q = parameters(scene.system)
     solvers: dict[tuple[bool, bool], Any] = {}
     for mode in ((left, right) for left in (False, True) for right in (False, True)):
         def watch(t: float, y: Array, out: Array, settings: Any) -> None:

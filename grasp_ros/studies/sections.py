@@ -11,7 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from grasp_ros.methods.registry import EXACT, METHODS, TOLERANCE
+from grasp_ros.methods.contract import TOLERANCE
+from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.studies import accuracy, predictability
 from grasp_ros.studies.document import prose, table
 from grasp_ros.studies.drift import Drift

@@ -8,10 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Integrator
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp, feedback
+from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.layout import FORCE, LEFT, V_L, X_L
+from grasp_ros.physics.model import Arm, Array
 from grasp_ros.physics.sampled import spectral_radii, spectral_radius
 from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.simulation import SampledPlant
 
 FIRST_S, LAST_S, SCAN = 1e-4, 10.0, 3000  # periods that are looked at for the first crossing
 TICKS = 4000
@@ -40,18 +43,17 @@ def first_limit(arm: Arm, delay: int) -> float:
 
 
 def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) -> float:
-    """Growth per period of a free arm in the plant's own simulation, from the second half of the run."""
-    far, none = Arm(1.0, 0.0, 0.0, 0.0, 0.0), Contact(1.0, 0.0)
-    start = np.array([1e-150, 0.0, 1e150, 0.0, 2e150, 0.0])  # room to grow without ever meeting the object
-    integrator = Integrator(System.of(Grasp(arm, far, none, none, 1.0), start), continuous=False)
-    waiting = [0.0] * delay
+    """Growth per period of an arm alone in the plant's own simulation, from the second half of the run."""
+    system = System(delay=delay, laws={LEFT: ControlLaw(arm.position_gain, arm.velocity_gain)})
+    system.bodies[LEFT, :FORCE] = arm.mass, arm.stiffness, arm.damping
+    system.state[X_L] = 1e-150  # room to grow
+    plant = SampledPlant(system, period * NANOSECONDS)
     sizes = []
     for tick in range(ticks):
-        x, v = integrator.state[:2]
-        sizes.append(math.hypot(math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * x, v))
-        waiting.append(feedback(arm, x, v))
-        integrator.set_input(np.array([waiting.pop(0), 0.0, 0.0]))
-        integrator.advance(period, start=tick * period)
+        state = plant.state
+        speed = math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * state[X_L]
+        sizes.append(math.hypot(speed, state[V_L]))
+        plant.step(system.commands(tick, state))
     half = ticks // 2
     window = ticks // 8  # maxima over a window: the phase of the oscillation drops out
     return float((max(sizes[-window:]) / max(sizes[half - window : half])) ** (1.0 / (ticks - half)))

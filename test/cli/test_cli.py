@@ -55,7 +55,7 @@ def test_simulate_writes_what_the_function_returns(tmp_path: Path) -> None:
         (["simulate", "case_01", "--set", "left_arm.mass_kg=0"], "left_arm.mass_kg: 0 is not allowed; allowed: a num"),
         (["simulate", "case_01", "--set", "left_arm.mass=1"], "--set left_arm.mass=1: no such key; allowed: "),
         (["simulate", "case_01", "--set", "mass"], "--set mass: not understood; allowed: section.key=value"),
-        (["simulate", "case_01", "--accuracy", "1"], "accuracy: 1.0 is outside [1e-16, 0.001]"),
+        (["simulate", "case_01", "--accuracy", "1"], "exact: accuracy 1.0 is not allowed; allowed: 1e-16 to 0.001"),
         (["simulate", "case_01", "--grid", "1"], "1 is not allowed; allowed: a whole number >= 2"),
         (["simulate", "case_01", "--max-work", "1e3"], "1e3 is not allowed; allowed: a whole number >= 1"),
         (["simulate", "case_01", "--method", "paper", "--tolerance", "1"], "--tolerance is not allowed; allowed for"),

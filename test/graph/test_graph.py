@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.layout import LEFT, OBJECT
 from grasp_ros.physics.model import impact_forces
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV_NAMES, RIGHT_COMMAND, SCENE, state_of
 from grasp_ros.simulation import simulate
@@ -73,7 +75,26 @@ def test_graph_bag_and_simulation_are_equal_bit_for_bit(two_runs: tuple[Path, Pa
     assert simulated.command.tobytes() == recording.command.tobytes()
     assert simulated.t.tobytes() == recording.t.tobytes()
     assert np.array_equal(recording.effort[1:], recording.command[:-1])
+    assert simulated.inputs.tobytes() == recording.inputs.tobytes()
     assert len({*simulated.events}) >= 12  # the run has contacts to be equal in
+
+
+def test_a_comparison_sees_inputs_that_differ_and_leaves_out_what_the_bag_does_not_know(
+    two_runs: tuple[Path, Path]
+) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    assert compare_recording(recording, ACCURACY).equal
+    effort = recording.effort.copy()
+    effort[1000, 0] = np.nextafter(effort[1000, 0], np.inf)
+    assert not compare_recording(replace(recording, effort=effort), ACCURACY).equal
+    cut = {name: getattr(recording, name)[:500] for name in ("tick", "state", "effort", "command", "lyapunov")}
+    begin = replace(recording, **cut)
+    assert np.isnan(begin.inputs[-1]).all()
+    assert begin.inputs[:-1].tobytes() == recording.inputs[:499].tobytes()
+    assert compare_recording(begin, ACCURACY).equal
+    gap = {name: np.delete(values, 100, axis=0) for name, values in cut.items()}
+    assert np.flatnonzero(np.isnan(replace(recording, **gap).inputs[:, 0])).tolist() == [99, 498]
+    assert compare_recording(replace(recording, **gap), ACCURACY).equal
 
 
 def test_two_runs_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:
@@ -129,7 +150,8 @@ def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
 @pytest.mark.parametrize("name", ["noise", "everything", "hammer", "no_contact", "friction_slide"])
 def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) -> None:
     """Simulation, graph and bag; and nothing is there that the scene does not name."""
-    settings = ["time.duration_s=1.0", *(["object_pulse.start_s=0.3"] if name == "everything" else [])]
+    more = ["object_pulse.start_s=0.3", "left_actuator.limit_N=30"] if name == "everything" else []
+    settings = ["time.duration_s=1.0", *more]
     graph = Graph(scene.load(name, settings), tmp_path / "run", ACCURACY)
     graph.start()
     try:
@@ -140,6 +162,11 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
     recording = bag.read(graph.bag)
     comparison = compare_recording(recording, ACCURACY)
     assert comparison.equal
+    inputs = simulate(recording.scene, sampled=True).inputs
+    assert recording.inputs.tobytes() == inputs.tobytes()
+    if more:  # a delay, a limit, and a pulse that all act
+        assert inputs[0].tolist() == [0.0, 0.0, 0.0]
+        assert (np.nanmax(np.abs(inputs[:, LEFT])), np.nanmax(inputs[:, OBJECT])) == (30.0, 30.0)
     assert not any(recording.missing.values())
     assert not recording.lyapunov[:, 5].any()
     assert {topic for topic, _, _ in content(tmp_path / "run")} == {

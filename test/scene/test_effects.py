@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +12,15 @@ import yaml
 from oracles import CASES, flight_array
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import PAPER, Scene
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
-from grasp_ros.simulation import Trajectory, simulate
-from grasp_ros.simulation.closed_loop import tick_times
+from grasp_ros.simulation import SampledPlant, Trajectory, simulate
+from grasp_ros.simulation.trajectory import tick_times
 from grasp_ros.studies.effects import registry_table, variants
 
 OTHERS = [name for name in scenes.names() if name not in CASES]
@@ -73,16 +74,11 @@ def test_certificate_holds_or_says_why_not(name: str) -> None:
 
 
 def balance(motion: Trajectory) -> list:
-    """Energy balance of every control period of a sampled motion; the inputs come from the commands and the delay."""
-    system = motion.scene.system
-    line = deque([np.zeros(2)] * system.delay)
-    rows = []
-    for tick in range(motion.scene.ticks):
-        line.append(motion.command[tick])
-        forces = system.external_at(tick)
-        forces[: len(line[0])] += line.popleft()
-        rows.append(energy_balance(system, motion.state[tick], motion.state[tick + 1], forces))
-    return rows
+    """Energy balance of every control period of a sampled motion."""
+    return [
+        energy_balance(motion.scene.system, motion.state[tick], motion.state[tick + 1], motion.inputs[tick])
+        for tick in range(motion.scene.ticks)
+    ]
 
 
 def test_the_energy_balance_notices_a_gain() -> None:
@@ -256,17 +252,16 @@ def test_a_knocked_object_comes_back() -> None:
 
 
 def plain_loop(scene: Scene, delay: int) -> Array:
-    """The loop written out: commands wait in a list."""
-    integrator = Integrator(scene.system, continuous=False)
+    """The loop written out: commands wait in a list, around a plant that knows of no delay."""
+    plant = SampledPlant(replace(scene.system, delay=0), scene.period_ns)
     waiting: deque[Array] = deque([np.zeros(3)] * delay)
-    states = [integrator.state]
-    for tick in range(scene.ticks):
-        x_l, v_l, _, _, x_r, v_r = integrator.state
+    states = [plant.state]
+    for _ in range(scene.ticks):
+        x_l, v_l, _, _, x_r, v_r = plant.state
         waiting.append(np.array([-5.0 * x_l - 0.5 * v_l, -5.0 * x_r - 0.5 * v_r, 0.0]))
-        integrator.set_input(waiting.popleft())
-        integrator.advance(scene.period_ns / 1e9, start=scene.time_of(tick))
-        assert integrator.status is Status.DONE
-        states.append(integrator.state)
+        plant.step(waiting.popleft())
+        assert plant.status is Status.DONE
+        states.append(plant.state)
     return np.array(states)
 
 

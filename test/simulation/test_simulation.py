@@ -16,8 +16,8 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
-from grasp_ros.simulation.closed_loop import tick_times
+from grasp_ros.simulation import GRID_POINTS, SampledPlant, Trajectory, load, simulate
+from grasp_ros.simulation.trajectory import tick_times
 
 
 def scene_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001, *settings: str) -> Scene:
@@ -28,15 +28,14 @@ def scene_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001
 def plain_loop(scene: Scene) -> tuple[Array, Array]:
     """Sampled feedback as the graph does it: states and commands at the ticks."""
     grasp = scene.grasp
-    integrator = Integrator(System.of(grasp, scene.initial_state), continuous=False)
-    states, forces = [integrator.state], []
+    plant = SampledPlant(System.of(grasp, scene.initial_state), scene.period_ns)
+    states, forces = [plant.state], []
     for _ in range(scene.ticks):
-        x_l, v_l, _, _, x_r, v_r = integrator.state
+        x_l, v_l, _, _, x_r, v_r = plant.state
         forces.append((feedback(grasp.left, x_l, v_l), feedback(grasp.right, x_r, v_r)))
-        integrator.set_input(np.array([*forces[-1], 0.0]))
-        integrator.advance(scene.period_ns / 1e9)
-        assert integrator.status is Status.DONE
-        states.append(integrator.state)
+        plant.step(np.array([*forces[-1], 0.0]))
+        assert plant.status is Status.DONE
+        states.append(plant.state)
     return np.array(states), np.array(forces)
 
 
@@ -133,6 +132,7 @@ def test_file_holds_everything(tmp_path: Path, name: str, sampled: bool) -> None
         assert np.array_equal(data["t"], result.t)
         assert np.array_equal(data["state"], result.state)
         assert np.array_equal(data["command"], result.command)
+        assert np.array_equal(data["inputs"], result.inputs, equal_nan=True)
         for key, values in zip(("V", "V_c", "V_rate", "mode"), level, strict=True):
             assert np.array_equal(data[key], values)
         for side, word in ((LEFT, "left"), (RIGHT, "right")):
@@ -157,8 +157,8 @@ def assert_same(a: Trajectory, b: Trajectory) -> None:
     assert a.events == b.events
     assert all(type(event.kind) is Transition for event in a.events)
     assert a.status is b.status
-    for name in ("t", "state", "command", "work"):
-        assert np.array_equal(getattr(a, name), getattr(b, name))
+    for name in ("t", "state", "command", "inputs", "work"):
+        assert np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
 
 
 def test_file_of_a_run_without_events(tmp_path: Path) -> None:
@@ -246,11 +246,12 @@ def test_stability_limit_of_a_sampled_free_arm(gains: tuple[float, float], limit
                     "right_arm.stiffness_N_per_m=0",
                 ],
             )
-            integrator = Integrator(System.of(scene.grasp, np.array([*state, 1e6, 0.0, 2e6, 0.0])), continuous=False)
-            integrator.set_input(np.array([feedback(scene.grasp.left, *state), 0.0, 0.0]))
-            integrator.advance(period)
+            system = System.of(scene.grasp, np.array([*state, 1e6, 0.0, 2e6, 0.0]))
+            integrator = Integrator(system, continuous=False)
+            plant = SampledPlant(system, period * 1e9, integrator)
+            plant.step(np.array([feedback(scene.grasp.left, *state), 0.0, 0.0]))
             assert integrator.events == []
-            columns.append(integrator.state[:2])
+            columns.append(plant.state[:2])
         return float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())
 
     assert radius(limit) == pytest.approx(1.0, abs=1e-11)

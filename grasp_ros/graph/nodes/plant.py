@@ -20,10 +20,9 @@ from grasp_ros.exact.integrator import ACCURACY, Integrator, Status, compile_ker
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode, run
-from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.model import Array
-from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, SCENE, WINDOW
+from grasp_ros.simulation.sampled_plant import SampledPlant
 
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
@@ -45,12 +44,10 @@ class Plant(GraspNode):
         if not kernels_on_disk():
             self.get_logger().info(COMPILING)
         compile_kernels()
-        self._integrator = Integrator(self._system, continuous=False, accuracy=accuracy)
-        self._tick = 0
+        integrator = Integrator(self._system, continuous=False, accuracy=accuracy)
+        self._plant = SampledPlant(self._system, self._scene.period_ns, integrator)
         self._recorded = -1  # last tick that the monitor has complete
-        self._line = DelayLine(self._system.delay)
         self._commands: dict[int, float] = {}
-        self._inputs = np.zeros(3)
         self._begin = math.nan
         self.counters.update(tick=0, **{"stale commands": 0, "repeated commands": 0, "refused commands": 0})
         self._bar = tqdm(total=self._scene.ticks, unit="tick", desc=self._scene.name, disable=not progress)
@@ -97,16 +94,16 @@ class Plant(GraspNode):
             self.wall_timer(UNCONTROLLED_SECONDS, self._advance)
 
     def _publish(self) -> None:
-        time_ns = self._tick * self._scene.period_ns
-        state = self._integrator.state
+        tick, state = self._plant.tick, self._plant.state
+        time_ns = tick * self._scene.period_ns
         self._simulated.publish(messages.clock(time_ns))
         for publisher, value in self._forces:
-            publisher.publish(messages.wrench(time_ns, value(self._system, self._tick, state)))
-        self._states.publish(messages.joint_state(time_ns, self._system.present, state, self._inputs))
+            publisher.publish(messages.wrench(time_ns, value(self._system, tick, state)))
+        self._states.publish(messages.joint_state(time_ns, self._system.present, state, self._plant.effort))
 
     def _on_command(self, side: int, message: Any) -> None:
         force = message.wrench.force.x
-        if messages.to_ns(message.header.stamp) != self._tick * self._scene.period_ns:
+        if messages.to_ns(message.header.stamp) != self._plant.tick * self._scene.period_ns:
             self.count("stale commands")
         elif not math.isfinite(force):
             self.count("refused commands")
@@ -121,22 +118,20 @@ class Plant(GraspNode):
         self._advance()
 
     def _advance(self) -> None:
-        last = self._tick == self._scene.ticks
+        tick = self._plant.tick
+        last = tick == self._scene.ticks
         lead = 0 if last else WINDOW
         complete = len(self._commands) == len(self._system.laws)
-        if self.finished or not complete or (self._monitored and self._tick - self._recorded > lead):
+        if self.finished or not complete or (self._monitored and tick - self._recorded > lead):
             return
         if last:
             self._finish()
             return
-        self._inputs = self._line.pass_on(self._take_commands())
-        self._integrator.set_input(self._inputs + self._system.external_at(self._tick))
-        self._integrator.advance(self._scene.period_ns / NANOSECONDS, start=self._scene.time_of(self._tick))
-        if self._integrator.status is not Status.DONE:
-            self._fail(self._integrator.stop)
+        self._plant.step(self._take_commands())
+        if self._plant.status is not Status.DONE:
+            self._fail(self._plant.stop)
             return
-        self._tick += 1
-        self.counters["tick"] = self._tick
+        self.counters["tick"] = self._plant.tick
         self._publish()
 
     def _take_commands(self) -> Array:
@@ -159,7 +154,7 @@ class Plant(GraspNode):
         self.finished = True
 
     def _show(self) -> None:
-        self._bar.update(self._tick - self._bar.n)
+        self._bar.update(self._plant.tick - self._bar.n)
 
     def close(self) -> None:
         """End the progress bar, and deliver what a finished run has published."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.control import DelayLine
 from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.scene import Scene
@@ -32,20 +31,10 @@ def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]], 
     return composed("case_01", {**values, **{key: dict(content) for key, content in added.items()}})
 
 
-def forces_of(trajectory: Trajectory) -> np.ndarray:
-    """Forces (n - 1, 3) that acted over the control periods of a sampled run, from its commands."""
-    system = trajectory.scene.system
-    line = DelayLine(system.delay)
-    rows = []
-    for tick, (left, right) in enumerate(trajectory.command[:-1]):
-        rows.append(line.pass_on(np.array([left, right, 0.0])) + system.external_at(tick))
-    return np.array(rows)
-
-
 def residual(trajectory: Trajectory) -> float:
     """Largest positive residual of the energy balance of a control period, in units of what rounding may add."""
     states = np.nan_to_num(trajectory.state)
-    book = energy_balance(trajectory.scene.system, states[:-1], states[1:], forces_of(trajectory))
+    book = energy_balance(trajectory.scene.system, states[:-1], states[1:], trajectory.inputs[:-1])
     return float((np.maximum(book.residual, 0.0) / np.maximum(book.rounding, LEAST)).max())
 
 

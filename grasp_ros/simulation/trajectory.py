@@ -1,0 +1,172 @@
+"""What a simulation delivers, its file, and the ticks of its output times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import ACCURACY, Event, Status, to_events
+from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
+
+
+def tick_times(scene: Scene) -> Array:
+    """Times in s of all control periods of a scene, shape (ticks + 1,)."""
+    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
+
+
+def tick_of(scene: Scene, t: Array) -> NDArray[np.int64]:
+    """The last tick at or before each time in s, shape (n,)."""
+    return np.searchsorted(tick_times(scene), t, side="right") - 1
+
+
+class Loop(NamedTuple):
+    """What went through a sampled loop, at n output times; see `Trajectory.command` and `Trajectory.inputs`."""
+
+    command: Array  # (n, 2), N
+    inputs: Array  # (n, 3), N by body
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """A simulated or recorded motion.
+
+    Attributes
+    ----------
+    scene : Scene
+    t : array (n,), s
+    state : array (n, 6), m and m/s
+        x_l, v_l, x_o, v_o, x_r, v_r; NaN for a body that is not there.
+    loop : Loop or None
+        Commands and inputs of sampled controllers at the output times; None under continuous feedback.
+    event_table : array (m, 5)
+        Time in s, side, kind, u in m and u' in m/s of every event, in the order of time; see `events`.
+    work : array of int
+        Counters, named by `counters`.
+    status : Status
+    method : str
+        A key of `methods.registry.METHODS`.
+    setting : float
+        Its accuracy, step in s, or tolerance.
+    stop : str
+        Why and where a run of `exact` stopped, with time, contact mode and state; empty if it did not.
+    """
+
+    scene: Scene
+    t: Array
+    state: Array
+    loop: Loop | None
+    event_table: Array
+    work: np.ndarray
+    status: Status
+    method: str = EXACT
+    setting: float = ACCURACY
+    stop: str = ""
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the commands were held over control periods."""
+        return self.loop is not None
+
+    @property
+    def counters(self) -> dict[str, int]:
+        """The work by its names."""
+        return {entry.name.lower().replace("_", " "): int(self.work[entry]) for entry in METHODS[self.method].counters}
+
+    @property
+    def command(self) -> Array:
+        """What the controllers answered: f_l, f_r (n, 2) in N; 0 without a controller.
+
+        In a sampled loop the answer to the last tick at or before the output time, as it left the controller: limited,
+        and not yet delayed. Under continuous feedback the answer to the state itself, (4), (5).
+        """
+        if self.loop is not None:
+            return self.loop.command
+        answers: Array = self.scene.system.commands(0, self.state.T)[:2].T
+        return answers
+
+    @property
+    def inputs(self) -> Array:
+        """What acted on the bodies from each output time on: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
+
+        In a sampled loop the commands that had arrived, limited and delayed, and the external forces, all of which stay
+        the same up to the next tick. Under continuous feedback `command` and the external forces. NaN at the end of the
+        horizon, from where on nothing has acted. A bag has the same, `graph.bag.Recording.inputs`.
+        """
+        if self.loop is not None:
+            return self.loop.inputs
+        system, ticks = self.scene.system, tick_of(self.scene, self.t)
+        inputs: Array = np.zeros((len(self.t), 3))
+        inputs[:, [LEFT, RIGHT]] = self.command
+        if system.external:
+            several, place = np.unique(ticks, return_inverse=True)
+            inputs += np.reshape([system.external_at(tick) for tick in several.tolist()], (-1, 3))[place]
+        inputs[ticks == self.scene.ticks] = np.nan
+        return inputs
+
+    @property
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode at the output times."""
+        return energy(self.scene.system, self.state)
+
+    @property
+    def events(self) -> list[Event]:
+        """The events as records."""
+        return to_events(self.event_table)
+
+    def times(self, kind: Transition, side: int) -> Array:
+        """Times in s of one side's events of a kind."""
+        chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
+        return chosen
+
+    def save(self, path: Path) -> None:
+        """Write everything to a .npz file.
+
+        Raises
+        ------
+        OSError
+            If the file cannot be written.
+        """
+        level = self.energy
+        with path.open("wb") as file:
+            np.savez_compressed(
+                file, t=self.t, state=self.state, command=self.command, inputs=self.inputs,
+                V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode,
+                touch_left=self.times(Transition.TOUCH, LEFT), touch_right=self.times(Transition.TOUCH, RIGHT),
+                release_left=self.times(Transition.RELEASE, LEFT), release_right=self.times(Transition.RELEASE, RIGHT),
+                events=self.event_table, work=self.work,
+                work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
+                method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
+                scene_name=self.scene.name, scene=self.scene.to_yaml(),
+            )
+
+
+def load(path: Path) -> Trajectory:
+    """Read what `Trajectory.save` wrote.
+
+    Raises
+    ------
+    Refused
+        If the file is not such a file.
+    """
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
+            loop = Loop(data["command"], data["inputs"])
+            return Trajectory(
+                scene, data["t"], data["state"], loop if data["sampled"] else None, data["events"], data["work"],
+                Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["stop"]),
+            )
+    except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
+        raise Refused(f"{path}: not a file of `grasp simulate`: {error}") from None
