@@ -7,7 +7,7 @@ SLOWER ?= 30%
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-.PHONY: demo test lint install study benchmark clean
+.PHONY: demo test lint install study benchmark mutants clean
 
 demo: install
 	$(BIN)/grasp run case_01
@@ -35,6 +35,10 @@ benchmark: install
 	$(BIN)/pytest benchmarks -W default --benchmark-storage=runs/benchmarks --benchmark-autosave \
 	    --benchmark-columns=min,median,rounds \
 	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))
+
+# Deletes or negates every branch of the automaton in turn; a test must fail for each.
+mutants: install
+	$(BIN)/python test/exact/mutants.py
 
 $(VENV)/ready: setup.py constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12) and 'Python 3.11 or 3.12 is needed')"

@@ -25,7 +25,8 @@ import numpy as np
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import kernel
 from grasp_ros.methods.contract import Problem, Solution
-from grasp_ros.methods.equations import EPS, SLIVER, Work, parameters, put
+from grasp_ros.methods.equations import SLIVER, Work, parameters, put
+from grasp_ros.physics.layout import EPS
 
 DONE, NOT_FINITE, NOT_SOLVED = 0, 1, 2
 _STATUS = (Status.DONE, Status.NOT_FINITE, Status.STALLED)

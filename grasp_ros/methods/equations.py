@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import kernel
 from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, Body, Pair, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
 OPEN, CONTACT, CLAMPED = int(Pair.OPEN), int(Pair.CONTACT), int(Pair.CLAMPED)
-EPS = 2.0**-52
 SLIVER = 1e-9  # of a step: what rounding may leave at the end of the horizon
 TOUCH, RELEASE, CLAMP, REENTRY = (int(kind) for kind in tuple(Transition)[:4])
 
@@ -24,7 +23,7 @@ class Work(IntEnum):
 
     STEPS = 0  # steps, and parts of steps between events
     RIGHT_HAND_SIDES = 1
-    EVENT_EVALUATIONS = 2  # trial steps or interpolants that look for a event
+    EVENT_EVALUATIONS = 2  # trial steps or interpolants that look for an event
     IMPLICIT_ITERATIONS = 3  # Newton iterations, or factorised Jacobians
 
 
@@ -45,10 +44,10 @@ def rates(q: Any, push_l: bool, push_r: bool, y: Any) -> Any:
     f_l, f_r = 0.0, 0.0
     if push_l:
         u = max(x_l - x_o, 0.0)
-        f_l = q[3] * (u * math.sqrt(u)) * max(1.0 + q[4] * (v_l - v_o), 0.0)
+        f_l = elastic_force(q[3], u) * max(damping_factor(q[4], v_l - v_o), 0.0)
     if push_r:
         u = max(x_o - x_r, 0.0)
-        f_r = q[8] * (u * math.sqrt(u)) * max(1.0 + q[9] * (v_o - v_r), 0.0)
+        f_r = elastic_force(q[8], u) * max(damping_factor(q[9], v_o - v_r), 0.0)
     a_l = (-q[1] * x_l - q[2] * v_l - f_l) / q[0]
     a_r = (-q[6] * x_r - q[7] * v_r + f_r) / q[5]
     return v_l, a_l, v_o, (f_l - f_r) / q[10], v_r, a_r
@@ -76,7 +75,7 @@ def condition(q: Any, y: Any, side: int) -> int:
     u, d = relative(y, side)
     if not u >= 0.0:
         return OPEN
-    return CONTACT if 1.0 + q[4 + 5 * side] * d >= 0.0 else CLAMPED
+    return CONTACT if damping_factor(q[4 + 5 * side], d) >= 0.0 else CLAMPED
 
 
 @kernel

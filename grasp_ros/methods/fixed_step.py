@@ -24,13 +24,13 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import allocating, kernel
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,
     CONTACT,
-    EPS,
     OPEN,
     SLIVER,
     Work,
@@ -44,7 +44,7 @@ from grasp_ros.methods.equations import (
     rates,
     relative,
 )
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import EPS, LEFT, RIGHT
 
 PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
@@ -102,7 +102,7 @@ def distance(q: Any, y: Any, side: int, mode: int, after: int) -> float:
         return u
     if after == OPEN:
         return -u
-    rest = 1.0 + q[4 + 5 * side] * d
+    rest = damping_factor(q[4 + 5 * side], d)
     return -rest if after == CLAMPED else rest
 
 
@@ -114,7 +114,7 @@ def next_mode(q: Any, y: Any, side: int, mode: int) -> int:
         return CONTACT if u > 0.0 else OPEN
     if u < 0.0:
         return OPEN
-    rest = 1.0 + q[4 + 5 * side] * d
+    rest = damping_factor(q[4 + 5 * side], d)
     if mode == CONTACT:
         return CLAMPED if rest < 0.0 else CONTACT
     return CONTACT if rest > 0.0 else CLAMPED

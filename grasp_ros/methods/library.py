@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
 from grasp_ros.exact.jit import allocating
 from grasp_ros.methods.contract import Problem, Solution
@@ -51,7 +52,7 @@ def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
         sign = 1.0 if side == 0 else -1.0
         j[x, v], j[v, x], j[v, v] = 1.0, -K / m, -C / m
         u, d = sign * (y[x] - y[2]), sign * (y[v] - y[3])
-        factor = 1.0 + p * d
+        factor = damping_factor(p, d)
         if not (push_l if side == 0 else push_r) or u <= 0.0 or factor <= 0.0:
             continue
         by_u, by_d = 1.5 * H * np.sqrt(u) * factor, p * H * u * np.sqrt(u)
