@@ -1,31 +1,6 @@
-"""Exact relations that decide tests and hard cases, in mpmath with 40 digits; nothing here calls a kernel.
+"""Exact relations that decide hard cases, in mpmath with 40 digits; nothing here calls a kernel.
 
-O1 to O15 in cases, tests and pages are these relations. K = k + Kp, C = c + Kv; continuous feedback unless said.
-
-O1   Impact of two free bodies with p = 0, reduced mass mu, approach speed v: depth (5 mu v^2 / (4 H))^(2/5),
-     duration (4/5) B(2/5, 1/2) depth / v, exit speed v.
-O2   The same with p > 0: exit speed (1 + W0(-(1 + z) e^-(1 + z))) / p with z = p v, below 1/p whatever v; depth and
-     duration from the first integral mu u' du' = -H u^(3/2) (1 + p u') du.
-O3   Balances along any motion. Momentum: the sums of m v, C x and the integral of K x - f are constant together.
-     Energy: V_c + 2 W is, with W' = C v^2 of each arm, p H u^(3/2) u'^2 of a pair in contact, -H u^(3/2) u' of a
-     clamped one. Under held commands: the energy of the plant changes by their work less W.
-O4   An under-damped arm released at rest first passes 0 at (pi - atan2(w, s)) / w, s = C / 2m, w = sqrt(K/m - s^2),
-     wherever it started; one that is not under-damped never does.
-O5   In a symmetric scene the object stays at exactly 0.
-O6   Sides swapped and signs changed: the mirror image, bit for bit.
-O7   Lengths times L, times times S, masses times A: K A/S^2, C A/S, H A/(S^2 sqrt L), p S/L; bit for bit for L a
-     power of 4, S and A powers of 2.
-O8   For C = p = 0 the motion backwards in time is a motion.
-O9   Equal arms with C > 0: in the end V_c = (4/5) H (kappa t)^(-5/2) with
-     kappa = (9/5) C H^2 / (K^2 m_o) 0.240369360865381648; infinitely many contacts, about t^(3/4).
-O10  Three free bodies with gaps, the left one comes with speed 1: their impacts one after the other, by O1 or O2.
-O11  The same without gaps, p = 0: final speeds that depend on the ratios of the masses alone.
-O12  Symmetric arms with C = p = 0, m = 1, K = 15, H = 1e4, released at 0.3 m: period 0.88931643572931156661 s.
-O13  An arm whose peak overshoots a face at rest by e, p = 0, deceleration a: contact for 2 sqrt(2 e / a), impulse
-     (3 pi / 8) H e^2 sqrt(2 / a), both up to O(e^(3/2)); no event for e < 0.
-O14  Rest points that overlap by d hold the object with the force f of
-     f/K_l + f/K_r + (f/H_l)^(2/3) + (f/H_r)^(2/3) = d.
-O15  Two touches a short d apart (K = C = 0): the final speed of the object is proportional to d.
+docs/oracles.md defines O1 to O15: what each says and decides, the functions that compute it, and where it is used.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The families of the hard cases: why their cases are hard, and what decides whether a result is right.
 
-The order is that of the page. O1 to O15 are defined in `grasp_ros.verification.oracles`.
+The order is that of the page. docs/oracles.md defines O1 to O15.
 """
 
 from __future__ import annotations
