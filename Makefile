@@ -12,6 +12,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 demo: install
 	$(BIN)/grasp run case_01
 
+# All tests, some minutes; `pytest -m "not slow"` runs those that take seconds.
 test: lint
 	$(BIN)/pytest
 

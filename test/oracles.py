@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY, Integrator
+from grasp_ros.exact.integrator import ACCURACY, Integrator, Status
 from grasp_ros.physics import energy as certificate
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
@@ -24,6 +24,7 @@ __all__ = ["Balance", "Impact", "first_touch_from_rest", "flight", "impact", "re
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 ELASTIC = Arm(1.0, 10.0, 0.0, 5.0, 0.0)
 FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
+AT_REST = [-0.3, 0.0, 0.0, 0.0, 0.5, 0.0]  # the standard release, m and m/s
 CASES = [f"case_{number:02d}" for number in range(1, 12)]
 
 
@@ -84,6 +85,17 @@ def run(grasp: Grasp, state: Any, duration: float, grid: Any = None, **options: 
     options = {"continuous": True, "accuracy": ACCURACY, **options}
     integrator = Integrator(System.of(grasp, np.asarray(state, dtype=float)), **options)
     return Run(integrator, integrator.advance(duration, None if grid is None else np.asarray(grid)))
+
+
+def kinds(result: Run) -> list[tuple[str, int]]:
+    """Events without their times."""
+    return [(event.kind.name, event.side) for event in result.integrator.events]
+
+
+def done(result: Run) -> Integrator:
+    """The integrator of a run that must have reached its end."""
+    assert result.integrator.status is Status.DONE
+    return result.integrator
 
 
 def balance_of(grasp: Grasp, state: Any, duration: float, **options: Any) -> Balance:

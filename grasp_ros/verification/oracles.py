@@ -110,6 +110,48 @@ def impact_numbers(m1: float, m2: float, hertzian: float, p: float, speed: float
         return float(law.duration), float(law.restitution)
 
 
+def chain_speeds(mass: Any, p: Any) -> tuple[float, float, float]:
+    """O10: speeds behind the last impact of a separated chain 1 : mass : 1 whose first body comes with 1."""
+    masses, v = [mpf(1), mpf(mass), mpf(1)], [mpf(1), mpf(0), mpf(0)]
+    while (pair := next((i for i in (0, 1) if v[i] > v[i + 1]), None)) is not None:
+        front, back = masses[pair : pair + 2]
+        speed, momentum = v[pair] - v[pair + 1], front * v[pair] + back * v[pair + 1]
+        leave = _exit(p * speed) / p if p else speed
+        v[pair] = (momentum - back * leave) / (front + back)
+        v[pair + 1] = v[pair] + leave
+    return float(v[0]), float(v[1]), float(v[2])
+
+
+def elastic_period(mass: Any, stiffness: Any, hertzian: Any, x: Any) -> Any:
+    """O12: period of an undamped arm that is released at rest at distance x from an object that does not move."""
+    mass, stiffness, hertzian, x = (mpf(value) for value in (mass, stiffness, hertzian, x))
+
+    def missing(u: Any, v: Any) -> Any:
+        """Square of the speed at the depth u, times the mass, if it is 0 at the depth v."""
+        return stiffness * (v * v - u * u) + mpf("0.8") * hertzian * (v ** mpf("2.5") - u ** mpf("2.5"))
+
+    depth = mp.findroot(lambda d: missing(0, d) - stiffness * x * x, (mpf(0), x), solver="anderson", tol=mp.eps**2)
+
+    def rate(angle: Any) -> Any:
+        """dt/d(angle) with u = depth cos(angle)^2, analytic at both ends."""
+        u = depth * mp.cos(angle) ** 2
+        return depth * mp.sin(2 * angle) / mp.sqrt(missing(u, depth) / mass)
+
+    return mp.pi * mp.sqrt(mass / stiffness) + 2 * mp.quad(rate, [0, mp.pi / 2], method="gauss-legendre")
+
+
+def tail_rate(damping: Any, stiffness: Any, hertzian: Any, mass: Any) -> Any:
+    """O9: kappa in 1/(m s); the amplitude of the object's last swing tends to 1 / (kappa t)."""
+    share = mp.beta(mpf("0.8"), mpf("1.5")) / mp.beta(mpf("0.4"), mpf("0.5"))
+    return mpf("1.8") * mpf(damping) * mpf(hertzian) ** 2 / (mpf(stiffness) ** 2 * mpf(mass)) * share
+
+
+def graze(overshoot: Any, deceleration: Any, hertzian: Any) -> tuple[float, float]:
+    """O13: duration and impulse of an elastic contact so weak that the arm goes on along its own arc."""
+    eps, a = mpf(overshoot), mpf(deceleration)
+    return float(2 * mp.sqrt(2 * eps / a)), float(3 * mp.pi / 8 * mpf(hertzian) * eps**2 * mp.sqrt(2 / a))
+
+
 def first_peak(x: float, mass: float, stiffness: float, damping: float) -> Any:
     """Where an under-damped arm that is released at rest at x first turns."""
     s = mpf(damping) / (2 * mpf(mass))

@@ -8,9 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
-from grasp_ros.verification.cases.case import Case, Product, Solver
+from grasp_ros.verification.cases.case import Case, Product, Solver, recorded
 from grasp_ros.verification.cases.families import RELATION
 from grasp_ros.verification.cases.scenes import ELASTIC, composed, distance, grasp, library, part
 
@@ -18,6 +19,7 @@ SWAPPED = [4, 5, 2, 3, 0, 1]
 FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
 DIRECTED = ("position_m", "velocity_m_per_s", "set_point_m", "feed_forward_N", "force_N", "angle_rad")
 PAIRED = {"left": "right", "right": "left"}
+OTHER_SIDE = {LEFT: RIGHT, RIGHT: LEFT, OBJECT: OBJECT}
 
 
 def mirrored(scene: Scene) -> Scene:
@@ -58,16 +60,23 @@ def started(scene: Scene, state: Array) -> Scene:
 
 
 def mirror(scene: Scene, solver: Solver) -> float:
-    """Largest difference between a scene and its mirror image."""
+    """Largest difference between a scene and its mirror image; the recorded events must be equal, too."""
     times = part(scene, 201)
-    here, there = solver.states(scene, times), solver.states(mirrored(scene), times)
+    here, own = solver.states(scene, times), recorded(solver)
+    there, image = solver.states(mirrored(scene), times), recorded(solver)
+    if own is not None and sorted(own) != sorted(event._replace(side=OTHER_SIDE[event.side]) for event in image or ()):
+        return np.inf
     return float(np.abs(here + there[:, SWAPPED]).max())
 
 
 def scaling(length: float, time: float, mass: float, scene: Scene, solver: Solver) -> float:
-    """Largest difference between a scene and itself in other units."""
+    """Largest difference between a scene and itself in other units; the recorded events must be equal, too."""
     times = part(scene, 201)
-    here, there = solver.states(scene, times), solver.states(scaled(scene, length, time, mass), time * times)
+    here, own = solver.states(scene, times), recorded(solver)
+    there, image = solver.states(scaled(scene, length, time, mass), time * times), recorded(solver)
+    expected = [(time * event.time, event.side, event.kind) for event in own or ()]
+    if expected != [(event.time, event.side, event.kind) for event in image or ()]:
+        return np.inf
     return float(np.abs(here * np.array([length, length / time] * 3) - there).max())
 
 
@@ -90,8 +99,8 @@ def splitting(scene: Scene, parts: int, solver: Solver) -> float:
 
 def _grid(scene: Scene, product: Product) -> float:
     """Output times must not change the motion."""
-    few, many = (product.run(scene, part(scene, points)).state for points in (2, 20001))
-    return float(np.abs(few[-1] - many[-1]).max())
+    few, many = (product.run(scene, part(scene, points)) for points in (2, 20001))
+    return float(np.abs(few.state[-1] - many.state[-1]).max()) if few.events == many.events else np.inf
 
 
 def _absent(product: Product) -> float:

@@ -148,6 +148,7 @@ def test_short_and_long_form_meet() -> None:
 
 @pytest.mark.parametrize("amplitude", [0.3, 0.5, 1e-9, 1e9])
 def test_first_touch_from_rest_does_not_depend_on_the_amplitude(amplitude: float) -> None:
+    """O4."""
     t, _ = root(GRAZING_ARM, STILL, (-amplitude, 0.0, 0.0, 0.0), 100.0)
     assert t == pytest.approx(float(first_touch_from_rest(1.0, 15.0, 0.7)), rel=1e-15)
     mirrored, _ = root(GRAZING_ARM, STILL, (amplitude, 0.0, 0.0, 0.0), 100.0, sign=-1.0)
@@ -217,6 +218,7 @@ SCENES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scene", SCENES)
 def test_the_first_touch_of_random_scenes(scene: Any) -> None:
     arm, at = scene
@@ -232,6 +234,7 @@ def test_the_first_touch_of_random_scenes(scene: Any) -> None:
         assert t == pytest.approx(expected, rel=0, abs=1e-14 * (1 + omega) / max(abs(float(speed) - at[3]), 1e-3))
 
 
+@pytest.mark.slow
 def test_the_random_scenes_have_all_kinds_of_answers() -> None:
     found = [scan(arm, *at, 12.0) for arm, at in SCENES]
     assert 4 <= sum(map(math.isinf, found)) <= 36
@@ -327,6 +330,7 @@ def test_reentry_of_a_separating_pair() -> None:
     assert 0.0 < t == pytest.approx(float(expected), rel=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("body", [(1.0, 15.0, 0.7, 0.0), (2.0, 3.0, 30.0, 0.0), (1.0, 0.0, 2.0, 0.0), STILL])
 def test_the_bound_holds_and_is_not_idle(body: Body) -> None:
     for q, q_rate in ((1.0, 0.0), (0.2, 3.0), (-0.5, 2.0), (0.0, -1.0)):

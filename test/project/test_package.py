@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow  # builds and installs
+
 ROOT = Path(__file__).parents[2]
 EXECUTABLES = {"plant", "left_controller", "right_controller", "monitor", "grasp"}
 

@@ -72,6 +72,11 @@ def test_nothing_lies_loose_at_the_root() -> None:
     }
 
 
+def test_tests_mirror_the_rooms() -> None:
+    tests = Path(__file__).parents[1]
+    assert {path.parent.relative_to(tests).as_posix() for path in tests.rglob("test_*.py")} == {*ROOMS, "project"}
+
+
 @pytest.mark.parametrize("name", SOURCES)
 def test_each_library_has_its_place(name: str) -> None:
     found = tops(name)

@@ -1,4 +1,4 @@
-"""The certificate: theorems of docs/certificate.md, the scenes whose V jumps, and the limits of the control period."""
+"""The certificate: theorems of docs/certificate.md, and the scenes whose V jumps."""
 
 from __future__ import annotations
 
@@ -9,12 +9,10 @@ from oracles import STANDARD, energy, run
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Contact, Grasp, hertzian_force, impact_force, in_contact
-from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import certificate
 from grasp_ros.studies.certificate import SCENES, jumps, safe_p
-from grasp_ros.studies.stability import first_limit
 from grasp_ros.verification.reference import integrate
 
 PAPER = [name for name in scenes.names() if name.startswith("case_")]
@@ -124,21 +122,6 @@ def test_theorem_4_one_lossy_contact_is_enough(losses: tuple[float, float]) -> N
     level = energy(grasp, states).V_c
     assert level[2] < 0.1 * level[1] < 0.01 * level[0]
     assert abs(states[2, 2]) < 0.1
-
-
-@pytest.mark.parametrize(
-    ("gains", "delay", "limit"),
-    [((5.0, 0.5), 0, 0.275056637414546), ((5.0, 0.5), 1, 0.0887780231816513), ((50.0, 5.0), 0, 0.2027695528985455)],
-)
-def test_limits_of_the_control_period(gains: tuple[float, float], delay: int, limit: float) -> None:
-    arm = STANDARD._replace(position_gain=gains[0], velocity_gain=gains[1])
-    assert first_limit(arm, delay) == pytest.approx(limit, rel=1e-12)
-    assert spectral_radius(arm, 1.001 * limit, delay) > 1.0 > spectral_radius(arm, 0.999 * limit, delay)
-
-
-def test_stability_returns_in_an_island() -> None:
-    inside, before, behind = (spectral_radius(STANDARD, period, 0) for period in (2.0, 1.6, 2.7))
-    assert inside < 1.0 < min(before, behind)
 
 
 def test_theorem_5_holds_through_contacts() -> None:

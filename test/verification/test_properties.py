@@ -72,6 +72,7 @@ def test_isolated_impacts_of_any_kind(hertzian: float, speed: float, loss: float
     assert impact_error(1.0, 10.0**mass, 10.0**hertzian, (loss,), 10.0**speed, Product()) <= 1e-11
 
 
+@pytest.mark.slow
 @settings(FIXED, max_examples=25)
 @given(st.floats(2.0, 8.0), st.floats(-2.0, 1.3), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5), st.floats(0.0, 6.0))
 def test_agreement_with_an_independent_method(hertzian: float, p: float, mass: float, v: float, damping: float) -> None:
@@ -84,6 +85,7 @@ def test_agreement_with_an_independent_method(hertzian: float, p: float, mass: f
 @settings(FIXED, max_examples=60)
 @given(st.floats(0.0, 8.0), st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_elastic_motion_runs_backwards(hertzian: float, mass: float, v_l: float, v_o: float) -> None:
+    """O8."""
     scene = grasp([-0.3, v_l, 0.05, v_o, 0.3, 0.2], 1.0, left=ELASTIC, contact=Contact(10.0**hertzian, 0.0),
                   mass=10.0**mass)
     assert reversal(scene, Product()) < 1e-9

@@ -13,6 +13,8 @@ from gmpy2 import mpfr
 from grasp_ros.physics.model import Arm, Contact, Grasp
 from grasp_ros.verification.reference import Reference, integrate
 
+pytestmark = pytest.mark.slow  # 20 s in 30 digits
+
 FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
 NOTHING = Contact(0.0, 0.0)
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
@@ -102,6 +104,7 @@ def test_the_elastic_case_keeps_its_energy() -> None:
 
 
 def test_first_contact_of_the_standard_case() -> None:
+    """O4."""
     result = integrate(CASES[1][0], AT_REST, [0.0, 0.6], digits=25, decimal=True)
     s, w = mpfr("0.35"), gmpy2.sqrt(15 - mpfr("0.35") ** 2)
     assert close(result.touches[0][0], (gmpy2.const_pi() - gmpy2.atan2(w, s)) / w, "1e-25")
@@ -129,6 +132,7 @@ def two_bodies(m1: float, m2: float, hertzian: float, p: Any, speed: Any) -> Ref
 
 
 def test_hertz_impact_lasts_as_long_as_the_beta_function_says() -> None:
+    """O1."""
     result = two_bodies(1.0, 1.0, 1e4, 0.0, 1.0)
     beta = gmpy2.gamma(mpfr("0.4")) * gmpy2.gamma(mpfr("0.5")) / gmpy2.gamma(mpfr("0.9"))
     depth = gmpy2.root((mpfr(5) / 80000) ** 2, 5)  # (5 mu v^2 / 4 H)^(2/5), mu = 1/2
@@ -146,6 +150,7 @@ def test_hertz_impact_lasts_as_long_as_the_beta_function_says() -> None:
 def test_damped_impact_has_the_restitution_of_its_first_integral(
     m1: float, m2: float, hertzian: float, p: float, speed: float
 ) -> None:
+    """O2."""
     result = two_bodies(m1, m2, hertzian, p, speed)
     z = mpfr(repr(p)) * mpfr(repr(speed))
     # u' + ln(1 - u') for the exit equals its value for the approach: z - ln(1 + z) = -(y + ln(1 - y)), y = p v_o
@@ -155,6 +160,7 @@ def test_damped_impact_has_the_restitution_of_its_first_integral(
 
 
 def test_an_elastic_symmetric_scene_is_periodic() -> None:
+    """O12."""
     period = mpfr("0.88931643572931156661")
     scene = grasp(ELASTIC, 1e4, 0.0, 3.0)
     first, second = integrate(scene, [-0.3, 0.0, 0.0, 0.0, 0.3, 0.0], [0.0, 2.0, 2.0 + period], decimal=True).state[1:]
@@ -188,6 +194,7 @@ def test_an_asymmetric_pair_comes_back_into_contact() -> None:
     ],
 )
 def test_a_touching_chain(object_mass: float, speeds: tuple[str, ...]) -> None:
+    """O11."""
     scene = grasp(FREE, 1e4, 0.0, object_mass)
     result = integrate(scene, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0], digits=20, decimal=True)
     assert all(close(a, b, "2e-18") for a, b in zip(result.state[-1][1::2], speeds, strict=True))
@@ -195,6 +202,7 @@ def test_a_touching_chain(object_mass: float, speeds: tuple[str, ...]) -> None:
 
 @pytest.mark.parametrize(("overshoot", "touches"), [("1e-6", 1), ("1e-15", 1), ("-1e-15", 0), ("-1e-6", 0)])
 def test_grazing_is_neither_missed_nor_invented(overshoot: str, touches: int) -> None:
+    """O13."""
     face = mpfr("0.22558827400810285623") - mpfr(overshoot)
     scene = Grasp(STANDARD, FREE, Contact(1e4, 0.0), NOTHING, 1.0)
     result = integrate(scene, [-0.3, 0.0, face, 0.0, 50.0, 0.0], [0.0, 1.0], digits=25, decimal=True)
@@ -207,6 +215,7 @@ def test_grazing_is_neither_missed_nor_invented(overshoot: str, touches: int) ->
 
 @pytest.mark.parametrize("delay", ["1e-3", "1e-8", "1e-16", "1e-22"])
 def test_touches_that_are_nearly_simultaneous(delay: str) -> None:
+    """O15."""
     scene = grasp(FREE, 1e4, 0.3, 1.0)
     start = [-1.0, 1.0, 0.0, 0.0, 1 + mpfr(delay), -1.0]
     result = integrate(scene, start, [0.0, 1.5], digits=30, decimal=True)

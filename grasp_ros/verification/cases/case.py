@@ -72,6 +72,11 @@ class Product:
         return self.run(scene, [scene.duration]).events
 
 
+def recorded(solver: Solver) -> list[Event] | None:
+    """Events that the product recorded in its last run; None of another solver, which need not look for them."""
+    return solver.runs[-1].events if isinstance(solver, Product) else None
+
+
 @dataclass(frozen=True)
 class Case:
     """A hard case.
@@ -104,6 +109,11 @@ class Case:
     product_only: bool = False
     max_events: int = MAX_EVENTS
     max_work: int = MAX_WORK
+
+    @property
+    def oracle(self) -> str:
+        """What decides: the oracle of the family, and where it differs the note."""
+        return f"{self.family.oracle}; {self.note}" if self.note else self.family.oracle
 
 
 @dataclass(frozen=True)

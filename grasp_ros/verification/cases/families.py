@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 REFERENCE = "reference with 25 digits, all states, each relative to its largest value"
+MOMENTUM, ENERGY = 1e-13, 2e-12  # what the balances may be off, relative
 
 
 class Family(NamedTuple):
@@ -28,8 +29,7 @@ CHAIN = Family(
 )
 CREEP = Family(
     "creep", "The pair opens along u' = -1/p, so closely that rounding cannot tell it from the surface itself.",
-    "duration of the impact from the first integral of (6), relative; promised are 4 roundings of the speeds, whose"
-    " difference is 1/p",
+    "O2: duration and exit speed, relative; promised are 4 roundings of the speeds, whose difference is 1/p",
 )
 TOUCH = Family(
     "touch", "Both sides touch at once, or nearly so, or one side touches while the other is in contact: a solver"
@@ -61,7 +61,7 @@ WAIT = Family(
 )
 HORIZON = Family(
     "horizon", "Up to 50 000 impacts: the motion is unpredictable after 50 s, its energy and its period are not, and"
-    " errors must not add up.", "V_c, which is constant, relative",
+    " errors must not add up.", "O3: V_c, which is constant, relative",
 )
 TAIL = Family(
     "tail", "Bounces get smaller for ever: no stall, no end, amplitudes below 1e-30 m.",
@@ -69,7 +69,7 @@ TAIL = Family(
 )
 BALANCE = Family(
     "balance", "An error that no single state shows.",
-    "O3: momentum in units of 1e-12, energy in units of 1e-10, both relative",
+    f"O3: momentum in units of {MOMENTUM:g}, energy in units of {ENERGY:g}, both relative",
 )
 LOOP = Family(
     "loop", "Held commands do work, near the stability limit of the loop and beyond it; the energy balance must close"

@@ -67,7 +67,8 @@ def _one_period(product: Product) -> float:
     """One control period of 3 s with many contacts in it, beside the reference under the same forces."""
     scene = _case_01(3.0, 1, {})
     expected = reference(scene, [0.0, 3.0], force=(1.5, -2.5), feedback=False)
-    return float(np.abs(product.run(scene, sampled=True).state[1] - expected[1]).max())
+    run = product.run(scene, sampled=True)
+    return float(np.abs(run.state[1] - expected[1]).max()) if len(run.events) >= 4 else np.inf
 
 
 def cases() -> Iterator[Case]:

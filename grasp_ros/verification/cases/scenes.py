@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Event
+from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.scene import Scene
 from grasp_ros.scene.validation import check_together, read_sections
-from grasp_ros.verification.reference import integrate
+from grasp_ros.verification.reference import Reference, integrate
 
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 ELASTIC = Arm(1.0, 10.0, 0.0, 5.0, 0.0)
@@ -21,6 +23,7 @@ FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
 PERIOD = 1e-3  # s
 STIFF = Contact(1e4, 0.1)  # of Table 1
 AWAY = 1e8  # m, where a body is that shall meet nobody
+BEGIN, END = (Transition.TOUCH, Transition.REENTRY), (Transition.RELEASE, Transition.CLAMP)  # of a contact
 
 
 def composed(name: str, sections: Mapping[str, Mapping[str, Any]]) -> Scene:
@@ -68,15 +71,33 @@ def library(name: str, seconds: float) -> Scene:
 
 @lru_cache(maxsize=256)
 def _reference(paper: Grasp, start: tuple[float, ...], times: tuple[float, ...], force: tuple[float, float],
-               feedback: bool) -> Array:
-    return integrate(paper, start, times, digits=25, force=force, feedback=feedback).as_array()
+               feedback: bool) -> Reference:
+    return integrate(paper, start, times, digits=25, force=force, feedback=feedback)
+
+
+def reference_run(scene: Scene, times: Sequence[float] | Array, force: tuple[float, float] = (0.0, 0.0),
+                  feedback: bool = True) -> Reference:
+    """States and contacts by another method with 25 digits."""
+    ticks = tuple(float(t) for t in times)
+    return _reference(scene.grasp, tuple(scene.initial_state.tolist()), ticks, force, feedback)
 
 
 def reference(scene: Scene, times: Sequence[float] | Array, force: tuple[float, float] = (0.0, 0.0),
               feedback: bool = True) -> Array:
-    """States (n, 6) by another method with 25 digits."""
-    ticks = tuple(float(t) for t in times)
-    return _reference(scene.grasp, tuple(scene.initial_state.tolist()), ticks, force, feedback)
+    """States (n, 6) of `reference_run`."""
+    return reference_run(scene, times, force, feedback).as_array()
+
+
+def contacts(events: Sequence[Event], side: int) -> tuple[Array, Array]:
+    """Begins and ends, in s, of one side's contact in the sense of (10).
+
+    A clamped pair that parts is in contact no more: its release is no second end.
+    """
+    own = [event for event in events if event.side == side]
+    before = [None, *(event.kind for event in own)]
+    begins = [event.time for event in own if event.kind in BEGIN]
+    ends = [event.time for event, last in zip(own, before, strict=False) if event.kind in END and last not in END]
+    return np.array(begins), np.array(ends)
 
 
 def distance(found: Array, expected: Array) -> float:

@@ -1,0 +1,44 @@
+"""Scenes of the tests: documents with one thing replaced, and scenes of the package with other numbers."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import yaml
+
+from grasp_ros import scene as scenes
+from grasp_ros.scene import Scene, load
+
+BASE: dict[str, Any] = yaml.safe_load(load("case_01").to_yaml())
+
+
+def document(section: str, key: str, value: Any) -> str:
+    """Case 1 with one number replaced."""
+    result = copy.deepcopy(BASE)
+    result[section][key] = value
+    return yaml.safe_dump(result, sort_keys=False)
+
+
+def text_with(old: str, new: str) -> str:
+    """Case 1 with one line replaced as text."""
+    text = load("case_01").to_yaml()
+    assert text.count(old) >= 1
+    return text.replace(old, new, 1)
+
+
+def scene_of(name: str, *settings: str, without: tuple[str, ...] = ()) -> Scene:
+    """A scene of the package with other numbers, or without some of its sections."""
+    document = yaml.safe_load(scenes.load(name, settings).to_yaml())
+    kept = {key: value for key, value in document.items() if key not in without}
+    return scenes.parse(yaml.safe_dump(kept, sort_keys=False), name, name)
+
+
+def case_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001, *settings: str) -> Scene:
+    """A case with another length and control period."""
+    return scenes.load(name, [f"time.duration_s={duration!r}", f"time.control_period_s={period!r}", *settings])
+
+
+def horizon(name: str, seconds: float, *settings: str) -> Scene:
+    """A scene over another time."""
+    return scenes.load(name, [f"time.duration_s={seconds}", *settings])

@@ -1,0 +1,172 @@
+"""Contacts: how often, when and how deep, by closed forms; and what is recorded of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+from oracles import AT_REST, CASES, ELASTIC, FREE, STANDARD, done, energy, impact, kinds, make_grasp, run
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
+from grasp_ros.physics.model import Arm, Contact, Grasp
+from grasp_ros.verification.cases.scenes import BEGIN
+from grasp_ros.verification.oracles import elastic_period, graze, impact_numbers
+
+IMPACTS = [
+    (1.0, 1.0, 1e4, 0.0, 1.0),
+    (1.0, 1.0, 1e4, 0.3, 1.0),
+    (2.0, 3.0, 1e9, 0.5, 0.01),
+    (1.0, 1e-3, 1e5, 10.0, 3.0),
+    (1.0, 1.0, 1e4, 1e-8, 1.0),
+    (1.0, 1.0, 1e4, 10.0, 1.0),
+    (1.0, 1.0, 1e12, 0.1, 1.0),
+    (1e-6, 1.0, 1e4, 0.1, 1.0),
+    (1e6, 1.0, 1e4, 0.1, 1.0),
+    (1.0, 1.0, 1e4, 1e-9, 1e8),
+    (1.0, 1.0, 1e4, 0.3, 1e-8),
+    (1.0, 1.0, 1e4, 0.3, 1e-20),
+    (1.0, 1.0, 1e-3, 0.1, 1.0),
+    *((1.0, 1.0, 1e4, 0.0, 10.0**k) for k in (8, -8, -12, -16, -18, -20, -22, -24, -30)),
+]
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize(("m1", "m2", "hertzian", "p", "speed"), IMPACTS)
+def test_an_impact_is_one_touch_and_keeps_the_momentum(
+    m1: float, m2: float, hertzian: float, p: float, speed: float, mirror: bool
+) -> None:
+    duration, _ = impact_numbers(m1, m2, hertzian, p, speed)
+    arms = FREE._replace(mass=m1), FREE
+    start = [-speed, speed, 0.0, 0.0, 1e3 * speed * (1 + duration), 1e3 * speed]  # touches after exactly 1 s
+    if mirror:
+        arms = arms[::-1]
+        start = [-value for value in start[4:6] + start[2:4] + start[0:2]]
+    contacts = Contact(hertzian, p), Contact(hertzian, p)
+    result = run(Grasp(*arms, *contacts, m2), start, 1 + duration * 1.1, [1 + duration / 2])
+    assert kinds(result) == [("TOUCH", RIGHT if mirror else LEFT), ("RELEASE", RIGHT if mirror else LEFT)]
+    assert done(result).events[0].time == 1.0
+    state = result.integrator.state * (-1 if mirror else 1)
+    assert m1 * state[5 if mirror else 1] + m2 * state[3] == pytest.approx(m1 * speed, rel=1e-14)
+
+
+@pytest.mark.parametrize("p", [0.0, 0.3, 10.0])
+def test_depth_of_a_single_impact(p: float) -> None:
+    """O1 and O2."""
+    law = impact(0.5, 1e4, p, 1.0)
+    times = np.linspace(1.0, 1.0 + float(law.duration), 2001)
+    states = run(make_grasp(FREE, 1e4, p, 1.0), [-1.0, 1.0, 0.0, 0.0, 50.0, 0.0], 2.0, times).states
+    depth = (states[:, 0] - states[:, 2]).max()
+    assert depth == pytest.approx(float(law.depth), rel=1e-5)
+    assert depth <= float(law.depth) * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("speed", [10.0**k for k in (8, 4, 0, -4, -8, -10, -12, -14, -16, -20)])
+def test_simultaneous_impacts_of_any_speed(speed: float) -> None:
+    law = impact(1, 1e4, 0, speed)  # each arm meets an object that does not move: its own mass counts
+    duration = float(law.duration)
+    result = run(make_grasp(FREE, 1e4, 0.0, 1.0), [-speed, speed, 0.0, 0.0, speed, -speed], 1 + 1.01 * duration)
+    assert sorted(kinds(result)) == [("RELEASE", 0), ("RELEASE", 1), ("TOUCH", 0), ("TOUCH", 1)]
+    assert done(result).state[1] / speed == pytest.approx(-1.0, rel=1e-12)
+    assert result.integrator.events[-1].time == pytest.approx(1 + duration, rel=1e-12)
+
+
+def test_the_last_impact_of_a_damped_chain_comes_late() -> None:
+    """O10."""
+    result = run(make_grasp(FREE, 1e4, 0.3, 1.0), [-1.0, 1.0, 0.0, 0.0, 1.0, 0.0], 100.0)
+    assert done(result).events[-1].side == LEFT
+    assert result.times(LEFT, Transition.TOUCH)[1] == pytest.approx(74.994, abs=5e-4)
+
+
+def test_elastic_symmetric_arm_is_periodic() -> None:
+    """O12; the hard cases count the touches and measure the phase."""
+    period = float(elastic_period(1, 15, 10_000, "0.3"))
+    result = run(make_grasp(ELASTIC, 1e4, 0.0, 5.0), [-0.3, 0, 0, 0, 0.3, 0], 1000 * period, [period, 1000 * period])
+    start = np.array([-0.3, 0.0, 0.0, 0.0, 0.3, 0.0])
+    assert np.abs(result.states[0] - start).max() < 2e-14
+    assert np.abs(result.states[1] - start).max() < 1e-8  # measured: 2e-9
+    assert done(result).status is Status.DONE
+
+
+@pytest.mark.parametrize("eps", [1e-4, 1e-6, 1e-8, 1e-10, -1e-6, -1e-10, -1e-12])
+@pytest.mark.parametrize("mirror", [False, True])
+def test_grazing_impulse(eps: float, mirror: bool) -> None:
+    """O13."""
+    m, k, c = 1, mpf(15), mpf(STANDARD.damping + STANDARD.velocity_gain)
+    s = c / (2 * m)
+    t_peak = mp.pi / mp.sqrt(k / m - s * s)
+    peak = mpf(0.3) * mp.exp(-s * t_peak)
+    face = float(peak - mpf(eps))
+    eps_exact = peak - mpf(face)
+    start = [-0.3, 0.0, face, 0.0, 50.0, 0.0]
+    if mirror:
+        start = [-value for value in start[4:6] + start[2:4] + start[0:2]]
+    free = FREE._replace(mass=1e9)
+    arms = (free, STANDARD) if mirror else (STANDARD, free)
+    result = run(Grasp(*arms, Contact(1e4, 0.0), Contact(1e4, 0.0), 1e9), start, 1.0)
+    if eps < 0.0:
+        assert done(result).events == []
+        return
+    assert [kind for kind, _ in kinds(result)] == ["TOUCH", "RELEASE"]
+    touch, release = done(result).events
+    a = float(15 * peak)
+    duration, impulse = graze(eps_exact, a, 1e4)
+    hardening = 3e4 * float(eps_exact) ** 0.5 / a  # H eps^1.5 / (m a eps), the impact against the arm's own arc
+    assert release.time - touch.time == pytest.approx(duration, rel=2 * hardening + 3e-3, abs=1e-15 / duration)
+    momentum = abs(result.integrator.state[3]) * 1e9
+    assert momentum == pytest.approx(impulse, rel=hardening + 1e-2)
+
+
+@pytest.mark.parametrize("exponent", range(3, 17))
+def test_touches_that_are_nearly_simultaneous(exponent: int) -> None:
+    """O15."""
+    start = [-1.0, 1.0, 0.0, 0.0, 1.0 + 10.0**-exponent, -1.0]
+    delay = start[4] - 1.0  # what double precision makes of it
+    result = run(make_grasp(FREE, 1e4, 0.3, 1.0), start, 1.5)
+    touches = [result.times(side, Transition.TOUCH) for side in (LEFT, RIGHT)]
+    assert [len(times) for times in touches] == [1, 1]
+    assert touches[1][0] - touches[0][0] == pytest.approx(delay, rel=1e-4, abs=3e-16)
+    assert result.integrator.state[3] == pytest.approx(-5.65648 * delay, rel=1e-5 + 5 * delay, abs=2e-15)
+    assert done(result).state[1] == pytest.approx(-float(impact(1, 1e4, 0.3, 1).restitution), abs=10 * delay + 1e-13)
+
+
+def test_a_very_long_flight_ends_in_its_touch() -> None:
+    result = run(make_grasp(FREE, 1e4, 0.0, 1.0), [-1.0, 1e-6, 0.0, 0.0, 1e9, 0.0], 1.1e6)
+    touch, release = done(result).events
+    assert release.time - touch.time == pytest.approx(float(impact(0.5, 1e4, 0, 1e-6).duration), rel=1e-8)
+    assert result.integrator.work[Work.ROOT_ITERATIONS] < 200
+
+
+def test_first_contacts_of_the_standard_case() -> None:
+    result = run(scenes.load("case_01").grasp, AT_REST, 0.6)
+    events = {(event.kind, event.side): event for event in done(result).events}
+    assert events[Transition.TOUCH, LEFT].time == events[Transition.TOUCH, RIGHT].time
+    assert events[Transition.TOUCH, LEFT].u_rate == pytest.approx(0.99930564858067212555, rel=1e-15)
+    assert events[Transition.RELEASE, LEFT].time == pytest.approx(0.513325334884, abs=6e-13)
+    assert events[Transition.RELEASE, RIGHT].time == pytest.approx(0.503118325389, abs=6e-13)
+
+
+def test_symmetric_clamp_and_reentry_of_scene_a() -> None:
+    grasp = make_grasp(Arm(1.0, 10.0, 0.2, 50.0, 5.0), 1e4, 10.0, 1.0)
+    result = run(grasp, [-0.3, 0, 0, 0, 0.3, 0], 0.4)
+    expected = [("TOUCH", 0), ("TOUCH", 1), ("CLAMP", 0), ("CLAMP", 1), ("REENTRY", 0), ("REENTRY", 1)]
+    assert kinds(result)[:6] == expected
+    clamp, reentry = done(result).events[2], result.integrator.events[4]
+    assert clamp.u_rate == pytest.approx(-0.1, rel=1e-13) == reentry.u_rate
+    tiny = 1e-9
+    level = energy(grasp, run(grasp, [-0.3, 0, 0, 0, 0.3, 0], 0.4, [reentry.time - tiny, reentry.time + tiny]).states)
+    assert pytest.approx([0.0248447, 0.0763355825901982], rel=1e-5) == level.V
+    assert level.V_c[0] == pytest.approx(level.V_c[1], rel=1e-6)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_events_are_in_order_and_alternate(name: str) -> None:
+    events = run(scenes.load(name).grasp, scenes.load(name).initial_state, 20.0).integrator.events
+    assert [e.time for e in events] == sorted(e.time for e in events)
+    for side in (LEFT, RIGHT):
+        own = [e for e in events if e.side == side]
+        assert len(own) >= 3
+        assert [e.kind in BEGIN for e in own] == [i % 2 == 0 for i in range(len(own))]
+        assert all(e.u == 0.0 for e in own if e.kind in (Transition.TOUCH, Transition.RELEASE))
+        assert all((e.u_rate > 0.0) == (e.kind is Transition.TOUCH) for e in own)

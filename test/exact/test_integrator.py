@@ -1,0 +1,156 @@
+"""Runs of the integrator: any accuracy, pieces and output times; energy; budgets; what is refused."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.layout import Work
+from grasp_ros.physics.system import System
+from grasp_ros.verification.cases.modes import STARTS
+
+GRID = np.linspace(0.0, 20.0, 201)
+
+
+@pytest.mark.parametrize("accuracy", [1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 1e-16])
+@pytest.mark.parametrize("name", CASES)
+def test_every_accuracy_gets_through_every_case(name: str, accuracy: float) -> None:
+    scene = scenes.load(name)
+    result = run(scene.grasp, scene.initial_state, 20.0, GRID, accuracy=accuracy)
+    done(result)
+    assert len(result.states) == len(GRID)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_repaired_v_never_rises(name: str) -> None:
+    scene = scenes.load(name)
+    V_c = energy(scene.grasp, run(scene.grasp, scene.initial_state, 20.0, np.linspace(0, 20, 4001)).states).V_c
+    assert np.diff(V_c).max() <= 1e-12 * V_c[0]
+    assert V_c[-1] < V_c[0] or name == "case_02"
+
+
+def test_elastic_energy_stays_for_2000_s_at_a_coarser_accuracy() -> None:
+    scene, grid = scenes.load("case_02"), np.linspace(0, 2000, 2001)
+    V_c = energy(scene.grasp, run(scene.grasp, scene.initial_state, 2000.0, grid, accuracy=1e-14).states).V_c
+    assert np.abs(V_c / V_c[0] - 1.0).max() < 1e-10  # measured: 2.7e-11
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name not in ("case_01", "case_09", "case_10")])
+def test_the_decaying_tail_ends_properly(name: str) -> None:
+    result = run(scenes.load(name).grasp, scenes.load(name).initial_state, 1000.0, [500.0, 1000.0])
+    level = energy(scenes.load(name).grasp, result.states)
+    assert done(result).work[Work.ROOT_ITERATIONS] < 3_000_000
+    # amplitudes of 1e-30 m and less are what rounding leaves of a motion that began with 0.5 m
+    assert level.V_c[1] <= level.V_c[0] * (1 + 1e-10) + 1e-60
+
+
+@pytest.mark.parametrize("start", [*STARTS.values(), AT_REST])
+def test_the_first_output_is_the_start(start: Any) -> None:
+    assert np.array_equal(run(make_grasp(), start, 0.1, [0.0, 0.1]).states[0], start)
+
+
+def test_the_first_and_the_last_output_are_start_and_end() -> None:
+    scene = scenes.load("case_03")
+    dense = run(scene.grasp, scene.initial_state, 20.0, np.linspace(0.0, 20.0, 9001))
+    assert np.array_equal(dense.states[-1], dense.integrator.state)
+    assert np.array_equal(dense.states[0], scene.initial_state)
+
+
+@pytest.mark.parametrize("name", ["case_01", "case_05", "case_09"])
+@pytest.mark.parametrize("pieces", [7, 250, 5000])
+def test_splitting_one_horizon_changes_nothing(name: str, pieces: int) -> None:
+    scene = scenes.load(name)
+    whole = run(scene.grasp, scene.initial_state, 5.0)
+    parts = Integrator(scene.system, continuous=True)
+    for i in range(pieces):
+        parts.advance(5.0 / pieces, start=5.0 * i / pieces)
+    assert parts.status is Status.DONE
+    assert sorted(kinds(Run(parts, whole.states))) == sorted(kinds(whole))
+    assert np.abs(parts.state - whole.integrator.state).max() < 2e-11
+    for a, b in zip(parts.events, whole.integrator.events, strict=True):
+        assert a.time == pytest.approx(b.time, abs=2e-11)
+
+
+def test_repeated_and_empty_output_times() -> None:
+    scene = scenes.load("case_01")
+    result = run(scene.grasp, scene.initial_state, 1.0, [0.0, 0.0, 0.45, 0.45, 1.0, 1.0])
+    assert np.array_equal(result.states[::2], result.states[1::2])
+    assert run(scene.grasp, scene.initial_state, 1.0, []).states.shape == (0, 6)
+
+
+def test_advance_by_nothing_changes_nothing() -> None:
+    scene = scenes.load("case_01")
+    integrator = Integrator(scene.system, continuous=True)
+    assert np.array_equal(integrator.advance(0.0, np.array([0.0])), scene.initial_state[None])
+    assert np.array_equal(integrator.state, scene.initial_state)
+
+
+def test_event_budget_stops_with_its_status() -> None:
+    scene = scenes.load("case_01")
+    for budget in (0, 1, 10):
+        result = run(scene.grasp, scene.initial_state, 20.0, GRID, max_events=budget)
+        assert result.integrator.status is Status.EVENT_BUDGET, budget
+        assert len(result.integrator.events) <= budget + 2
+        assert len(result.states) < len(GRID)
+
+
+def test_event_budget_beyond_the_kernel_rows() -> None:
+    scene = scenes.load("case_02")
+    result = run(scene.grasp, scene.initial_state, 5000.0, np.linspace(0, 5000, 501), max_events=2000)
+    assert result.integrator.status is Status.EVENT_BUDGET
+    assert 2000 <= len(result.integrator.events) < 4000
+    assert 0 < len(result.states) < 501
+    again = result.integrator.advance(1.0, np.array([0.5]))
+    assert again.shape == (0, 6)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
+def test_bad_durations_are_refused(bad: float) -> None:
+    with pytest.raises(ValueError, match="duration"):
+        Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
+
+
+@pytest.mark.parametrize("state", [AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST]])
+def test_bad_states_are_refused(state: Any) -> None:
+    with pytest.raises(ValueError, match="six finite"):
+        Integrator(System.of(make_grasp(), np.array(state)), continuous=True)
+
+
+@pytest.mark.parametrize("accuracy", [0.0, -1.0, 9e-17, 2e-3, math.nan])
+def test_bad_accuracies_are_refused(accuracy: float) -> None:
+    with pytest.raises(ValueError, match="accuracy"):
+        Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
+
+
+SCRIPT = """
+import sys, numpy as np
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator
+for name in ("case_01", "case_05"):
+    scene = scenes.load(name)
+    integrator = Integrator(scene.system, continuous=True)
+    states = integrator.advance(scene.duration if len(sys.argv) > 1 else 2.0, np.linspace(0.0, 2.0, 21))
+    print(*(value.hex() for value in states.ravel().tolist()))
+    print(*(event.time.hex() for event in integrator.events))
+"""
+
+
+@pytest.mark.slow
+def test_uncompiled_source_gives_the_same_numbers() -> None:
+    outputs = []
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        command = [sys.executable, "-W", "ignore", "-c", SCRIPT]
+        finished = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
+        outputs.append([float.fromhex(word) for word in finished.stdout.split()])
+    assert len(outputs[0]) == len(outputs[1]) > 250
+    assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)

@@ -1,0 +1,182 @@
+"""What a graph of four real processes records over real DDS, beside the simulation without ROS."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from processes import DEADLINE, wait_for
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
+
+from grasp_ros import scene
+from grasp_ros.cli.report import compare_recording
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.layout import LEFT, OBJECT
+from grasp_ros.physics.model import impact_forces
+from grasp_ros.simulation import simulate
+
+pytestmark = pytest.mark.slow  # real processes
+
+
+def content(directory: Path) -> list[tuple[str, int, bytes]]:
+    with (directory / "bag" / "bag.mcap").open("rb") as file:
+        rows = make_reader(file).iter_messages()
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in rows]
+
+
+def test_graph_bag_and_simulation_are_equal_bit_for_bit(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    simulated = simulate(scene.load("case_01", ["time.duration_s=3"]), sampled=True)
+    assert len(recording.tick) == 3001
+    assert simulated.state.tobytes() == recording.state.tobytes()
+    assert simulated.command.tobytes() == recording.command.tobytes()
+    assert simulated.t.tobytes() == recording.t.tobytes()
+    assert np.array_equal(recording.effort[1:], recording.command[:-1])
+    assert simulated.inputs.tobytes() == recording.inputs.tobytes()
+    assert len({*simulated.events}) >= 12  # the run has contacts to be equal in
+
+
+def test_a_comparison_sees_inputs_that_differ_and_leaves_out_what_the_bag_does_not_know(
+    two_runs: tuple[Path, Path]
+) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    assert compare_recording(recording, ACCURACY).equal
+    effort = recording.effort.copy()
+    effort[1000, 0] = np.nextafter(effort[1000, 0], np.inf)
+    assert not compare_recording(replace(recording, effort=effort), ACCURACY).equal
+    cut = {name: getattr(recording, name)[:500] for name in ("tick", "state", "effort", "command", "lyapunov")}
+    begin = replace(recording, **cut)
+    assert np.isnan(begin.inputs[-1]).all()
+    assert begin.inputs[:-1].tobytes() == recording.inputs[:499].tobytes()
+    assert compare_recording(begin, ACCURACY).equal
+    gap = {name: np.delete(values, 100, axis=0) for name, values in cut.items()}
+    assert np.flatnonzero(np.isnan(replace(recording, **gap).inputs[:, 0])).tolist() == [99, 498]
+    assert compare_recording(replace(recording, **gap), ACCURACY).equal
+
+
+def test_two_runs_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:
+    first, second = (content(directory) for directory in two_runs)
+    assert first == second
+    assert len(first) == 6 * 3001 + 1
+
+
+def test_bag_holds_every_tick_of_every_topic(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    assert recording.missing == {topic.name: 0 for topic in recording.scene.topics}
+    assert recording.scene.values == scene.load("case_01", ["time.duration_s=3"]).values
+    assert {"python", "numpy", "grasp_ros", "rclpy"} <= set(recording.versions)
+
+
+def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
+    level = recording.energy
+    assert np.array_equal(recording.lyapunov[:, :4], np.stack([*level[:3], level.mode.astype(float)], axis=1))
+    assert (recording.lyapunov[:, 4] <= 1e-12).all()  # the energy balance closes
+    assert recording.lyapunov[:, 4].sum() < -1.0  # what the impacts and dampers have taken
+    assert not recording.lyapunov[:, 5].any()
+    assert set(recording.lyapunov[:, 3]) == {0.0, 1.0, 2.0, 3.0}
+    for side, force in zip(("left", "right"), impact_forces(recording.scene.grasp, recording.state), strict=True):
+        assert np.array_equal(recording.outputs[f"contact/{side}"], force)
+        assert force.max() > 10.0
+
+
+def test_an_independent_reader_decodes_the_bag(two_runs: tuple[Path, Path]) -> None:
+    with (two_runs[0] / "bag" / "bag.mcap").open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        rows = [
+            (schema.name, channel.metadata["offered_qos_profiles"], message.log_time, decoded)
+            for schema, channel, message, decoded in reader.iter_decoded_messages(topics=["/joint_states"])
+        ]
+    names, qos, times, states = zip(*rows, strict=True)
+    assert set(names) == {"sensor_msgs/msg/JointState"}
+    assert "reliab" in qos[0]
+    assert list(times) == [tick * 1_000_000 for tick in range(3001)]
+    assert states[500].name == ["left", "object", "right"]
+    stamp = states[500].header.stamp
+    assert (stamp.sec, stamp.nanosec) == (0, 500_000_000)
+    assert states[500].position[0] == simulate(scene.load("case_01"), sampled=True, grid=np.array([0.5])).state[0, 0]
+
+
+def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
+    printed = (two_runs[0].parent / "stdout").read_text()
+    assert "equal, bit for bit" in printed
+    assert "lost                      nothing" in printed
+    assert (two_runs[0] / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["noise", "everything", "hammer", "no_contact", "friction_slide"])
+def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) -> None:
+    """Simulation, graph and bag; and nothing is there that the scene does not name."""
+    more = ["object_pulse.start_s=0.3", "left_actuator.limit_N=30"] if name == "everything" else []
+    settings = ["time.duration_s=1.0", *more]
+    graph = Graph(scene.load(name, settings), tmp_path / "run", ACCURACY)
+    graph.start()
+    try:
+        graph.wait([])
+    finally:
+        statuses = graph.stop()
+    assert set(statuses.values()) == {0}
+    recording = bag.read(graph.bag)
+    comparison = compare_recording(recording, ACCURACY)
+    assert comparison.equal
+    inputs = simulate(recording.scene, sampled=True).inputs
+    assert recording.inputs.tobytes() == inputs.tobytes()
+    if more:  # a delay, a limit, and a pulse that all act
+        assert inputs[0].tolist() == [0.0, 0.0, 0.0]
+        assert (np.nanmax(np.abs(inputs[:, LEFT])), np.nanmax(inputs[:, OBJECT])) == (30.0, 30.0)
+    assert not any(recording.missing.values())
+    assert not recording.lyapunov[:, 5].any()
+    assert {topic for topic, _, _ in content(tmp_path / "run")} == {
+        "/scene", *(f"/{topic.name}" for topic in recording.scene.topics)
+    }
+    assert set(statuses) == {"plant", "monitor", *recording.scene.controllers}
+
+
+def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
+    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    clients = {name: AsyncParameterClient(peer, name) for name in ("left_controller", "plant")}
+    graph = Graph(scene.load("case_01", ["time.duration_s=6"]), tmp_path / "run", ACCURACY)
+
+    def answer(name: str, number: Parameter) -> Any:
+        future = clients[name].set_parameters([number])
+        deadline = time.monotonic() + DEADLINE
+        while not future.done():
+            assert time.monotonic() < deadline, f"{name} does not answer"
+            executor.spin_once(timeout_sec=0.01)
+        return future.result().results[0]
+
+    graph.start()
+    try:
+        wait_for(clients["left_controller"].services_are_ready, "the controller")
+        wait_for(clients["plant"].services_are_ready, "the plant")
+        wait_for(lambda: graph.bag.exists(), "the bag")  # the controller has the scene when the monitor has it
+        gain = "left_feedback.position_gain_N_per_m"
+        wait_for(lambda: answer("left_controller", Parameter(gain, value=9)).successful, "the new gain")
+        refused = answer("left_controller", Parameter(gain, value=-100.0))
+        assert not refused.successful
+        assert "a sum >= 0" in refused.reason
+        fixed = answer("plant", Parameter("object.mass_kg", value=4.0))
+        assert not fixed.successful
+        assert "does not change in a run" in fixed.reason
+        graph.wait([])
+    finally:
+        graph.stop()
+    recording = bag.read(graph.bag)
+    assert list(recording.changes.values()) == [{gain: 9.0}]
+    assert compare_recording(recording, ACCURACY).equal
+    tick = next(iter(recording.changes))
+    x, v = recording.state[tick, :2]
+    assert recording.command[tick, 0] == -9.0 * x - 0.5 * v
+    assert not recording.lyapunov[:, 5].any()

@@ -1,0 +1,97 @@
+"""What a node refuses, and what the plant drops."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import WrenchStamped
+from processes import DEADLINE, START, wait_for
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from grasp_ros import scene
+from grasp_ros.graph.nodes import messages
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
+from grasp_ros.simulation import simulate
+
+pytestmark = pytest.mark.slow  # real processes
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "complaint"),
+    [
+        ("plant", "scene:=case_99", "case_99: no such scene"),
+        ("plant", "scene:=missing.yaml", "missing.yaml: no such file"),
+        ("plant", "accuracy:=1.0", "accuracy: 1.0 is outside"),
+        ("plant", "accuracy:=1", "accuracy: 1.0 is outside"),
+        ("plant", "scene:=1", "scene"),
+        ("plant", "object.mas_kg:=4.0", "object.mas_kg: no such parameter"),
+        ("plant", "tilt.angle_rad:=0.3", "tilt.angle_rad: no such parameter"),
+        ("plant", "object.mass_kg:=-4.0", "object.mass_kg"),
+        ("monitor", "bag:=.", "bag: '.' exists"),
+    ],
+)
+def test_bad_parameters_are_refused(tmp_path: Path, name: str, parameter: str, complaint: str) -> None:
+    command_line = [*START, name, "--ros-args", "-p", parameter]
+    result = subprocess.run(command_line, cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert result.returncode == 2
+    assert complaint in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_a_second_plant_on_the_same_topics_is_refused() -> None:
+    plants = [subprocess.Popen([*START, "plant"], stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    wait_for(lambda: any(plant.poll() is not None for plant in plants), "a plant that gives way")
+    for plant in plants:
+        plant.terminate()
+    errors = [plant.communicate(timeout=DEADLINE)[1] for plant in plants]
+    statuses = [plant.returncode for plant in plants]
+    assert 1 in statuses
+    assert "another plant publishes here" in errors[statuses.index(1)]
+    assert "Traceback" not in "".join(errors)
+
+
+def test_plant_drops_what_is_stale_repeated_or_not_finite(
+    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    """One node plays both controllers and sends garbage between its right answers."""
+    peer, executor = node
+    settings = ["time.duration_s=0.6"]
+    expected = simulate(scene.load("case_01", settings), sampled=True)
+    publishers = [
+        peer.create_publisher(WrenchStamped, topic.name, messages.qos(topic)) for topic in (LEFT_COMMAND, RIGHT_COMMAND)
+    ]
+    states: list[np.ndarray] = []
+    scenes: list[str] = []
+
+    def answer(message: JointState) -> None:
+        states.append(state_of(message)[0])
+        now = messages.to_ns(message.header.stamp)
+        forces = expected.scene.system.commands(now // 1_000_000, states[-1])
+        for publisher in publishers:
+            publisher.publish(messages.wrench(now - 1_000_000, 100.0))
+            publisher.publish(messages.wrench(now, math.nan))
+            publisher.publish(messages.wrench(now, math.inf))
+        publishers[0].publish(messages.wrench(now, forces[0]))
+        publishers[0].publish(messages.wrench(now, 100.0))
+        publishers[1].publish(messages.wrench(now, forces[1]))
+
+    peer.create_subscription(JointState, JOINT_STATES.name, answer, messages.qos(JOINT_STATES))
+    peer.create_subscription(String, SCENE.name, lambda message: scenes.append(message.data), messages.qos(SCENE))
+    file = tmp_path / "short.yaml"
+    file.write_text(expected.scene.to_yaml())
+    plant = subprocess.Popen([*START, "plant", "--ros-args", "-p", f"scene:={file}"])
+    deadline = time.monotonic() + DEADLINE
+    while plant.poll() is None:
+        assert time.monotonic() < deadline, "the plant does not finish"
+        executor.spin_once(timeout_sec=0.05)
+    assert plant.returncode == 0
+    assert np.array_equal(states, expected.state)
+    assert scene.parse(scenes[0], "scene", "topic").values == expected.scene.values

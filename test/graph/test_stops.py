@@ -1,0 +1,117 @@
+"""How a graph and its nodes end: signals, a plant that is gone, an energy balance that does not close."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rclpy
+from processes import DEADLINE, START, wait_for
+
+from grasp_ros import scene
+from grasp_ros.graph import bag
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
+from grasp_ros.simulation import simulate
+
+pytestmark = pytest.mark.slow  # real processes
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("moment", ["recording", "starting"])
+def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, moment: str) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run")], text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    recorded = tmp_path / "run" / "bag" / "bag.mcap"
+    if moment == "recording":
+        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 2_000_000, "a bag that grows")
+    else:
+        wait_for(lambda: (tmp_path / "run" / "case_01.yaml").exists(), "the first process")
+    process.send_signal(number)
+    out, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 0, err
+    assert "Traceback" not in err + out
+    if moment == "recording":
+        recording = bag.read(recorded.parent)
+        ticks = len(recording.tick)
+        assert 100 < ticks < 20001
+        assert recording.counts == {topic.name: ticks for topic in recording.scene.topics}
+        assert np.array_equal(recording.tick, np.arange(ticks))
+        full = simulate(scene.load("case_01"), sampled=True)
+        assert full.state[:ticks].tobytes() == recording.state.tobytes()
+    left_behind = subprocess.run(["pgrep", "-f", str(tmp_path)], capture_output=True, text=True, check=False)
+    assert left_behind.stdout == ""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", ["plant", "left_controller", "right_controller", "monitor"])
+def test_lonely_node_ends_cleanly_on_a_signal(tmp_path: Path, name: str, number: signal.Signals) -> None:
+    process = subprocess.Popen(
+        [*START, name], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "ROS_DOMAIN_ID": "120"},
+    )
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=120)
+    observer = rclpy.create_node("observer", context=context)
+    wait_for(lambda: name in observer.get_node_names(), name)
+    process.send_signal(number)
+    _, err = process.communicate(timeout=DEADLINE)
+    observer.destroy_node()
+    context.shutdown()
+    assert process.returncode == 0, err
+    assert "Traceback" not in err
+
+
+def test_run_notices_a_plant_that_was_stopped(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run")], text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    recorded = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 1_000_000, "a bag that grows")
+    subprocess.run(["pkill", "-TERM", "-f", f"start plant .*{tmp_path}"], check=True)
+    _, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 1
+    assert "monitor: still runs although its counterpart has ended" in err
+    assert bag.read(recorded.parent).counts[JOINT_STATES.name] > 100
+
+
+WRONG_PLANT = """
+import sys
+from grasp_ros.graph.nodes import start
+from grasp_ros.exact.integrator import Integrator
+set_input = Integrator.set_input
+Integrator.set_input = lambda self, forces: set_input(self, 1.5 * forces)
+sys.exit(start.main("plant"))
+"""
+
+
+def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(tmp_path: Path) -> None:
+    """A plant that pushes its arms harder than the commands say."""
+    options = ["--ros-args", "-p", "wait_for_monitor:=true"]
+    recording = [*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
+    monitor = subprocess.Popen(recording, stderr=subprocess.PIPE, text=True)
+    others = [
+        subprocess.Popen([sys.executable, "-c", WRONG_PLANT, *options], stderr=subprocess.PIPE),
+        *(subprocess.Popen([*START, f"{side}_controller", *options], stderr=subprocess.PIPE)
+          for side in ("left", "right")),
+    ]
+    _, err = monitor.communicate(timeout=DEADLINE)
+    _, last_words = others[0].communicate(timeout=DEADLINE)
+    for controller in others[1:]:
+        controller.terminate()
+        controller.communicate(timeout=DEADLINE)
+    assert (monitor.returncode, others[0].returncode) == (1, 1)
+    assert b"the monitor that this run waits for has ended" in last_words
+    assert re.search(r"V_c rose by \S+ J more than the work of the held forces, t = \S+ s, mode 0, state \[", err)
+    found = bag.read(tmp_path / "bag")
+    assert found.alarms == 1
+    assert found.lyapunov[-1, LYAPUNOV_NAMES.index("alarm")] == 1.0
+    assert not any(found.missing.values())

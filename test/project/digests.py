@@ -1,0 +1,49 @@
+"""SHA-256 of states, events and counters of every scene that comes with the package, as written and sampled.
+
+    python test/project/digests.py > test/project/digests.json
+
+records them anew, with the versions that they depend on; `test_digests.py` compares. Do this only for a new scene or
+for a change of the numerics that the CHANGELOG names: what only moves or renames keeps every bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+
+import llvmlite
+import numba
+import numpy as np
+
+from grasp_ros import scene
+from grasp_ros.simulation import Trajectory, simulate
+
+
+def versions() -> dict[str, str]:
+    """What the last bits depend on beside this package: `libm`, the compiler, the machine."""
+    return {
+        "libc": " ".join(platform.libc_ver()), "numpy": np.__version__, "numba": numba.__version__,
+        "llvmlite": llvmlite.__version__, "machine": platform.machine(),
+    }
+
+
+def digest(trajectory: Trajectory) -> str:
+    """SHA-256 of the bytes of states, events and counters."""
+    found = hashlib.sha256()
+    for array in (trajectory.state, trajectory.event_table, trajectory.work):
+        found.update(array.tobytes())
+    return found.hexdigest()
+
+
+def digests() -> dict[str, str]:
+    """Of every scene, by name and kind of run."""
+    return {
+        f"{name} {kind}": digest(simulate(scene.load(name), sampled=sampled))
+        for name in sorted(scene.names())
+        for kind, sampled in (("as written", False), ("sampled", True))
+    }
+
+
+if __name__ == "__main__":
+    print(json.dumps({"versions": versions(), "digests": digests()}, indent=1))

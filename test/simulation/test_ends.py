@@ -1,0 +1,63 @@
+"""How runs end: at a budget, where the energy rises, and never because a kernel took breath."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from documents import case_of
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact import integrator
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.layout import DAMPING, OBJECT, Work
+from grasp_ros.simulation import GRID_POINTS, load, simulate
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_runs_stop_where_the_energy_rises(sampled: bool) -> None:
+    """An object that its surroundings drive, which no scene can ask for."""
+    scene = scenes.load("case_01").changed({"time.duration_s": 1.0, "object.velocity_m_per_s": 0.01})
+    whole = simulate(scene, sampled=sampled)
+    assert (whole.status, whole.stop) == (Status.DONE, "")
+    driven = scene.changed({})
+    driven.system.bodies[OBJECT, DAMPING] = -50.0
+    cut = simulate(driven, sampled=sampled)
+    assert cut.status is Status.ENERGY_RISES
+    found = re.fullmatch(rf"{cut.status.value}: t = (\S+) s, mode (\d), state \[.*\]", cut.stop)
+    assert found is not None
+    assert cut.t[-1] <= float(found[1]) < 1.0
+    assert 0 < len(cut.t) == len(cut.state) == len(cut.command) < len(whole.t)
+    np.testing.assert_allclose(cut.state, whole.state[: len(cut.t)], atol=1e-2)
+
+
+@pytest.mark.parametrize("breath", [10**6, 50])
+def test_the_budget_of_work_ends_a_run(monkeypatch: pytest.MonkeyPatch, breath: int) -> None:
+    monkeypatch.setattr(integrator, "BREATH", breath)
+    run = simulate(scenes.load("case_02"), max_work=300)
+    assert run.status is Status.WORK_BUDGET
+    spent = int(run.work.sum() - run.work[Work.REJECTED_STEPS])
+    assert 300 <= spent < 400
+    assert run.stop.startswith(f"{run.status.value}: t = ")
+    assert 0 < len(run.t) < 2001
+
+
+@pytest.mark.parametrize("name", ["case_02", "friction", "friction_slide"])
+def test_a_run_that_takes_breath_gives_the_same_bits(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    whole = simulate(scenes.load(name))
+    monkeypatch.setattr(integrator, "BREATH", 7)
+    pieces = simulate(scenes.load(name))
+    np.testing.assert_array_equal(pieces.state, whole.state)
+    np.testing.assert_array_equal(pieces.event_table, whole.event_table)
+    np.testing.assert_array_equal(pieces.work, whole.work)
+
+
+def test_budget_ends_a_run_with_its_status(tmp_path: Path) -> None:
+    scene = case_of("case_02", 3000.0, 1.0)
+    result = simulate(scene, max_events=1500)
+    assert result.status is Status.EVENT_BUDGET
+    assert 0 < len(result.t) == len(result.state) == len(result.command) < GRID_POINTS
+    result.save(tmp_path / "cut.npz")
+    assert load(tmp_path / "cut.npz").status is Status.EVENT_BUDGET

@@ -1,0 +1,211 @@
+"""The sampled loop: held commands, delay, limits, noise, numbers that change, and its stability."""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from documents import case_of, scene_of
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.model import Array, feedback
+from grasp_ros.physics.system import System
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import SampledPlant, simulate
+from grasp_ros.simulation.trajectory import tick_times
+
+
+def plain_loop(scene: Scene) -> tuple[Array, Array]:
+    """Sampled feedback as the graph does it: states and commands at the ticks."""
+    grasp = scene.grasp
+    plant = SampledPlant(System.of(grasp, scene.initial_state), scene.period_ns)
+    states, forces = [plant.state], []
+    for _ in range(scene.ticks):
+        x_l, v_l, _, _, x_r, v_r = plant.state
+        forces.append((feedback(grasp.left, x_l, v_l), feedback(grasp.right, x_r, v_r)))
+        plant.step(np.array([*forces[-1], 0.0]))
+        assert plant.status is Status.DONE
+        states.append(plant.state)
+    return np.array(states), np.array(forces)
+
+
+@pytest.mark.parametrize("name", ["case_01", "case_02", "case_05", "case_10"])
+@pytest.mark.parametrize("period", [0.001, 0.01, 0.05])
+def test_sampled_is_a_plain_loop_bit_for_bit(name: str, period: float) -> None:
+    scene = case_of(name, 2.0, period)
+    states, forces = plain_loop(scene)
+    result = simulate(scene, sampled=True)
+    assert np.array_equal(result.state, states)
+    assert np.array_equal(result.command[:-1], forces)
+    assert np.array_equal(result.t, tick_times(scene))
+    assert result.sampled
+    assert len(result.times(Transition.TOUCH, LEFT)) >= 1
+
+
+def test_sampled_between_ticks() -> None:
+    scene = case_of(duration=1.0, period=0.01)
+    ticks = simulate(scene, sampled=True)
+    fine = simulate(scene, sampled=True, grid=np.sort(np.concatenate([ticks.t, np.linspace(0.0, 1.0, 1234)])))
+    index = np.searchsorted(fine.t, ticks.t, side="left")
+    assert np.array_equal(fine.t[index], ticks.t)
+    assert np.abs(fine.state[index] - ticks.state).max() < 1e-14
+    assert [e[1:3] for e in fine.events] == [e[1:3] for e in ticks.events]
+    assert np.abs(np.diff(fine.state[:, 0])).max() < 0.01  # no jump between ticks
+
+
+def test_sampled_approaches_continuous() -> None:
+    errors = []
+    for period in (0.004, 0.002, 0.001, 0.0005):
+        scene = case_of(duration=1.0, period=period)
+        grid = np.linspace(0.0, 1.0, 101)
+        errors.append(
+            np.abs(simulate(scene, sampled=True, grid=grid).state - simulate(scene, grid=grid).state)[:, 0].max()
+        )
+    ratios = [a / b for a, b in itertools.pairwise(errors)]
+    assert all(1.6 < ratio < 2.5 for ratio in ratios)  # first order in the period
+    assert errors[-1] > 1e-6
+
+
+@pytest.mark.parametrize(("gains", "limit"), [((5.0, 0.5), 0.275056637414546), ((50.0, 5.0), 0.2027695528985455)])
+def test_stability_limit_of_a_sampled_free_arm(gains: tuple[float, float], limit: float) -> None:
+    def radius(period: float) -> float:
+        """Of the map over one period, whose columns are two integrations; the object is out of reach."""
+        columns = []
+        for state in ([1.0, 0.0], [0.0, 1.0]):
+            scene = scenes.load(
+                "case_01",
+                [
+                    f"left_feedback.position_gain_N_per_m={gains[0]}",
+                    f"left_feedback.velocity_gain_Ns_per_m={gains[1]}",
+                    "right_arm.stiffness_N_per_m=0",
+                ],
+            )
+            system = System.of(scene.grasp, np.array([*state, 1e6, 0.0, 2e6, 0.0]))
+            integrator = Integrator(system, continuous=False)
+            plant = SampledPlant(system, period * 1e9, integrator)
+            plant.step(np.array([feedback(scene.grasp.left, *state), 0.0, 0.0]))
+            assert integrator.events == []
+            columns.append(plant.state[:2])
+        return float(np.abs(np.linalg.eigvals(np.array(columns).T)).max())
+
+    assert radius(limit) == pytest.approx(1.0, abs=1e-11)
+    assert radius(limit * 0.99) < 1.0 < radius(limit * 1.01)
+    if gains == (5.0, 0.5):  # stability comes back between 1.637 and 2.670 s
+        assert [radius(h) < 1.0 for h in (1.636, 1.638, 2.669, 2.671)] == [False, True, True, False]
+
+
+@pytest.mark.parametrize(("period", "grows"), [(0.2, False), (0.4, True)])
+def test_instability_is_reported_faithfully(period: float, grows: bool) -> None:
+    far = (
+        "object.position_m=1e6",
+        "right_arm.position_m=2e6",
+        "right_arm.stiffness_N_per_m=0",
+        "right_feedback.position_gain_N_per_m=0",
+        "right_feedback.velocity_gain_Ns_per_m=0",
+    )
+    result = simulate(case_of("case_01", 20.0, period, *far), sampled=True)
+    assert result.status is Status.DONE
+    assert np.isfinite(result.state).all()
+    size = np.abs(result.state[:, 0])
+    assert (size[-10:].max() > 2.0 * size[:10].max()) == grows
+
+
+def delayed_loop(scene: Scene, delay: int) -> Array:
+    """The loop written out: commands wait in a list, around a plant that knows of no delay."""
+    plant = SampledPlant(replace(scene.system, delay=0), scene.period_ns)
+    waiting: deque[Array] = deque([np.zeros(3)] * delay)
+    states = [plant.state]
+    for _ in range(scene.ticks):
+        x_l, v_l, _, _, x_r, v_r = plant.state
+        waiting.append(np.array([-5.0 * x_l - 0.5 * v_l, -5.0 * x_r - 0.5 * v_r, 0.0]))
+        plant.step(waiting.popleft())
+        assert plant.status is Status.DONE
+        states.append(plant.state)
+    return np.array(states)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 2, 7])
+def test_delay_is_a_list_of_waiting_commands(delay: int) -> None:
+    scene = scene_of("delay", f"loop.delay_ticks={delay}", "time.duration_s=5.0")
+    assert simulate(scene).state.tobytes() == delayed_loop(scene, delay).tobytes()
+
+
+@pytest.mark.parametrize(("factor", "grows"), [(0.98, False), (1.02, True)])
+def test_delay_costs_the_stability_that_theory_says(factor: float, grows: bool) -> None:
+    """Spectral radius 1 of the sampled arm with one period of delay is at 0.08878 s."""
+    period = round(0.0887780231816513 * factor * 1e6) / 1e6
+    settings = [f"time.control_period_s={period!r}", f"time.duration_s={period * 2000:.9f}", "loop.delay_ticks=1"]
+    document = {key: value for key, value in yaml.safe_load(scenes.load("delay").to_yaml()).items()
+                if not key.startswith(("right", "object", "left_contact"))}
+    scene = scenes.parse(yaml.safe_dump(document), "d", "d", settings)
+    swings = np.abs(simulate(scene).state[:, 0])
+    assert (swings[-200:].max() > swings[:200].max()) == grows
+
+
+def test_saturation_limits_what_the_law_asks_for() -> None:
+    motion = simulate(scenes.load("saturation"))
+    asked = np.stack([-5.0 * motion.state[:, i] - 0.5 * motion.state[:, i + 1] for i in (0, 4)], axis=1)
+    assert np.array_equal(motion.command, np.clip(asked, -1.0, 1.0))
+    assert (np.abs(asked) > 1.0).any()
+
+
+@pytest.mark.slow
+def test_noise_is_seeded_and_as_large_as_it_says() -> None:
+    settings = ("time.duration_s=60.0",)
+    steps = ("position_step_m", "velocity_step_m_per_s")
+    scene = scene_of("noise", *settings)
+    sections = {key: dict(numbers) for key, numbers in scene.values.items()}
+    for key in ("left_sensor", "right_sensor"):
+        for step in steps:
+            del sections[key][step]
+    smooth = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **sections}), "smooth", "smooth")
+    motion = simulate(smooth)
+    assert simulate(smooth).state.tobytes() == motion.state.tobytes()
+    other = simulate(smooth.changed({"left_sensor.noise_seed": 3}))
+    assert other.state.tobytes() != motion.state.tobytes()
+    noise = motion.command[:, 0] + 5.0 * motion.state[:, 0] + 0.5 * motion.state[:, 1]
+    expected = np.hypot(5.0 * 0.002, 0.5 * 0.01)
+    assert noise.std() == pytest.approx(expected, rel=0.02)
+    assert abs(noise.mean()) < 5 * expected / np.sqrt(len(noise))
+    assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.03
+    right = motion.command[:, 1] + 5.0 * motion.state[:, 4] + 0.5 * motion.state[:, 5]
+    assert abs(np.corrcoef(noise, right)[0, 1]) < 0.03
+
+
+def test_quantised_measurements_are_whole_steps() -> None:
+    document = {**scenes.load("noise").values}
+    for side in ("left", "right"):
+        document[f"{side}_sensor"] = {"noise_seed": 0, "position_step_m": 0.01}
+    scene = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **document}), "steps", "steps")
+    motion = simulate(scene)
+    measured = (motion.command[:, 0] + 0.5 * motion.state[:, 1]) / -5.0
+    assert np.abs(measured / 0.01 - np.round(measured / 0.01)).max() < 1e-9
+    assert np.abs(measured - motion.state[:, 0]).max() <= 0.005 + 1e-12
+
+
+def test_changes_act_from_their_tick_on() -> None:
+    scene = scenes.load("case_01", ["time.duration_s=2.0"])
+    plain = simulate(scene, sampled=True)
+    changed = simulate(scene, sampled=True, changes={700: {"left_feedback.position_gain_N_per_m": 50.0}})
+    assert changed.state[:701].tobytes() == plain.state[:701].tobytes()
+    assert changed.state[701, 1] != plain.state[701, 1]
+    assert changed.command[700, 0] == -50.0 * plain.state[700, 0] - 0.5 * plain.state[700, 1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "sampled", "words"),
+    [
+        ({5: {"left_feedback.position_gain_N_per_m": 9.0}}, False, "continuous"),
+        ({5: {"object.mass_kg": 9.0}}, True, "object.mass_kg at tick 5"),
+        ({-1: {"left_feedback.position_gain_N_per_m": 9.0}}, True, "at tick -1"),
+    ],
+)
+def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bool, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        simulate(scenes.load("case_01", ["time.duration_s=1"]), sampled=sampled, changes=changes)
