@@ -60,7 +60,7 @@ class SampledLoop:
         self._inputs: list[Array] = []
 
     def drive(self, integrator: Integrator) -> Array:
-        """States (n, 6) at the output times; only the rows reached, if the integrator stops."""
+        """States (n, 6) at the output times; only the rows reached, if the integrator stops. To be called once."""
         scene = self._scene
         plant = SampledPlant(scene.system, scene.period_ns, integrator)
         offsets, rest = _split(self._grid, range(scene.ticks + 1), scene.period_ns)
