@@ -1,4 +1,4 @@
-"""The energy of a system: the paper's V, its continuous repair V_c, V', and the ledger of held commands.
+"""The energy of a system: the paper's V, its continuous repair V_c, V', and the energy balance of held commands.
 
 A linear term of a body brings its energy by itself: stiffness k and constant force f, of the arm or of the feedback,
 are the potential k (x - f/k)^2. V_c is known up to a constant where a body has a force but no spring.
@@ -62,26 +62,26 @@ def energy(system: System, state: Array, external: Array | None = None) -> Energ
     return Energy(V, V_c, V_rate, mode)
 
 
-class Ledger(NamedTuple):
-    """What became of the energy over one control period, in J of V."""
+class EnergyBalance(NamedTuple):
+    """Energy balance of one control period, in J of V."""
 
     rise: Array  # of twice the energy of the plant by itself
     work: Array  # twice the work of the forces that were held
     rounding: Array  # what rounding may add
 
     @property
-    def unexplained(self) -> Array:
-        """Rise that no work explains; dissipation makes it negative."""
+    def residual(self) -> Array:
+        """Rise less work: minus what was dissipated, so it is never positive but for rounding."""
         return self.rise - self.work
 
     @property
     def alarm(self) -> NDArray[np.bool_]:
-        """Whether energy came from nowhere; also if it is not a number."""
-        return np.logical_not(self.unexplained <= self.rounding)
+        """Whether the residual is positive beyond rounding, or not a number."""
+        return np.logical_not(self.residual <= self.rounding)
 
 
-def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger:
-    """Balance of the energy between states (..., 6) under held forces (..., 3) in N, by body.
+def energy_balance(system: System, before: Array, after: Array, forces: Array) -> EnergyBalance:
+    """Energy balance between states (..., 6) under held forces (..., 3) in N, by body.
 
     Along any motion E(after) - E(before) = sum f (x_after - x_before) - dissipation, with E from the plant's own k,
     its constant forces and the contacts. It holds for any delay, saturation or jitter of the commands, because the
@@ -101,7 +101,7 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
         rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _place(system, body, after)
-    return Ledger(levels[1] - levels[0], work, rounding)
+    return EnergyBalance(levels[1] - levels[0], work, rounding)
 
 
 def _mechanical(system: System, bodies: Array, state: Array) -> Array:
