@@ -24,26 +24,37 @@ from grasp_ros.simulation import simulate
 pytestmark = pytest.mark.slow  # real processes
 
 
-@pytest.mark.parametrize(
-    ("name", "parameter", "complaint"),
-    [
-        ("plant", "scene:=case_99", "case_99: no such scene"),
-        ("plant", "scene:=missing.yaml", "missing.yaml: no such file"),
-        ("plant", "accuracy:=1.0", "accuracy: 1.0 is outside"),
-        ("plant", "accuracy:=1", "accuracy: 1.0 is outside"),
-        ("plant", "scene:=1", "scene"),
-        ("plant", "object.mas_kg:=4.0", "object.mas_kg: no such parameter"),
-        ("plant", "tilt.angle_rad:=0.3", "tilt.angle_rad: no such parameter"),
-        ("plant", "object.mass_kg:=-4.0", "object.mass_kg"),
-        ("monitor", "bag:=.", "bag: '.' exists"),
-    ],
-)
-def test_bad_parameters_are_refused(tmp_path: Path, name: str, parameter: str, complaint: str) -> None:
-    command_line = [*START, name, "--ros-args", "-p", parameter]
-    result = subprocess.run(command_line, cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE, check=False)
-    assert result.returncode == 2
-    assert complaint in result.stderr
-    assert "Traceback" not in result.stderr
+REFUSED = [
+    ("plant", "scene:=case_99", "case_99: no such scene"),
+    ("plant", "scene:=missing.yaml", "missing.yaml: no such file"),
+    ("plant", "accuracy:=1.0", "accuracy: 1.0 is outside"),
+    ("plant", "accuracy:=1", "accuracy: 1.0 is outside"),
+    ("plant", "scene:=1", "scene"),
+    ("plant", "object.mas_kg:=4.0", "object.mas_kg: no such parameter"),
+    ("plant", "tilt.angle_rad:=0.3", "tilt.angle_rad: no such parameter"),
+    ("plant", "object.mass_kg:=-4.0", "object.mass_kg"),
+    ("monitor", "bag:=.", "bag: '.' exists"),
+]
+
+
+@pytest.fixture(scope="module")
+def refusals(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
+    """Exit status and messages of all refused nodes, which start together."""
+    cwd = tmp_path_factory.mktemp("refused")
+    nodes = [
+        subprocess.Popen([*START, name, "--ros-args", "-p", parameter], cwd=cwd, stderr=subprocess.PIPE, text=True)
+        for name, parameter, _ in REFUSED
+    ]
+    messages = [node.communicate(timeout=DEADLINE)[1] for node in nodes]
+    return list(zip([node.returncode for node in nodes], messages, strict=True))
+
+
+@pytest.mark.parametrize("row", range(len(REFUSED)), ids=[f"{name} {parameter}" for name, parameter, _ in REFUSED])
+def test_bad_parameters_are_refused(refusals: list[tuple[int, str]], row: int) -> None:
+    status, message = refusals[row]
+    assert status == 2
+    assert REFUSED[row][2] in message
+    assert "Traceback" not in message
 
 
 def test_a_second_plant_on_the_same_topics_is_refused() -> None:
