@@ -9,8 +9,7 @@ from itertools import product
 import numpy as np
 
 from grasp_ros.exact.integrator import Event
-from grasp_ros.physics.energy import EPS
-from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.layout import EPS, LEFT, Transition
 from grasp_ros.physics.model import Contact
 from grasp_ros.verification.cases.case import Case, Solver, recorded
 from grasp_ros.verification.cases.families import CHAIN, CREEP, EXTREME, IMPACT
