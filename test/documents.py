@@ -29,9 +29,8 @@ def text_with(old: str, new: str) -> str:
 
 def scene_of(name: str, *settings: str, without: tuple[str, ...] = ()) -> Scene:
     """A scene of the package with other numbers, or without some of its sections."""
-    document = yaml.safe_load(scenes.load(name, settings).to_yaml())
-    kept = {key: value for key, value in document.items() if key not in without}
-    return scenes.parse(yaml.safe_dump(kept, sort_keys=False), name, name)
+    scene = scenes.load(name, settings)
+    return scenes.compose(name, {key: numbers for key, numbers in scene.values.items() if key not in without})
 
 
 def case_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001, *settings: str) -> Scene:

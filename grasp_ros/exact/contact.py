@@ -13,7 +13,7 @@ from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import rate_lanes
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.polynomial import NOISE, curvatures, first_rise, invert_time, lane_range, values
-from grasp_ros.exact.records import Array, Candidate, Output, Plant, Settings, State, Step, Tables
+from grasp_ros.exact.records import Array, Candidate, Output, Plant, Scale, Settings, State, Step, Tables
 from grasp_ros.exact.scales import scales
 from grasp_ros.exact.series import expand_both, expand_one, step_size
 from grasp_ros.physics.layout import (
@@ -121,15 +121,9 @@ def vanished_step(tables: Tables, step: Step, span: float, allowed: float) -> fl
 
 
 @inlined
-def accepted_step(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Array
-                  ) -> tuple[float, Step]:
-    """Expand the series at the state; returns the length of an accepted step in its units, and what it is.
-
-    G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: the defect at the end of the step consists
-    of neglected terms only and decides whether the step is accepted. Shortening it costs no new expansion. The values
-    at its end are left in `tables.at`.
-    """
-    c, at, y, n = tables.c, tables.at, state.y, settings.order
+def begin_series(tables: Tables, plant: Plant, state: State, settings: Settings) -> tuple[Step, Scale]:
+    """Write order 0 of the series; returns what they stand for, and the scales of the impact."""
+    c, y = tables.c, state.y
     left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
     for lane in range(LANES):
         c[lane] = y[lane]
@@ -143,22 +137,29 @@ def accepted_step(tables: Tables, plant: Plant, state: State, settings: Settings
         w_r, v_r = scales(plant, state, settings, RIGHT)
     # The unit of s makes the radius of convergence about 1: coefficients must not leave the range of numbers.
     unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * settings.rate)
-    step = Step(n, unit, left, right)
-    if left and right:
-        expand_both(c, tables.f, plant.bodies, plant.pairs, unit, n)
-    else:
-        expand_one(c, tables.f, plant.bodies, plant.pairs, LEFT if left else RIGHT, unit, n)
-    h = step_size(c, left, right, w_l, w_r, max(v_l, v_r), n, settings.tolerance)
-    allowed = (100.0 * settings.tolerance + 100.0 * EPS) * (w_l * w_r if left and right else (w_l * w_r) ** 2)
+    return Step(settings.order, unit, left, right), Scale(w_l, w_r, max(v_l, v_r))
+
+
+@inlined
+def accepted_length(tables: Tables, step: Step, scale: Scale, settings: Settings, span: float, work: Array) -> float:
+    """Length in units of a step that is exact enough, or nan; the values at its end are left in `tables.at`.
+
+    G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: the defect at the end of the step consists
+    of neglected terms only and decides whether the step is accepted. Shortening it costs no new expansion.
+    """
+    c, n, left, right = tables.c, step.order, step.left, step.right
+    h = step_size(c, left, right, scale.w_l, scale.w_r, scale.v, n, settings.tolerance)
+    product = scale.w_l * scale.w_r
+    allowed = (100.0 * settings.tolerance + 100.0 * EPS) * (product if left and right else product**2)
     if h == math.inf:
-        return vanished_step(tables, step, span, allowed), step
+        return vanished_step(tables, step, span, allowed)
     for _ in range(60):
-        values(c, n, h, at)
-        if defect(at, step) <= allowed:
-            return h, step
+        values(c, n, h, tables.at)
+        if defect(tables.at, step) <= allowed:
+            return h
         work[Work.REJECTED_STEPS] += 1
         h *= 0.7
-    return math.nan, step
+    return math.nan
 
 
 @inlined
@@ -195,7 +196,12 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     """One Taylor step, cut at its first event or at the end of the span; returns its time in s, or nan if it fails."""
     out.work[Work.CONTACT_STEPS] += 1
     c, at, y, n = tables.c, tables.at, state.y, settings.order
-    h, step = accepted_step(tables, plant, state, settings, span, out.work)
+    step, scale = begin_series(tables, plant, state, settings)
+    if step.left and step.right:
+        expand_both(c, tables.f, plant.bodies, plant.pairs, step.unit, n)
+    else:
+        expand_one(c, tables.f, plant.bodies, plant.pairs, LEFT if step.left else RIGHT, step.unit, n)
+    h = accepted_length(tables, step, scale, settings, span, out.work)
     curvatures(c, n, h, tables.size)
     left = pair_candidate(tables, plant, state, n, LEFT, h, out.work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)

@@ -10,7 +10,7 @@ from grasp_ros.exact.clock import until
 from grasp_ros.exact.contact import contact_segment
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
-from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.jit import kernel
 from grasp_ros.exact.modes import begin_interval, end_ballistic, leave_corner
 from grasp_ros.exact.outputs import may_go_on, write_reached
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, State, Tables
@@ -26,7 +26,10 @@ def advance(
     end: float, tolerance: float, max_work: int,
     grid: Array, rows: Array, events: Array, filled: Integers, work: Integers,
 ) -> int:
-    """The door: flat arrays become records, because each record that crosses from Python costs half a microsecond.
+    """Integrate from the clock to `end` under constant inputs, segment by segment.
+
+    This is the door: flat arrays come in and become records, because a record that crosses from Python costs half a
+    microsecond.
 
     Parameters
     ----------
@@ -51,16 +54,10 @@ def advance(
         A `layout.Outcome`. If it is neither DONE nor EVENTS_FULL nor WORK_USED, `rows` holds nothing of the segment
         that failed.
     """
-    plant = Plant(given, bodies, pairs, coulomb)
+    tables = Tables(c, f, at, size, row)
+    plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, clock)
     settings = Settings(tolerance, row.shape[0] - 1, rate_bound(given))
     out = Output(grid, rows, events, filled, work)
-    return run(Tables(c, f, at, size, row), plant, State(y, mode, clock), settings, end, max_work, out)
-
-
-@inlined
-def run(tables: Tables, plant: Plant, state: State, settings: Settings, end: float, max_work: int, out: Output
-        ) -> Outcome:
-    """Integrate from the clock to `end` under constant inputs, segment by segment."""
     begin_interval(plant, state, settings, out)
     idle = 0
     before = energy_level(plant, state, 0.0)

@@ -9,12 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact import hybrid
+from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
 from grasp_ros.exact.records import Tables
 from grasp_ros.exact.series import new_tables, series_order
 from grasp_ros.physics.energy import energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EVENT_TIME, FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Transition, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
@@ -94,7 +95,7 @@ class Integrator:
 
     Raises
     ------
-    ValueError
+    Refused
         If the accuracy is outside its range or the state is not finite.
     """
 
@@ -103,10 +104,10 @@ class Integrator:
         max_work: int = MAX_WORK,
     ) -> None:
         if not FINEST <= accuracy <= COARSEST:
-            raise ValueError(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+            raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
         state = system.state
         if state.shape != (6,) or not np.isfinite(state).all():
-            raise ValueError(f"state: {state!r} is not an array of six finite numbers")
+            raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._accuracy = system, accuracy
@@ -180,17 +181,17 @@ class Integrator:
 
         Raises
         ------
-        ValueError
+        Refused
             If the duration is negative or not finite.
         """
         if not (math.isfinite(duration) and duration >= 0.0):
-            raise ValueError(f"duration: {duration!r} is not a finite number of seconds >= 0")
+            raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else np.ascontiguousarray(grid, dtype=float)
         out = np.empty((len(times), 6))
         clock, filled = np.zeros(2), np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
             allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
-            outcome = hybrid.advance(
+            outcome = advance(
                 *self._tables, self._given, self._bodies, self._pairs, self._coulomb, self._y, self._mode, clock,
                 duration, self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled,
                 self.work,

@@ -76,6 +76,14 @@ class Step(NamedTuple):
     right: bool
 
 
+class Scale(NamedTuple):
+    """Sizes of an impact, powers of two, see `scales.scales`."""
+
+    w_l: float  # of w = sqrt(u), left; 1 where the pair is not in contact
+    w_r: float
+    v: float  # of u', m/s
+
+
 class Regime(IntEnum):
     """Form of the closed solution of a flight, see `flight.fly`."""
 

@@ -138,13 +138,14 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
         gv, gd, gl, gr, go, u, q, z = convolve(f, k, 0, 2)
         u = (u + w_next * w_before) + w_end * w
         q = (q + u_next * u_before) + u_end * u
-        g = hertzian * q
+        g = hertzian * q  # H w^4: the elastic force H w^3, times the w of dt = 2 w ds
         u_l, u_r = (u, gap) if on_left else (gap, u)
         one = 1.0 if k == 0 else 0.0
         a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d, d_open = (v_l - v_o, v_o - v_r) if on_left else (v_o - v_r, v_l - v_o)
-        e = one + loss * d
+        e = one + loss * d  # 1 + p u'
         now = (v_o, d_open, a_l, a_r, a_o, e)
+        # The impact law (6) per 2 ds: H w^4 (1 + p u').
         z = with_ends(z, e, g, first[5], g_0, second[5], g_1, before[5], g_before)
         gv = with_ends(gv, v_o, w, first[0], w_0, second[0], w_1, before[0], w_before)
         gd = with_ends(gd, d_open, w, first[1], w_0, second[1], w_1, before[1], w_before)
@@ -196,6 +197,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d_l, d_r = v_l - v_o, v_o - v_r
         e_l, e_r = one + loss_l * d_l, one + loss_r * d_r
+        # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
         z_l, z_r = (z_l + a[10] * g_l) + e_l * b[3], (z_r + a[11] * g_r) + e_r * b[4]
         wd_l, wd_r = (wd_l + a[6] * w_r) + d_l * b[2], (wd_r + a[7] * w_l) + d_r * b[1]
         gv, gl, gr, go = (

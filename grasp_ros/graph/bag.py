@@ -20,14 +20,17 @@ from rosbags.interfaces import (
     QosTime,
 )
 from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.effects.force import SECTIONS
+from grasp_ros.scene.files import decoding, writing
 from grasp_ros.scene.topics import (
     CHANGES,
     EXTERNAL_FORCES,
@@ -43,7 +46,7 @@ _TYPES = get_typestore(Stores.ROS2_JAZZY)
 _NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
 
 
-class BagError(ValueError):
+class BagError(Refused):
     """A bag that cannot be written or read: names the path and the reason."""
 
 
@@ -70,12 +73,13 @@ class Recorder:
     Raises
     ------
     BagError
-        If the directory exists or cannot be written.
+        If the directory exists or cannot be written, now or later.
     """
 
     def __init__(self, path: Path, scene: scenes.Scene, versions: dict[str, str]) -> None:
-        self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
+        self._path = path
         try:
+            self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
         except (WriterError, OSError) as error:
             raise BagError(f"{path}: cannot be written: {error}") from None
@@ -94,7 +98,8 @@ class Recorder:
 
     def write(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
         """Append one serialized message with its simulated time."""
-        self._writer.write(self._connections[topic.name], time_ns, cdr)
+        with writing(self._path, BagError):
+            self._writer.write(self._connections[topic.name], time_ns, cdr)
 
     def write_lyapunov(self, time_ns: int, values: Sequence[float]) -> None:
         """Append the monitor's own values; serialized here, because rclpy pads this type with stray bytes."""
@@ -110,7 +115,8 @@ class Recorder:
 
     def close(self) -> None:
         """Finish the bag; only now it has its metadata."""
-        self._writer.close()
+        with writing(self._path, BagError):
+            self._writer.close()
 
 
 @dataclass(frozen=True)
@@ -203,16 +209,13 @@ def read(path: Path) -> Recording:
     BagError
         If the path is not such a bag.
     """
-    try:
+    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError, yaml.YAMLError)):
         metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
         custom = metadata["rosbag2_bagfile_information"]["custom_data"]
         scene = scenes.parse(custom["scene"], path.name, str(path))
         with Reader(path) as reader:
             columns = {topic: _column(reader, topic, scene) for topic in scene.topics}
             changes = _changes(reader, scene)
-    except (ReaderError, KeyError, TypeError, OSError, ValueError, yaml.YAMLError) as error:
-        reason = " ".join(str(error).split())
-        raise BagError(f"{path}: not a bag of this package: {reason}") from None
     ticks, joints = columns[JOINT_STATES]
     if not len(ticks):
         raise BagError(f"{path}: holds no tick")

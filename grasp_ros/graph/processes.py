@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
 
 STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
@@ -40,10 +41,6 @@ class Graph:
     errors : int, optional
         Where the processes' messages go, as in `subprocess.Popen`; default: the terminal.
 
-    Raises
-    ------
-    FileExistsError
-        If the directory exists.
     """
 
     scene: Scene
@@ -59,10 +56,17 @@ class Graph:
         return self.directory / "bag"
 
     def start(self) -> None:
-        """Start the processes, each in a session of its own: a Ctrl-C reaches them through `stop`, once."""
-        self.directory.mkdir(parents=True)
+        """Start the processes, each in a session of its own: a Ctrl-C reaches them through `stop`, once.
+
+        Raises
+        ------
+        Refused
+            If the directory exists or cannot be written.
+        """
         scene_file = self.directory / f"{self.scene.name}.yaml"
-        scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+        with writing(self.directory):
+            self.directory.mkdir(parents=True)
+            scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
         environment = {
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "ROS_LOG_DIR": str(self.directory / "log"),

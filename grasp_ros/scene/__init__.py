@@ -1,6 +1,6 @@
 """Scenes: strict YAML files that say everything about a run, and the effects that they are composed of."""
 
-from grasp_ros.scene.scene import PAPER, Scene, load, names, parse
+from grasp_ros.scene.scene import PAPER, Scene, compose, load, names, parse
 from grasp_ros.scene.validation import SceneError
 
-__all__ = ["PAPER", "Scene", "SceneError", "load", "names", "parse"]
+__all__ = ["PAPER", "Scene", "SceneError", "compose", "load", "names", "parse"]

@@ -6,20 +6,22 @@ simulated. Every key carries its unit. Nothing is repaired: a file that is not e
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, MASS, OBJECT, RIGHT
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
+from grasp_ros.scene.files import reading
+from grasp_ros.scene.settings import apply
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
@@ -33,7 +35,7 @@ PAPER = frozenset(  # the sections of the paper's grasp
 
 @dataclass(frozen=True)
 class Scene:
-    """A validated scene.
+    """A validated scene; `load`, `parse`, `compose` and `changed` make one.
 
     Attributes
     ----------
@@ -73,12 +75,12 @@ class Scene:
 
         Raises
         ------
-        ValueError
+        Refused
             If the scene is not two arms, an object, two contacts and the paper's feedback.
         """
         system = self.system
         if self.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
-            raise ValueError(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
+            raise Refused(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
         left, right = (self._arm(side) for side in (LEFT, RIGHT))
         (hertz_l, loss_l), (hertz_r, loss_r) = system.pairs.tolist()
         mass = float(system.bodies[OBJECT, MASS])
@@ -163,24 +165,26 @@ class Scene:
         SceneError
             If the result cannot be run.
         """
-        values = {section: dict(content) for section, content in self.values.items()}
+        document = self._document()
         for name, number in numbers.items():
             section, _, key = name.partition(".")
-            if key not in values.get(section, {}):
+            if key not in self.values.get(section, {}):
                 raise SceneError(f"{self.name}: {name}: not in this scene; allowed: what it names")
-            values[section][key] = number
-        values = read_sections(self.name, values)
-        check_together(self.name, values)
-        return replace(self, values=values)
+            document[section][key] = number
+        return _read(document, self.name, self.name)
 
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
+        return dump(self._document())
+
+    def _document(self) -> dict[str, Any]:
+        """What a file with this scene holds."""
+        watch = {"watch": self.watch} if self.watch else {}
         values = {
             section: {key: list(value) if isinstance(value, tuple) else value for key, value in numbers.items()}
             for section, numbers in self.values.items()
         }
-        texts = {"title": self.title, "readings": list(self.readings), **({"watch": self.watch} if self.watch else {})}
-        return dump({**texts, **values})
+        return {"title": self.title, "readings": list(self.readings), **watch, **values}
 
 
 def names() -> list[str]:
@@ -196,7 +200,8 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
     ----------
     reference : str
     settings : sequence of str
-        "section.key=value": numbers that replace those of the file, or name what it does not.
+        "section.key=value": numbers that replace those of the file, or name what it does not. "section={}" names a
+        section without numbers; if it is there, it stays as it is.
 
     Raises
     ------
@@ -205,12 +210,10 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
     """
     path = Path(reference)
     if path.suffix in (".yaml", ".yml"):
-        if not path.is_file():
-            raise SceneError(f"{reference}: no such file")
-        try:
+        with reading(reference, SceneError):
+            if not path.is_file():
+                raise SceneError(f"{reference}: no such file")
             text = path.read_text(encoding="utf-8")
-        except UnicodeDecodeError as error:
-            raise SceneError(f"{reference}: {error}; allowed: UTF-8 text") from None
         return parse(text, path.stem, str(path), settings)
     if reference not in names():
         known = ", ".join(names())
@@ -228,18 +231,50 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     """
     try:
         document = load_yaml(text)
-    except ValueError as error:
-        raise SceneError(f"{source}: {' '.join(str(error).split())}") from None
+    except Refused as error:
+        raise SceneError(f"{source}: {error}") from None
     if not isinstance(document, dict):
         raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
-    for setting in settings:
-        _apply(document, setting)
+    apply(settings, document)
+    return _read(document, name, source)
+
+
+def compose(
+    name: str, sections: Mapping[str, Mapping[str, Any]], *, title: str | None = None, readings: Sequence[str] = (),
+    watch: str = "",
+) -> Scene:
+    """A scene from its sections, validated like a file.
+
+    Parameters
+    ----------
+    name : str
+        Name of the scene, which errors name as well.
+    sections : mapping of str to mapping of str to float, int or sequence of float
+        Numbers by section and key, as a file has them: `{"time": {"duration_s": 1.0, ...}, "loop": {}, ...}`.
+    title : str, optional
+        Default: the name.
+    readings : sequence of str
+    watch : str
+        See `Scene`.
+
+    Raises
+    ------
+    SceneError
+        If it is not a scene that can be run.
+    """
+    check_keys(name, "", sections, tuple(BY_SECTION), ("time",))
+    texts = {"title": name if title is None else title, "readings": readings, "watch": watch}
+    return _read({**texts, **sections}, name, name)
+
+
+def _read(document: Mapping[Any, Any], name: str, source: str) -> Scene:
+    """The one place where a scene is made: from a file, from sections, or from another scene."""
     check_keys(source, "", document, (*TEXTS, *BY_SECTION), ("title", "readings", "time"))
     title, readings, watch = document["title"], document["readings"], document.get("watch", "")
     for key, value in (("title", title), ("watch", watch)):
         if not isinstance(value, str):
             raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text")
-    if not isinstance(readings, list) or not all(isinstance(reading, str) for reading in readings):
+    if not isinstance(readings, (list, tuple)) or not all(isinstance(reading, str) for reading in readings):
         raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of texts")
     values = read_sections(source, {key: numbers for key, numbers in document.items() if key in BY_SECTION})
     check_together(source, values)
@@ -248,20 +283,3 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
 
 def _library() -> Any:
     return resources.files("grasp_ros.config")
-
-
-def _apply(document: dict[Any, Any], setting: str) -> None:
-    match = re.fullmatch(r"(\w+)\.(\w+)=(.*)", setting)
-    if match is None:
-        raise SceneError(f"--set {setting}: not understood; allowed: section.key=value")
-    section, key, value = match.groups()
-    known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
-    if f"{section}.{key}" not in known:
-        raise SceneError(f"--set {setting}: no such key; allowed: {', '.join(known)}")
-    try:
-        number = load_yaml(value)
-    except ValueError as error:
-        raise SceneError(f"--set {setting}: {error}; allowed: a number") from None
-    numbers = document.setdefault(section, {})
-    if isinstance(numbers, dict):  # anything else is refused with the file
-        numbers[key] = number

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Hashable
 from typing import Any
 
 import yaml
 
+from grasp_ros.physics.errors import Refused
+
 _FLOAT = re.compile(r"^[-+]?(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$")
 _INT = re.compile(r"^[-+]?(0|[1-9]\d*)$")
 _RULES = (("float", _FLOAT), ("int", _INT))
+MISFITS = (ValueError, LookupError, AttributeError)  # what PyYAML raises for 2001-13-45, `!!bool x`, `!!timestamp x`
 _NUMERIC = {f"tag:yaml.org,2002:{kind}" for kind, _ in _RULES}
 
 
@@ -30,14 +34,14 @@ for _class in (_Loader, _Dumper):
         _class.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", _pattern, list("-+0123456789."))
 
 
-def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[str, Any]:
-    result: dict[str, Any] = {}
+def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    result: dict[Any, Any] = {}
     for key_node, value_node in node.value:
         key = loader.construct_object(key_node, deep=True)
-        if isinstance(key, (list, dict)):
-            raise ValueError(f"{key!r} is a key; allowed: texts as keys")
+        if not isinstance(key, Hashable):
+            raise Refused(f"{key!r} is a key; allowed: texts as keys")
         if key in result:
-            raise ValueError(f"{key}: the key stands twice; allowed: once")
+            raise Refused(f"{key}: the key stands twice; allowed: once")
         result[key] = loader.construct_object(value_node, deep=True)
     return result
 
@@ -50,13 +54,19 @@ def load(text: str) -> Any:
 
     Raises
     ------
-    ValueError
+    Refused
         If the text is not YAML, a key stands twice, or a key is a list or a mapping.
     """
     try:
         return yaml.load(text, _Loader)
+    except Refused:
+        raise
     except yaml.YAMLError as error:
-        raise ValueError(" ".join(str(error).split())) from None
+        raise Refused(" ".join(str(error).split())) from None
+    except MISFITS as error:
+        raise Refused(f"a value cannot be read: {error}") from None
+    except RecursionError:
+        raise Refused("nested too deeply") from None
 
 
 def dump(document: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import Effect
 from grasp_ros.scene.parameter import Parameter
@@ -12,7 +13,7 @@ from grasp_ros.scene.parameter import Parameter
 SOMETHING = frozenset(("left_arm", "object", "right_arm"))
 
 
-class SceneError(ValueError):
+class SceneError(Refused):
     """A scene that cannot be run as written: names the file, the key, the value and what is allowed."""
 
 
@@ -50,7 +51,7 @@ def read_sections(source: str, values: Mapping[str, Any]) -> dict[str, dict[str,
 def _section(source: str, effect: Effect, found: Any) -> dict[str, Any]:
     keys = [parameter.key for parameter in effect.parameters]
     needed = [parameter.key for parameter in effect.parameters if not parameter.optional]
-    if not isinstance(found, dict):
+    if not isinstance(found, Mapping):
         raise SceneError(
             f"{source}: {effect.section}: {found!r} is not allowed; allowed: a mapping with {', '.join(keys)}"
         )

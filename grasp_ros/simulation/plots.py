@@ -11,11 +11,14 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from grasp_ros.physics.energy import Energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import PAPER, Scene
+from grasp_ros.scene.files import writing
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
 PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
@@ -59,13 +62,11 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
 
     Raises
     ------
-    ValueError
-        If matplotlib does not know the format, or the motion is empty.
-    OSError
-        If the file cannot be written.
+    Refused
+        If the motion is empty, matplotlib does not know the format, or the file cannot be written.
     """
     if not len(motion.t):
-        raise ValueError("nothing to draw: the motion has no output times")
+        raise Refused("nothing to draw: the motion has no output times")
     figure, (top, middle, bottom) = plt.subplots(
         3, 1, sharex=True, figsize=(9.0, 9.0), height_ratios=(3, 2, 3), layout="constrained"
     )
@@ -88,8 +89,27 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:
             axes.legend(loc="upper right", ncols=3, fontsize="small")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    save(figure, path)
+
+
+def save(figure: Figure, path: Path, dpi: int = 150) -> None:
+    """Write a figure into a file, and close it.
+
+    Raises
+    ------
+    Refused
+        If matplotlib does not know the format, or the file cannot be written.
+    """
+    known, ending = figure.canvas.get_supported_filetypes(), path.suffix.removeprefix(".").lower()
+    try:
+        if ending and ending not in known:
+            raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
+        with writing(path):
+            figure.savefig(path, dpi=dpi)
+    except RuntimeError as error:  # a .pgf where there is no TeX
+        raise Refused(f"{path}: {error}") from None
+    finally:
+        plt.close(figure)
 
 
 def _limits(axes: Axes, paper: tuple[float, float], values: Array) -> None:

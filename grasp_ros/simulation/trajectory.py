@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, Event, Status, to_events
-from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.methods.registry import EXACT, METHODS, find
 from grasp_ros.physics.energy import Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.files import decoding, writing
 
 
 def tick_times(scene: Scene) -> Array:
@@ -28,7 +29,10 @@ def tick_times(scene: Scene) -> Array:
 
 def tick_of(scene: Scene, t: Array) -> NDArray[np.int64]:
     """The last tick at or before each time in s, shape (n,)."""
-    return np.searchsorted(tick_times(scene), t, side="right") - 1
+    ticks = np.floor(np.asarray(t) * (NANOSECONDS / scene.period_ns)).astype(np.int64)  # rounding may miss it by one
+    ticks -= ticks * scene.period_ns / NANOSECONDS > t
+    ticks += (ticks + 1) * scene.period_ns / NANOSECONDS <= t
+    return np.minimum(ticks, scene.ticks)
 
 
 class Loop(NamedTuple):
@@ -135,11 +139,11 @@ class Trajectory:
 
         Raises
         ------
-        OSError
+        Refused
             If the file cannot be written.
         """
         level = self.energy
-        with path.open("wb") as file:
+        with writing(path), path.open("wb") as file:
             np.savez_compressed(
                 file, t=self.t, state=self.state, command=self.command, inputs=self.inputs,
                 V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode,
@@ -160,13 +164,21 @@ def load(path: Path) -> Trajectory:
     Refused
         If the file is not such a file.
     """
-    try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
-            loop = Loop(data["command"], data["inputs"])
-            return Trajectory(
-                scene, data["t"], data["state"], loop if data["sampled"] else None, data["events"], data["work"],
-                Status[str(data["status"])], str(data["method"]), float(data["setting"]), str(data["stop"]),
-            )
-    except (OSError, EOFError, KeyError, ValueError, TypeError, BadZipFile) as error:
-        raise Refused(f"{path}: not a file of `grasp simulate`: {error}") from None
+    kind = "a file of `grasp simulate`"
+    with decoding(path, kind), path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+        scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
+        method, rows, events = find(str(data["method"])), len(data["t"]), len(data["events"])
+        loop = Loop(_numbers(data, "command", rows, 2), _numbers(data, "inputs", rows, 3))
+        return Trajectory(
+            scene, _numbers(data, "t", rows), _numbers(data, "state", rows, 6), loop if data["sampled"] else None,
+            _numbers(data, "events", events, 5), _numbers(data, "work", len(method.counters)),
+            Status[str(data["status"])], method.name, float(data["setting"]), str(data["stop"]),
+        )
+
+
+def _numbers(data: Mapping[str, np.ndarray], name: str, *shape: int) -> np.ndarray:
+    """An array of a file, if it has the shape that the others ask for."""
+    found = data[name]
+    if found.shape != shape or found.dtype.kind not in "fi":
+        raise Refused(f"{name}: {found.dtype} of shape {found.shape} is not allowed; allowed: numbers of shape {shape}")
+    return found

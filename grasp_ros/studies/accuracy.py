@@ -32,8 +32,11 @@ def default_scenes() -> list[Scene]:
     """Cases 1 to 4 of the paper, and case 1 with a contact that is stiffer by 1e4."""
     name, hertzian = STIFF
     stiff = scenes.load(name, [f"{side}_contact.hertz_N_per_m1_5={hertzian}" for side in ("left", "right")])
-    text = stiff.to_yaml()
-    return [*map(scenes.load, STANDARD), scenes.parse(text, f"{name}_H{hertzian:.0e}".replace("+0", ""), name)]
+    renamed = scenes.compose(
+        f"{name}_H{hertzian:.0e}".replace("+0", ""), stiff.values, title=stiff.title, readings=stiff.readings,
+        watch=stiff.watch,
+    )
+    return [*map(scenes.load, STANDARD), renamed]
 
 
 def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: Sequence[Contender]) -> list[Record]:
@@ -41,7 +44,7 @@ def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: 
 
     Raises
     ------
-    ValueError
+    Refused
         If a scene is one that the contenders cannot treat, see `measure.check` and `methods.registry.check`.
     """
     for scene in subjects:

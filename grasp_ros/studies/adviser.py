@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from grasp_ros.methods.contract import UNITS
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.studies import accuracy
 from grasp_ros.studies.contenders import own_contenders
@@ -38,15 +39,13 @@ def advise(records: list[Record], error: float | None = None, budget: float | No
 
     Raises
     ------
-    ValueError
+    Refused
         If not exactly one of error and budget is given and positive, or nothing has a result.
     """
-    wish = error if budget is None else budget
-    if (error is None) == (budget is None) or not (wish is not None and wish > 0.0):
-        raise ValueError("--error, --budget: allowed: exactly one of them, a number > 0")
+    wish = _wish(error, budget)
     sound = [record for record in records if record.good and not record.missed and record.status == "done"]
     if not sound:
-        raise ValueError("no method has a result on this scene")
+        raise Refused("no method has a result on this scene")
 
     def cost(record: Record) -> tuple[float, float]:
         pair = (record.seconds or 0.0, record.error or 0.0)
@@ -61,16 +60,23 @@ def advise(records: list[Record], error: float | None = None, budget: float | No
     return Advice(ranked[0] if ranked else None, ranked[1 : 1 + OTHERS], min(sound, key=limited))
 
 
+def _wish(error: float | None, budget: float | None) -> float:
+    """The one number that is asked for."""
+    wish = error if budget is None else budget
+    if (error is None) == (budget is None) or wish is None or not wish > 0.0:
+        raise Refused("--error, --budget: allowed: exactly one of them, a number > 0")
+    return wish
+
+
 def run(scene: Scene, directory: Path, error: float | None, budget: float | None, quick: bool) -> tuple[Advice, str]:
     """Measure what is not in the journal yet, and answer in words.
 
     Raises
     ------
-    ValueError
+    Refused
         See `advise`.
     """
-    if (error is None) == (budget is None):
-        raise ValueError("--error, --budget: allowed: exactly one of them, a number > 0")
+    _wish(error, budget)
     effort = QUICK if quick else HASTE
     advice = advise(accuracy.run([scene], directory, effort, own_contenders()), error, budget)
     wish = f"an error of {error:g}" if budget is None else f"{budget:g} s"

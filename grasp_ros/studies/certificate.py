@@ -17,7 +17,7 @@ from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import page_figures
-from grasp_ros.studies.document import put
+from grasp_ros.studies.document import put, read, write
 from grasp_ros.studies.stability import first_limit
 
 JUMPS, LIMITS = "the jumps", "the limits of the control period"  # marked parts of the document
@@ -153,10 +153,10 @@ def run(document: Path | None) -> None:
 
     Raises
     ------
-    ValueError
-        If the document has no marks.
+    Refused
+        If the document cannot be read or written, or has no marks.
     """
-    text = "" if document is None else put(put(document.read_text(encoding="utf-8"), JUMPS, ""), LIMITS, "")
+    text = "" if document is None else put(put(read(document), JUMPS, ""), LIMITS, "")
     limits = limits_table()
     print(limits)
     table = f"{scenes_table()}\n\n{smallest_table(DRAWS, STEPS)}"
@@ -166,7 +166,7 @@ def run(document: Path | None) -> None:
         shown = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 8001)) for name in SCENES[:2]]
         page_figures.v_jumps(shown, figure)
         block = f"{table}\n\n![V and V_c]({figure.name})"
-        document.write_text(put(put(text, JUMPS, block), LIMITS, limits), encoding="utf-8")
+        write(document, put(put(text, JUMPS, block), LIMITS, limits))
 
 
 def limits_table() -> str:

@@ -4,8 +4,36 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import reading, writing
 
 WIDTH = 118
+
+
+def read(path: Path) -> str:
+    """The text of a document.
+
+    Raises
+    ------
+    Refused
+        If it cannot be read.
+    """
+    with reading(path):
+        return path.read_text(encoding="utf-8")
+
+
+def write(path: Path, text: str) -> None:
+    """Write a document.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written.
+    """
+    with writing(path):
+        path.write_text(text, encoding="utf-8")
 
 
 def put(text: str, part: str, block: str) -> str:
@@ -13,12 +41,12 @@ def put(text: str, part: str, block: str) -> str:
 
     Raises
     ------
-    ValueError
+    Refused
         If the text has no such marks.
     """
     begin, end = f"<!-- begin of {part} -->", f"<!-- end of {part} -->"
     if not (begin in text and end in text.split(begin)[1]):
-        raise ValueError(f"the document has no marks; allowed: a text with {begin} and {end}")
+        raise Refused(f"the document has no marks; allowed: a text with {begin} and {end}")
     before, rest = text.split(begin)
     return f"{before}{begin}\n\n{block}\n\n{end}{rest.split(end)[1]}"
 

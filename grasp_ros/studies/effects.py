@@ -21,12 +21,12 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.layout import Transition
-from grasp_ros.scene import Scene, strict_yaml
+from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.versions import versions
 from grasp_ros.studies import page_figures
-from grasp_ros.studies.document import put
+from grasp_ros.studies.document import put, read, write
 
 BARE = "bare"
 REPEATS, SAMPLED_REPEATS = 31, 5
@@ -57,10 +57,10 @@ def run(scene: Scene, document: Path | None) -> None:
 
     Raises
     ------
-    ValueError
-        If the document has no marks.
+    Refused
+        If the document cannot be read or written, or has no marks.
     """
-    text = None if document is None else document.read_text(encoding="utf-8")
+    text = None if document is None else read(document)
     if text is not None:
         text = put(text, REGISTRY, registry_table())
         put(text, COSTS, "")  # refuses a text without marks before the work begins
@@ -71,7 +71,7 @@ def run(scene: Scene, document: Path | None) -> None:
         figure = document.with_suffix(".png")
         page_figures.effect_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
         block = f"{table}\n\n![costs of the effects]({figure.name})"
-        document.write_text(put(text, COSTS, block), encoding="utf-8")
+        write(document, put(text, COSTS, block))
 
 
 def registry_table() -> str:
@@ -92,10 +92,10 @@ def variants(scene: Scene) -> dict[str, Scene]:
         if effect.example and own.keys() | {"loop"} >= set(effect.needs):
             needed: dict[str, Mapping[str, Any]] = {key: {} for key in effect.needs if key not in own}
             added: dict[str, Mapping[str, Any]] = {effect.section: {**own.get(effect.section, {}), **effect.example}}
-            found[effect.section] = _composed(scene, {**own, **needed, **added})
+            found[effect.section] = _with(scene, {**own, **needed, **added})
             everything = {**needed, **everything, **added}
     lesser = {f"{name}.yaml": scenes.load(name) for name in LESSER}
-    return {**found, "all together": _composed(scene, everything), **lesser}
+    return {**found, "all together": _with(scene, everything), **lesser}
 
 
 def measure(found: Mapping[str, Scene], repeats: int, sampled_repeats: int) -> list[Cost]:
@@ -121,12 +121,8 @@ def _final_state(scene: Scene) -> None:
     simulate(scene, grid=np.array([scene.duration]))
 
 
-def _composed(scene: Scene, values: Mapping[str, Mapping[str, Any]]) -> Scene:
-    document = strict_yaml.dump({
-        "title": scene.title, "readings": list(scene.readings),
-        **{section: dict(numbers) for section, numbers in values.items()},
-    })
-    return scenes.parse(document, scene.name, scene.name)
+def _with(scene: Scene, sections: Mapping[str, Mapping[str, Any]]) -> Scene:
+    return scenes.compose(scene.name, sections, title=scene.title, readings=scene.readings)
 
 
 def _interleaved(runs: Mapping[str, Callable[[], object]], repeats: int, what: str) -> dict[str, float]:

@@ -16,6 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from grasp_ros.methods.contract import STEP
+from grasp_ros.simulation.plots import save
 from grasp_ros.studies.accuracy import by_method, frontier
 from grasp_ros.studies.drift import Drift
 from grasp_ros.studies.loop import Point
@@ -28,6 +29,7 @@ COLORS = {  # by the beginning of a method's name; distinguishable for colour-bl
     "heyoka": "#009e73",
 }
 HEIGHT, WIDTH = 3.1, 4.3  # inches, of a panel
+DPI = 130
 
 
 def color(method: str) -> str:
@@ -73,7 +75,7 @@ def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
         axes.grid(alpha=0.25, which="major")
     _method_legend(panels[len(names)], list(by_method(records)))
     figure.supylabel("error: " + metric.replace(", against", ",\nagainst"), fontsize="small")
-    _save(figure, path)
+    save(figure, path, DPI)
 
 
 def _points(records: Sequence[Record]) -> tuple[list[float], list[float]]:
@@ -119,7 +121,7 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
             lines.values(), lines.keys(), fontsize=7, loc=("outside right upper", "outside right lower")[row],
             frameon=False,
         )
-    _save(figure, path)
+    save(figure, path, DPI)
 
 
 def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
@@ -141,7 +143,7 @@ def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
     axes.legend(fontsize=7, title="method, setting: worst drift, wall time", title_fontsize=7, loc="center left",
                 bbox_to_anchor=(1.0, 0.5))
     axes.grid(alpha=0.25)
-    _save(figure, path)
+    save(figure, path, DPI)
 
 
 def control_period(points: Sequence[Point], name: str, path: Path) -> None:
@@ -171,7 +173,7 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
         axes.set_xticks([20, 10, 5, 2, 1, 0.5, 0.2, 0.1], ["20", "10", "5", "2", "1", "0.5", "0.2", "0.1"])
         axes.minorticks_off()
         axes.grid(alpha=0.25)
-    _save(figure, path)
+    save(figure, path, DPI)
 
 
 def prediction(predictions: Sequence[Prediction], path: Path) -> None:
@@ -191,7 +193,7 @@ def prediction(predictions: Sequence[Prediction], path: Path) -> None:
     )
     axes.legend(fontsize=8, loc="lower right")
     axes.grid(alpha=0.25)
-    _save(figure, path)
+    save(figure, path, DPI)
 
 
 def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str, float], path: Path) -> None:
@@ -218,7 +220,7 @@ def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str,
     )
     axes.legend(fontsize=8)
     axes.grid(alpha=0.25)
-    _save(figure, path)
+    save(figure, path, DPI)
 
 
 def _panels(number: int) -> tuple[Any, list[Axes]]:
@@ -231,8 +233,3 @@ def _panels(number: int) -> tuple[Any, list[Axes]]:
     for spare in panels[number:]:
         spare.axis("off")
     return figure, panels
-
-
-def _save(figure: Any, path: Path) -> None:
-    figure.savefig(path, dpi=130)
-    plt.close(figure)

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.scene import Scene
 from grasp_ros.studies import graph
@@ -62,15 +61,13 @@ def run(scene: Scene, directory: Path, graph_periods: tuple[float, ...] = GRAPH_
 
 
 def _measure(scene: Scene, period_ms: float, grid: Any, ideal: Any, with_graph: bool) -> Point:
-    period = f"time.control_period_s={period_ms / 1e3!r}"
-    sampled = scenes.parse(scene.to_yaml(), scene.name, scene.name, [period])
+    sampled = scene.changed({"time.control_period_s": period_ms / 1e3})
     begin = time.perf_counter()
     state = simulation.simulate(sampled, grid=grid, sampled=True).state
     one = (time.perf_counter() - begin) / scene.duration
     four = bare = None
     if with_graph:
-        ticks = f"time.duration_s={TICKS * round(period_ms * 1e6) / 1e9!r}"
-        short = scenes.parse(sampled.to_yaml(), scene.name, scene.name, [ticks])
+        short = sampled.changed({"time.duration_s": TICKS * round(period_ms * 1e6) / 1e9})
         per_tick = 1e3 / period_ms  # ticks per simulated second
         pairs = [(graph.bare_speed(TICKS), graph.our_speed(short)) for _ in range(PAIRS)]
         bare, four = (per_tick / max(speeds) for speeds in zip(*pairs, strict=True))

@@ -9,9 +9,11 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import simulation
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.files import decoding, writing
 from grasp_ros.studies.peers import Answer, Contender, Solve
 from grasp_ros.studies.records import Journal, Record, scene_key
 from grasp_ros.verification import reference
@@ -47,26 +49,33 @@ def check(scene: Scene) -> None:
 
     Raises
     ------
-    ValueError
+    Refused
         If a pair starts in contact, or condition (10)'s second surface acts.
     """
     x_l, _, x_o, _, x_r, _ = scene.initial_state
     if not x_l < x_o < x_r:
-        raise ValueError(f"{scene.name}: starts in contact; allowed here: scenes that start with gaps on both sides")
+        raise Refused(f"{scene.name}: starts in contact; allowed here: scenes that start with gaps on both sides")
     if any(event.kind == Transition.CLAMP for event in simulation.simulate(scene).events):
-        raise ValueError(f"{scene.name}: a pair separates faster than 1/p; allowed here: scenes where none does")
+        raise Refused(f"{scene.name}: a pair separates faster than 1/p; allowed here: scenes where none does")
 
 
 def truth(scene: Scene, journal: Journal) -> Truth:
-    """The reference at the default output times; kept beside the journal."""
+    """The reference at the default output times; kept beside the journal.
+
+    Raises
+    ------
+    Refused
+        If what was kept is damaged, or cannot be written.
+    """
     path = journal.directory / f"reference_{scene_key(scene)}.npz"
     if path.exists():
-        with np.load(path) as data:
+        with decoding(path, "a reference of a study"), np.load(path) as data:
             return Truth(data["grid"], data["state"], (int(data["touches"][0]), int(data["touches"][1])))
     grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
     exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid.tolist(), digits=DIGITS)
     result = Truth(grid, exact.as_array(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
-    np.savez_compressed(path, **result._asdict())
+    with writing(path):
+        np.savez_compressed(path, **result._asdict())
     return result
 
 

@@ -12,8 +12,10 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
 from grasp_ros.studies import (
     accuracy,
+    document,
     drift,
     figures,
     loop,
@@ -46,7 +48,15 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         The journal.
     quick : bool
         Few settings on two short scenes, without the outside peers and without ROS.
+
+    Raises
+    ------
+    Refused
+        If a directory cannot be written.
     """
+    place = docs / "accuracy"
+    with writing(place):
+        place.mkdir(parents=True, exist_ok=True)
     subjects = accuracy.default_scenes()
     case = scenes.load(LOOP_SCENE)
     if quick:
@@ -61,8 +71,6 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     limits = stability.limits(case.grasp.left)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
-    place = docs / "accuracy"
-    place.mkdir(parents=True, exist_ok=True)
     write_csv(records, place / "records.csv")
     figures.work_precision(records, accuracy.METRIC, place / "error_against_time.png")
     figures.contacts_missed(records, place / "contacts_missed.png")
@@ -79,7 +87,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         *([] if quick else [time_sections.final_state(_final_states(subjects, directory))]),
         sections.methods(), sections.details(records),
     ]
-    page.write_text("\n\n".join(text) + "\n", encoding="utf-8")
+    document.write(page, "\n\n".join(text) + "\n")
     return page
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from grasp_ros.physics.model import penetration
-from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, Motion
+from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, Motion, save
 
 
 def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
@@ -24,8 +24,7 @@ def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
         axes.set_xlabel(label)
     panels[0].invert_yaxis()
     figure.suptitle("cost of each effect; beside the bars: ratio to the bare scene", fontsize="medium")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    save(figure, path)
 
 
 def v_jumps(motions: Sequence[Motion], path: Path) -> None:
@@ -51,14 +50,13 @@ def v_jumps(motions: Sequence[Motion], path: Path) -> None:
             axes.legend(loc="upper right", fontsize="small")
     panels[0, 0].set_ylabel("J")
     panels[1, 0].set_ylabel("1")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    save(figure, path)
 
 
 def hard_cases(
     rows: Sequence[tuple[str, float, float | None, Sequence[float | None]]], others: Sequence[str], path: Path
 ) -> None:
-    """Draw what hard cases reach: family, what is promised, our figure, those of other methods; None: no result."""
+    """Draw the errors of hard cases: family, what is promised, ours, those of other methods; None: no result."""
     figure, axes = plt.subplots(figsize=(11.0, 5.0), layout="constrained")
     floor = 1e-17  # where an exact 0 is drawn
     series = [("this package", LEFT_COLOR, "o", [own for _, _, own, _ in rows])]
@@ -80,5 +78,4 @@ def hard_cases(
     axes.set_ylabel("error by the case's oracle")
     axes.grid(axis="y", alpha=0.3)
     axes.legend(loc="upper right", ncols=3, fontsize="small")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
+    save(figure, path)

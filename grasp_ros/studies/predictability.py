@@ -1,4 +1,4 @@
-"""How far ahead a scene can be predicted in double precision: accuracy that a scene cannot hold is not for sale."""
+"""How far ahead a scene can be predicted in double precision."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
@@ -71,4 +70,4 @@ def report(predictions: Sequence[Prediction]) -> str:
 
 def horizon(scene: Scene, seconds: float) -> Scene:
     """The same scene over another horizon."""
-    return scenes.parse(scene.to_yaml(), scene.name, scene.name, [f"time.duration_s={seconds!r}"])
+    return scene.changed({"time.duration_s": seconds})

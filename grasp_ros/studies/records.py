@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 from grasp_ros import methods
 from grasp_ros.exact.jit import sources_digest
 from grasp_ros.scene import Scene
+from grasp_ros.scene.files import decoding, reading, writing
 
 PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "heyoka")
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
@@ -102,19 +103,31 @@ class Journal:
     ----------
     directory : Path
         Made if it does not exist.
+
+    Raises
+    ------
+    Refused
+        If the directory cannot be made or written, or holds a journal that is damaged.
     """
 
     def __init__(self, directory: Path) -> None:
-        directory.mkdir(parents=True, exist_ok=True)
+        with writing(directory):
+            directory.mkdir(parents=True, exist_ok=True)
         self.directory = directory
         self._path = directory / "journal.jsonl"
         self._lines: dict[str, Any] = {}
         if self._path.exists():
+            self._read()
+
+    def _read(self) -> None:
+        with reading(self._path):
             text = self._path.read_text(encoding="utf-8")
-            whole = text[: text.rfind("\n") + 1]
-            if whole != text:  # the last line of a run that was killed
+        whole = text[: text.rfind("\n") + 1]
+        if whole != text:  # the last line of a run that was killed
+            with writing(self._path):
                 self._path.write_text(whole, encoding="utf-8")
-            for line in whole.splitlines():
+        for line in whole.splitlines():
+            with decoding(self._path, "the journal of a study"):
                 entry = json.loads(line)
                 self._lines[entry["key"]] = entry["value"]
 
@@ -125,7 +138,7 @@ class Journal:
     def put(self, key: str, value: Any) -> None:
         """Note something at once."""
         self._lines[key] = value
-        with self._path.open("a", encoding="utf-8") as file:
+        with writing(self._path), self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"key": key, "value": value}) + "\n")
 
 
@@ -143,7 +156,7 @@ def scene_key(scene: Scene) -> str:
 
 def write_csv(records: Iterable[Record], path: Path) -> None:
     """All records as a table with a header."""
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with writing(path), path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow([*Record._fields, "missed"])
         for record in records:

@@ -17,10 +17,11 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.methods.registry import EXACT
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.studies import accuracy, measure, peer_heyoka, predictability
+from grasp_ros.studies import accuracy, document, measure, peer_heyoka, predictability
 from grasp_ros.studies.contenders import all_contenders, own_contenders
 from grasp_ros.studies.peers import Contender, Solve
 from grasp_ros.studies.records import Journal, Record, describe_machine
@@ -47,11 +48,12 @@ def run(scene: Scene, error: float, out: Path | None, directory: Path) -> None:
 
     Raises
     ------
-    ValueError
-        If the error is not positive, or the scene is one that the peers cannot treat, see `measure.check`.
+    Refused
+        If the error is not positive, the file cannot be written, or the scene is one that the peers cannot treat, see
+        `measure.check`.
     """
     if not error > 0.0:
-        raise ValueError(f"--error {error!r} is not allowed; allowed: a number > 0")
+        raise Refused(f"--error {error!r} is not allowed; allowed: a number > 0")
     measure.check(scene)
     target = measure.truth(scene, Journal(directory))
     heading = [
@@ -75,7 +77,7 @@ def run(scene: Scene, error: float, out: Path | None, directory: Path) -> None:
     if out is not None:
         record = {"scene": scene.to_yaml(), "metric": accuracy.METRIC, "error": error, "machine": describe_machine()}
         timings = {o: [{**t._asdict(), "record": t.record._asdict()} for t in rows] for o, rows in results.items()}
-        out.write_text(json.dumps({**record, "timings": timings}, indent=1) + "\n", encoding="utf-8")
+        document.write(out, json.dumps({**record, "timings": timings}, indent=1) + "\n")
 
 
 def final_state(scene: Scene, target: measure.Truth, error: float) -> list[Timing]:

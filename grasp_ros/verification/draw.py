@@ -9,8 +9,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
-from grasp_ros.verification.cases.scenes import composed, horizon
+from grasp_ros.verification.cases.scenes import horizon
 
 NUMBERS = 80  # of a draw
 
@@ -71,7 +72,7 @@ def draw_scene(numbers: Sequence[float]) -> Scene:
         _take_losses(sections)
     if draw.chance(0.3):
         _add_effects(draw, sections, speed**2 / size)
-    return composed("drawn", sections)
+    return scenes.compose("drawn", sections)
 
 
 def _add_loop(draw: Draw, sections: dict[str, dict[str, Any]], seconds: float) -> None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 from tqdm import tqdm
 
+from grasp_ros.scene.files import writing
 from grasp_ros.verification.cases.case import Unfinished
 from grasp_ros.verification.draw import NUMBERS, draw_scene
 from grasp_ros.verification.properties import Check, checks
@@ -38,6 +39,11 @@ def run(seconds: float, seed: int, directory: Path) -> int:
     -------
     int
         Number of failures.
+
+    Raises
+    ------
+    Refused
+        If a scene that fails cannot be written.
     """
     begin = time.monotonic()
     rng = np.random.default_rng(seed)
@@ -58,10 +64,11 @@ def run(seconds: float, seed: int, directory: Path) -> int:
                 tallies.setdefault(check.name, Tally()).add(check)
                 if not check.holds:
                     broken += 1
-                    directory.mkdir(parents=True, exist_ok=True)
                     path = directory / f"{check.name.replace(' ', '_')}_{seed}_{ends.total()}.yaml"
-                    path.write_text(scene.to_yaml(), encoding="utf-8")
-                    bar.write(f"{check.name}: {check.figure:.3g}, allowed {check.bound:.3g}; scene in {path}")
+                    with writing(path):
+                        directory.mkdir(parents=True, exist_ok=True)
+                        path.write_text(scene.to_yaml(), encoding="utf-8")
+                    bar.write(f"{check.name}: {check.error:.3g}, allowed {check.bound:.3g}; scene in {path}")
             bar.set_postfix_str(f"{ends.total()} scenes, {broken} failures", refresh=False)
             bar.update(passed - bar.n)
     print(f"{ends.total()} scenes in {seconds:g} s, seed {seed}, {sampled} of them sampled")

@@ -8,11 +8,13 @@ from functools import partial
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product, Solver, recorded
-from grasp_ros.verification.cases.scenes import ELASTIC, composed, distance, grasp, library, part
+from grasp_ros.verification.cases.families import RELATION
+from grasp_ros.verification.cases.scenes import ELASTIC, distance, grasp, library, part
 
 SWAPPED = [4, 5, 2, 3, 0, 1]
 FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
@@ -29,7 +31,7 @@ def mirrored(scene: Scene) -> Scene:
         values[f"{PAIRED[side]}_{rest}" if side in PAIRED else section] = {
             key: -value if key in DIRECTED else value for key, value in numbers.items()
         }
-    return composed(scene.name, values)
+    return scenes.compose(scene.name, values)
 
 
 def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
@@ -44,7 +46,7 @@ def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
         "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
         "gravity_m_per_s2": length / time**2,
     }
-    return composed(scene.name, {
+    return scenes.compose(scene.name, {
         section: {key: value * factors[key] for key, value in numbers.items()}
         for section, numbers in scene.values.items()
     })
@@ -86,12 +88,12 @@ def reversal(scene: Scene, solver: Solver) -> float:
     return float(np.abs(back * FLIP - scene.initial_state).max())
 
 
-def splitting(scene: Scene, pieces: int, solver: Solver) -> float:
+def splitting(scene: Scene, parts: int, solver: Solver) -> float:
     """Difference between one horizon and many, each started from the state before."""
     whole = solver.states(scene, [scene.duration])[0]
-    short = scene.changed({"time.duration_s": round(scene.duration / pieces, 9)})
+    short = scene.changed({"time.duration_s": round(scene.duration / parts, 9)})
     state = scene.initial_state
-    for _ in range(pieces):
+    for _ in range(parts):
         state = solver.states(started(short, state), [short.duration])[0]
     return distance(state[None], whole[None])
 
@@ -105,7 +107,7 @@ def _grid(scene: Scene, product: Product) -> float:
 def _absent(product: Product) -> float:
     """An arm and a contact that meet nobody, and not being there at all."""
     full = grasp([-0.3, 0.0, 0.0, 0.0, 1e6, 0.0], 5.0, right=Arm(1.0, 0.0, 0.0, 0.0, 0.0))
-    bare = composed("bare", {key: numbers for key, numbers in full.values.items() if not key.startswith("right")})
+    bare = scenes.compose("bare", {key: numbers for key, numbers in full.values.items() if not key.startswith("right")})
     times = part(full, 201)
     return float(np.abs(product.run(full, times).state[:, :4] - product.run(bare, times).state[:, :4]).max())
 
@@ -113,7 +115,7 @@ def _absent(product: Product) -> float:
 def _order(product: Product) -> float:
     """The order of the sections of a file."""
     scene = library("case_04", 5.0)
-    other = composed("case_04", dict(reversed(list(scene.values.items()))))
+    other = scenes.compose("case_04", dict(reversed(list(scene.values.items()))))
     times = part(scene, 201)
     return float(np.abs(product.run(scene, times).state - product.run(other, times).state).max())
 
@@ -123,20 +125,16 @@ def cases() -> Iterator[Case]:
     clamped = grasp([-0.3, 0, 0, 0, 0.2, 0], 5.0, contact=Contact(1e3, 15.0), mass=1.0)
     uneven = grasp([-0.3, 0.1, 0.02, 0.3, 0.5, 0], 5.0, right=Arm(2.0, 3.0, 0.1, 20.0, 1.0), contact=Contact(1e6, 0.5))
     for text, scene in (("case 3", library("case_03", 5.0)), ("clamped", clamped), ("uneven", uneven)):
-        yield Case("relation", f"mirror, {text}", "both sides must be the same code", "O6: bit for bit",
-                   partial(mirror, scene), 0.0)
+        yield Case(RELATION, f"mirror, {text}", partial(mirror, scene), 0.0, "O6")
     for units in ((4.0, 1.0, 1.0), (1.0, 2.0, 1.0), (1.0, 1.0, 8.0), (4.0**-3, 2.0**4, 0.25)):
-        yield Case("relation", f"units times {', '.join(f'{unit:g}' for unit in units)}", "tolerances must scale too",
-                   "O7: bit for bit", partial(scaling, *units, uneven), 0.0)
+        yield Case(RELATION, f"units times {', '.join(f'{unit:g}' for unit in units)}",
+                   partial(scaling, *units, uneven), 0.0, "O7: tolerances scale too")
     backwards = grasp([-0.3, 0.0, 0.05, 0.3, 0.2, -0.1], 5.0, left=ELASTIC, contact=Contact(1e4, 0.0))
-    yield Case("relation", "backwards in time", "every error of the way there is still there on the way back",
-               "O8: the start, m and m/s", partial(reversal, backwards), 1e-10)
-    for pieces in (10, 1000):
-        yield Case("relation", f"5 s in {pieces} pieces", "a piece may begin in any mode, at any depth",
-                   "the same final state", partial(splitting, uneven, pieces), 1e-10)
-    yield Case("relation", "2 or 20001 output times", "outputs must not steer the steps", "bit for bit",
-               partial(_grid, uneven), 0.0, product_only=True)
-    yield Case("relation", "absent or out of reach", "what is not there must not act", "bit for bit", _absent, 0.0,
-               product_only=True)
-    yield Case("relation", "order of the sections", "effects must not depend on it", "bit for bit", _order, 0.0,
-               product_only=True)
+    yield Case(RELATION, "backwards in time", partial(reversal, backwards), 1e-10,
+               "O8: back at the start, m and m/s; errors of both ways add up")
+    for parts in (10, 1000):
+        yield Case(RELATION, f"5 s in {parts} intervals", partial(splitting, uneven, parts), 1e-10,
+                   "the same end, relative; an interval may begin in any mode")
+    yield Case(RELATION, "2 or 20001 output times", partial(_grid, uneven), 0.0, product_only=True)
+    yield Case(RELATION, "an arm absent or out of reach", _absent, 0.0, product_only=True)
+    yield Case(RELATION, "order of the sections", _order, 0.0, product_only=True)

@@ -1,4 +1,4 @@
-"""How a graph and its nodes end: signals, a plant that is gone, energy from nowhere."""
+"""How a graph and its nodes end: signals, a plant that is gone, an energy balance that does not close."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ sys.exit(start.main("plant"))
 """
 
 
-def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Path) -> None:
+def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(tmp_path: Path) -> None:
     """A plant that pushes its arms harder than the commands say."""
     options = ["--ros-args", "-p", "wait_for_monitor:=true"]
     recording = [*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
@@ -144,7 +144,7 @@ def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Pat
         controller.communicate(timeout=DEADLINE)
     assert (monitor.returncode, others[0].returncode) == (1, 1)
     assert b"the monitor that this run waits for has ended" in last_words
-    assert re.search(r"V_c rose by \S+ J more than the held forces can explain, t = \S+ s, mode 0, state \[", err)
+    assert re.search(r"V_c rose by \S+ J more than the work of the held forces, t = \S+ s, mode 0, state \[", err)
     found = bag.read(tmp_path / "bag")
     assert found.alarms == 1
     assert found.lyapunov[-1, LYAPUNOV_NAMES.index("alarm")] == 1.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -139,12 +138,12 @@ def test_what_a_method_cannot_do_is_refused(options: dict[str, Any], complaint: 
 
 
 def test_scenes_with_more_than_the_basic_grasp_are_refused() -> None:
-    basic = scenes.load("case_01")
-    more = dataclasses.replace(basic, values={**basic.values, "line": {"tilt_rad": 0.1}})
-    with pytest.raises(ValueError, match="case_01: line: rk4 knows two arms, an object and their contacts"):
+    more = scenes.load("case_01", ["tilt.angle_rad=0.1", "tilt.gravity_m_per_s2=9.81"])
+    with pytest.raises(ValueError, match="case_01: tilt: rk4 knows two arms, an object and their contacts"):
         simulate(more, method="rk4")
-    less = dataclasses.replace(basic, values={key: value for key, value in basic.values.items() if key != "object"})
-    with pytest.raises(ValueError, match="case_01: object: rk4"):
+    less = scenes.compose("case_01", {key: value for key, value in scenes.load("case_01").values.items()
+                                      if key not in ("object", "left_contact", "right_contact")})
+    with pytest.raises(ValueError, match="case_01: left_contact, object, right_contact: rk4"):
         simulate(less, method="rk4")
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import yaml
 from documents import scene_of
 from oracles import flight_array
 
@@ -39,7 +38,7 @@ def test_an_absent_arm_is_one_that_is_out_of_reach() -> None:
     document = {**scenes.load("case_01", ["right_arm.position_m=1e3", "right_arm.stiffness_N_per_m=0",
                                           "right_feedback.position_gain_N_per_m=0"]).values}
     document.update(scenes.load("hammer").values)
-    far = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **document}), "far", "far")
+    far = scenes.compose("far", document)
     assert simulate(far).state[:, :4].tobytes() == motion.state[:, :4].tobytes()
     assert np.isnan(motion.state[:, 4:]).all()
 

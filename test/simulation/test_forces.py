@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import yaml
 from documents import scene_of
 from mpmath import mpf
 
@@ -72,9 +71,9 @@ def test_a_set_point_is_a_constant_force() -> None:
     ],
 )
 def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]], impulse: float) -> None:
-    document = {"title": "", "readings": [], "time": {"duration_s": 1.0, "control_period_s": 0.01},
+    document = {"time": {"duration_s": 1.0, "control_period_s": 0.01},
                 "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 1.0}, **section}
-    scene = scenes.parse(yaml.safe_dump(document), "push", "push")
+    scene = scenes.compose("push", document)
     for sampled in (False, True):
         motion = simulate(scene, sampled=sampled)
         assert motion.state[-1, 3] == pytest.approx(1.0 + impulse / 2.0, rel=1e-14)
@@ -85,10 +84,10 @@ def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]
 
 
 def test_a_sine_force_is_a_staircase_with_the_values_of_the_sine() -> None:
-    document = {"title": "", "readings": [], "time": {"duration_s": 1.0, "control_period_s": 0.001},
+    document = {"time": {"duration_s": 1.0, "control_period_s": 0.001},
                 "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
                 "object_sine": {"amplitude_N": 2.0, "frequency_Hz": 3.0, "phase_rad": 0.5}}
-    scene = scenes.parse(yaml.safe_dump(document), "shake", "shake")
+    scene = scenes.compose("shake", document)
     turn = 2 * np.pi * 3.0
     exact = 2.0 / turn * (np.cos(0.5) - np.cos(turn * tick_times(scene) + 0.5))
     found = simulate(scene, sampled=True).state[:, 3]

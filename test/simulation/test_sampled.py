@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import yaml
 from documents import case_of, scene_of
 
 from grasp_ros import scene as scenes
@@ -18,7 +17,7 @@ from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import SampledPlant, simulate
-from grasp_ros.simulation.trajectory import tick_times
+from grasp_ros.simulation.trajectory import tick_of, tick_times
 
 
 def plain_loop(scene: Scene) -> tuple[Array, Array]:
@@ -46,6 +45,18 @@ def test_sampled_is_a_plain_loop_bit_for_bit(name: str, period: float) -> None:
     assert np.array_equal(result.t, tick_times(scene))
     assert result.sampled
     assert len(result.times(Transition.TOUCH, LEFT)) >= 1
+
+
+@pytest.mark.parametrize("period", [0.001, 0.0123, 3e-9, 0.000976562, 0.1])
+def test_the_tick_of_a_time_is_the_last_one_that_has_come(period: float) -> None:
+    """Also one rounding before and after a tick; and without a table of all ticks, which may be too many."""
+    scene = case_of("case_01", round(1000 * period, 9), period)
+    ticks, times = np.arange(scene.ticks + 1), tick_times(scene)
+    assert np.array_equal(tick_of(scene, times), ticks)
+    assert np.array_equal(tick_of(scene, np.nextafter(times, np.inf)), ticks)
+    assert np.array_equal(tick_of(scene, np.nextafter(times[1:], 0.0)), ticks[:-1])
+    many = case_of("no_contact", 1e9, 1e-3)
+    assert tick_of(many, np.array([0.0, 1.0, 1e9])).tolist() == [0, 1000, 10**12]
 
 
 def test_sampled_between_ticks() -> None:
@@ -141,9 +152,9 @@ def test_delay_costs_the_stability_that_theory_says(factor: float, grows: bool) 
     """Spectral radius 1 of the sampled arm with one period of delay is at 0.08878 s."""
     period = round(0.0887780231816513 * factor * 1e6) / 1e6
     settings = [f"time.control_period_s={period!r}", f"time.duration_s={period * 2000:.9f}", "loop.delay_ticks=1"]
-    document = {key: value for key, value in yaml.safe_load(scenes.load("delay").to_yaml()).items()
-                if not key.startswith(("right", "object", "left_contact"))}
-    scene = scenes.parse(yaml.safe_dump(document), "d", "d", settings)
+    scene = scenes.load("delay", settings)
+    scene = scenes.compose("d", {section: numbers for section, numbers in scene.values.items()
+                                 if not section.startswith(("right", "object", "left_contact"))})
     swings = np.abs(simulate(scene).state[:, 0])
     assert (swings[-200:].max() > swings[:200].max()) == grows
 
@@ -164,7 +175,7 @@ def test_noise_is_seeded_and_as_large_as_it_says() -> None:
     for key in ("left_sensor", "right_sensor"):
         for step in steps:
             del sections[key][step]
-    smooth = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **sections}), "smooth", "smooth")
+    smooth = scenes.compose("smooth", sections)
     motion = simulate(smooth)
     assert simulate(smooth).state.tobytes() == motion.state.tobytes()
     other = simulate(smooth.changed({"left_sensor.noise_seed": 3}))
@@ -182,7 +193,7 @@ def test_quantised_measurements_are_whole_steps() -> None:
     document = {**scenes.load("noise").values}
     for side in ("left", "right"):
         document[f"{side}_sensor"] = {"noise_seed": 0, "position_step_m": 0.01}
-    scene = scenes.parse(yaml.safe_dump({"title": "", "readings": [], **document}), "steps", "steps")
+    scene = scenes.compose("steps", document)
     motion = simulate(scene)
     measured = (motion.command[:, 0] + 0.5 * motion.state[:, 1]) / -5.0
     assert np.abs(measured / 0.01 - np.round(measured / 0.01)).max() < 1e-9

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Sequence
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import rclpy
@@ -19,6 +21,7 @@ from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
@@ -37,7 +40,8 @@ class GraspNode(Node):
     why_read_only = "set at the start only, with -p or a parameter file"
 
     def __init__(self, name: str) -> None:
-        super().__init__(name)
+        with _refusing():
+            super().__init__(name)
         self.finished = False
         self.exit_code = 0
         self.counters: dict[str, int | float | str] = {}
@@ -50,13 +54,28 @@ class GraspNode(Node):
         """Declare a parameter that is set at start only, and return its value."""
         number = isinstance(default, float)  # for which an integer will do as well
         descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=number)
-        value = self.declare_parameter(name, default, descriptor).value
-        return float(value) if number else value
+        value = self._declare(name, default, descriptor)
+        if not number:
+            return value
+        if not isinstance(value, (float, int)) or isinstance(value, bool):
+            raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
+        return float(value)
+
+    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
+        """The value that the start has given, or the default."""
+        with _refusing():
+            value = self.declare_parameter(name, default, descriptor).value
+        return list(value) if isinstance(value, array) else value
 
     def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
         """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
 
         The types are dynamic so that an integer will do for a floating-point number.
+
+        Raises
+        ------
+        Refused
+            If the start has given a number that is not allowed, or one that is not there.
         """
         given = {}
         for effect in scene.effects:
@@ -64,14 +83,14 @@ class GraspNode(Node):
                 if parameter.key not in scene.values[effect.section]:
                     continue
                 name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
-                default = list(value) if parameter.several else value
-                found = self.declare_parameter(name, default, _descriptor(parameter)).value
-                found = list(found) if parameter.several else parameter.read(found)
-                if found != default:
+                found = self._declare(name, list(value) if parameter.several else value, _descriptor(parameter))
+                if not parameter.accepts(found):
+                    raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
+                if (found := parameter.read(found)) != value:
                     given[name] = found
         unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
         if unknown:  # rclpy itself would not say a word
-            raise ValueError(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
+            raise Refused(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
         return given
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
@@ -144,6 +163,15 @@ class GraspNode(Node):
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
 
 
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Refuse what rclpy refuses of the parameters that the start has given."""
+    try:
+        yield
+    except ParameterException as error:
+        raise Refused(str(error)) from None
+
+
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     """What `ros2 param describe` shows of a number of the scene."""
     descriptor = ParameterDescriptor(
@@ -162,21 +190,34 @@ def run(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
     The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
     raises.
     """
+    try:
+        return _live(make, received)
+    except Refused as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+def _live(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
     node = None
     try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        _init()
         node = make()
         executor = EventsExecutor()
         executor.add_node(node)
         while not (node.finished or received):
             executor.spin_once(timeout_sec=POLL_SECONDS)
         executor.shutdown()
-    except (ValueError, ParameterException) as error:
-        print(error, file=sys.stderr)
-        return 2
     finally:
         if node is not None:
             node.close()
             node.destroy_node()
         rclpy.try_shutdown()
     return node.exit_code
+
+
+def _init() -> None:
+    """Start rclpy with the arguments of the process."""
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the base of what rcl raises
+        raise Refused(f"--ros-args: {error}") from None

@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any
 
+from grasp_ros import scene as scenes
 from grasp_ros.verification.cases.case import Case, Product
-from grasp_ros.verification.cases.scenes import composed
+from grasp_ros.verification.cases.families import FOUND
 from grasp_ros.verification.properties import checks
 
 SCENES: tuple[tuple[str, str, Mapping[str, Mapping[str, Any]]], ...] = (
@@ -61,11 +62,10 @@ SCENES: tuple[tuple[str, str, Mapping[str, Mapping[str, Any]]], ...] = (
 
 def _violated(sections: Mapping[str, Mapping[str, Any]], _: Product) -> float:
     """Number of properties that do not hold."""
-    return float(sum(not check.holds for check in checks(composed("found", sections))))
+    return float(sum(not check.holds for check in checks(scenes.compose("found", sections))))
 
 
 def cases() -> Iterator[Case]:
     """One for each."""
-    for name, why, sections in SCENES:
-        yield Case("found", name, why, "all properties of `grasp study fuzz`", partial(_violated, sections), 0.0,
-                   product_only=True)
+    for name, note, sections in SCENES:
+        yield Case(FOUND, name, partial(_violated, sections), 0.0, note, product_only=True)

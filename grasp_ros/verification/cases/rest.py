@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product
-from grasp_ros.verification.cases.scenes import composed, part
+from grasp_ros.verification.cases.families import REST
+from grasp_ros.verification.cases.scenes import part
 
 PUSH, HERTZIAN, RATE = 1.0, 1e4, 10.0  # N, N/m^1.5, 1/s
 GRAVITY, ANGLE = 9.81, 0.3  # m/s^2, rad
@@ -20,7 +22,7 @@ BODIES = 1.0, 2.0  # kg, arm and object
 def _touching(seconds: float, stiffness: float, added: Mapping[str, Mapping[str, Any]]) -> Scene:
     """An arm and an object, both at rest at 0."""
     arm, mass = BODIES
-    return composed("touching", {
+    return scenes.compose("touching", {
         "time": {"duration_s": seconds, "control_period_s": 0.001},
         "left_arm": {"mass_kg": arm, "stiffness_N_per_m": stiffness, "position_m": 0.0, "velocity_m_per_s": 0.0},
         "object": {"mass_kg": mass, "position_m": 0.0, "velocity_m_per_s": 0.0},
@@ -74,10 +76,9 @@ def _tilted(sign: float, product: Product) -> float:
 def cases() -> Iterator[Case]:
     """All of them."""
     for start, sampled, text in ((0.0, False, "at once"), (1.0, False, "after 1 s"), (1.0, True, "in a sampled run")):
-        yield Case("rest", f"pushed {text}", "u and u' are 0: only the force tells that it is a touch",
-                   "momentum f t, energy f x, relative", partial(_pushes, start, sampled), 1e-13, product_only=True)
-    yield Case("rest", "the same push later", "until then nothing may happen", "the same motion, m and m/s", _later,
-               1e-12, product_only=True)
+        yield Case(REST, f"pushed {text}", partial(_pushes, start, sampled), 1e-13, product_only=True)
+    yield Case(REST, "the same push later", _later, 1e-12, "nothing before it, then the same motion, m and m/s",
+               product_only=True)
     for sign, text, oracle in ((-1.0, "part", "closed form, m"), (1.0, "are pressed together", "energy, J")):
-        yield Case("rest", f"on a tilted line they {text}", "gravity cancels in u''; a higher derivative decides",
-                   oracle, partial(_tilted, sign), 1e-13, product_only=True)
+        yield Case(REST, f"on a tilted line they {text}", partial(_tilted, sign), 1e-13,
+                   f"gravity cancels in u''; {oracle}", product_only=True)

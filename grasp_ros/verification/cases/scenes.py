@@ -1,11 +1,10 @@
-"""Building the scenes of hard cases from few numbers, and what their figures have in common."""
+"""Building the scenes of hard cases from few numbers, and what their errors have in common."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from grasp_ros.exact.integrator import Event
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.scene import Scene
-from grasp_ros.scene.validation import check_together, read_sections
 from grasp_ros.verification.reference import Reference, integrate
 
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
@@ -24,13 +22,6 @@ PERIOD = 1e-3  # s
 STIFF = Contact(1e4, 0.1)  # of Table 1
 AWAY = 1e8  # m, where a body is that shall meet nobody
 BEGIN, END = (Transition.TOUCH, Transition.REENTRY), (Transition.RELEASE, Transition.CLAMP)  # of a contact
-
-
-def composed(name: str, sections: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """A validated scene of the sections."""
-    values = read_sections(name, {section: dict(numbers) for section, numbers in sections.items()})
-    check_together(name, values)
-    return Scene(name, name, (), "", values)
 
 
 def horizon(seconds: float) -> dict[str, float]:
@@ -61,7 +52,7 @@ def grasp(state: Sequence[float] | Array, seconds: float, *, left: Arm = STANDAR
             "position_gain_N_per_m": arm.position_gain, "velocity_gain_Ns_per_m": arm.velocity_gain,
         }
         sections[f"{side}_contact"] = {"hertz_N_per_m1_5": pair.hertzian, "dissipation_s_per_m": pair.dissipation}
-    return composed(name, sections)
+    return scenes.compose(name, sections)
 
 
 def library(name: str, seconds: float) -> Scene:

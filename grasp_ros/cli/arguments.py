@@ -1,0 +1,93 @@
+"""What several subcommands share: their arguments, checks of these, and the compilation that most of them need."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST, compile_kernels
+from grasp_ros.exact.jit import COMPILING, kernels_on_disk
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene
+
+Command = Callable[[argparse.Namespace], int]
+STUDY_DIRECTORY = Path("runs") / "studies"
+ROW = 16  # numbers that a run keeps for each output time: time, state, commands, energies, and copies
+
+
+def add_command(commands: Any, name: str, command: Command, text: str) -> argparse.ArgumentParser:
+    """Add a subcommand; `command` is what it runs, and returns the exit status."""
+    sub: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
+    sub.set_defaults(command=command)
+    return sub
+
+
+def add_scene(sub: argparse.ArgumentParser) -> None:
+    """One scene, with settings."""
+    sub.add_argument("scene", help="a name that `grasp scenes` lists, or the path of a .yaml file")
+    add_settings(sub)
+
+
+def add_settings(sub: argparse.ArgumentParser) -> None:
+    """What replaces numbers of scenes."""
+    sub.add_argument(
+        "--set", dest="settings", action="append", default=[], metavar="section.key=value",
+        help="replace a number; section={} names a section without numbers",
+    )
+
+
+def add_accuracy(sub: argparse.ArgumentParser) -> None:
+    """The accuracy of `exact`."""
+    sub.add_argument(
+        "--accuracy", type=float, default=ACCURACY, metavar="A",
+        help=f"first neglected term of a contact, relative, {FINEST:g} to {COARSEST:g} (default {ACCURACY:g})",
+    )
+
+
+def add_output(sub: argparse.ArgumentParser, metavar: str, text: str, default: Path | None = None) -> None:
+    """A file or a directory to write."""
+    sub.add_argument("-o", "--output", type=Path, default=default, metavar=metavar, help=text)
+
+
+def add_study_directory(sub: argparse.ArgumentParser) -> None:
+    """Where a study keeps what it has measured."""
+    text = f"records, tables and figures; what is there is not measured again (default {STUDY_DIRECTORY})"
+    add_output(sub, "DIRECTORY", text, STUDY_DIRECTORY)
+
+
+def whole(least: int) -> Callable[[str], int]:
+    """Reads a whole number from a command line."""
+    def read(word: str) -> int:
+        if not word.isdecimal() or int(word) < least:
+            raise argparse.ArgumentTypeError(f"{word} is not allowed; allowed: a whole number >= {least}")
+        return int(word)
+
+    return read
+
+
+def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:
+    """Refuse more output times, or ticks of a sampled run, than memory holds, before the work.
+
+    Raises
+    ------
+    Refused
+        Names them.
+    """
+    ticks = scene.ticks if sampled or scene.sampled else 0
+    for name, rows in (("--grid", grid or 0), (f"{scene.name}: control periods", ticks)):
+        try:
+            np.empty((rows, ROW))
+        except (MemoryError, ValueError):  # the second: more than any array can have
+            raise Refused(f"{name}: {rows} is not allowed; allowed: as many as fit into memory") from None
+
+
+def prepare() -> None:
+    """Compile the kernels where that has not been done, and say so."""
+    if not kernels_on_disk():
+        print(COMPILING, file=sys.stderr)
+    compile_kernels()

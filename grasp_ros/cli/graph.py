@@ -1,0 +1,94 @@
+"""`grasp run` and `inspect`: the graph, and what it has recorded."""
+
+from __future__ import annotations
+
+import argparse
+import signal
+import sys
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, prepare
+from grasp_ros.exact.integrator import Integrator
+from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommands."""
+    sub = add_command(commands, "run", _run, "run a scene in four ROS 2 processes and record a bag")
+    add_scene(sub)
+    add_accuracy(sub)
+    add_output(sub, "DIRECTORY", "new directory for the scene and the bag")
+    sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
+    sub.add_argument("bag", type=Path)
+    sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
+    add_accuracy(sub)
+
+
+def _run(options: argparse.Namespace) -> int:
+    scene = scenes.load(options.scene, options.settings)
+    directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
+    Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
+    prepare()
+    graph = Graph(scene, directory, options.accuracy, progress=True)
+    begin = time.monotonic()
+    try:
+        stopped = _live(graph)
+    except GraphError as error:
+        print(f"grasp: {error}", file=sys.stderr)
+        return 1
+    seconds = time.monotonic() - begin
+    if not (graph.bag / "metadata.yaml").exists():
+        print("interrupted before the first tick: no bag")
+        return 0
+    return _report(graph, stopped, seconds)
+
+
+def _live(graph: Graph) -> bool:
+    """Start a graph, wait for its end and stop it; returns whether a signal has ended it."""
+    received: list[int] = []
+    for number in STOP_SIGNALS:  # only noted: an exception could leave a process behind
+        signal.signal(number, lambda which, _: received.append(which))
+    try:
+        graph.start()
+        graph.wait(received)
+    finally:
+        graph.stop()
+        for number in STOP_SIGNALS:
+            signal.signal(number, signal.default_int_handler)
+    return bool(received)
+
+
+def _report(graph: Graph, stopped: bool, seconds: float) -> int:
+    """Print and draw what a run has recorded; the exit status says whether it is all there and right."""
+    from grasp_ros.cli import report
+    from grasp_ros.graph import bag
+    from grasp_ros.simulation import plots
+
+    recording = bag.read(graph.bag)
+    rows, whole = report.describe_recording(recording), True
+    if not stopped:
+        comparison = report.compare_recording(recording, graph.accuracy)
+        whole = comparison.equal and not recording.alarms and not any(recording.missing.values())
+        figure = graph.directory / "figure.png"
+        plots.draw(recording, figure, graph.scene.feedback_in_words(sampled=True))
+        rows += [*comparison.rows, ("figure", str(figure))]
+    print(report.table([*rows, ("wall time", f"{seconds:.1f} s with start and stop")]))
+    return 0 if whole else 1
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from grasp_ros.cli import report
+    from grasp_ros.graph import bag
+
+    recording = bag.read(options.bag)
+    rows, equal = report.describe_recording(recording), True
+    if options.replay:
+        prepare()
+        comparison = report.compare_recording(recording, options.accuracy)
+        rows, equal = rows + comparison.rows, comparison.equal
+    print(report.table(rows))
+    return 0 if equal else 1

@@ -1,0 +1,91 @@
+"""`grasp scenes`, `methods` and `simulate`: what there is, and a run without ROS."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.arguments import (
+    add_accuracy,
+    add_command,
+    add_output,
+    add_scene,
+    check_memory,
+    prepare,
+    whole,
+)
+from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status
+from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
+from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation import GRID_POINTS, simulate
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommands."""
+    add_command(commands, "scenes", _scenes, "list the scenes that come with the package")
+    text = "list the methods of integration: order, source, what each does at a touch"
+    add_command(commands, "methods", _methods, text)
+    sub = add_command(commands, "simulate", _simulate, "simulate a scene without ROS")
+    add_scene(sub)
+    add_accuracy(sub)
+    sub.add_argument("--grid", type=whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
+    sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
+    sub.add_argument("--method", choices=METHODS, default=EXACT, help="way to integrate; see `grasp methods`")
+    setting = sub.add_mutually_exclusive_group()
+    setting.add_argument("--step", type=float, metavar="S", help="step in s of a method with a fixed step")
+    setting.add_argument("--tolerance", type=float, metavar="T", help="tolerance (rtol = atol) of an adaptive method")
+    sub.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N",
+                     help=f"budget of contact events (default {MAX_EVENTS})")
+    sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N",
+                     help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
+    add_output(sub, "FILE.npz", "write states, events, V and counters")
+
+
+def _scenes(_: argparse.Namespace) -> int:
+    for name in scenes.names():
+        print(f"{name}  {scenes.load(name).title}")
+    return 0
+
+
+def _methods(_: argparse.Namespace) -> int:
+    for name, method in METHODS.items():
+        print(f"{name}\n  order: {method.order}\n  source: {method.source}\n  at a touch: {method.at_touch}")
+        print(f"  --{method.knob}, default {method.default:g}{UNITS[method.knob]}")
+    return 0
+
+
+def _simulate(options: argparse.Namespace) -> int:
+    from grasp_ros.cli.report import describe_trajectory, table
+
+    scene = scenes.load(options.scene, options.settings)
+    setting = _setting(options)
+    check_memory(scene, options.sampled, options.grid)
+    grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
+    prepare()
+    quick = not (options.sampled or scene.sampled)
+    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
+        trajectory = simulate(
+            scene, grid=grid, sampled=options.sampled, method=options.method, setting=setting,
+            max_events=options.max_events, max_work=options.max_work,
+            progress=lambda reached: bar.update(reached - bar.n),
+        )
+    print(table(describe_trajectory(trajectory)))
+    if options.output is not None:
+        trajectory.save(options.output)
+        print(f"written to {options.output}")
+    return 0 if trajectory.status is Status.DONE else 1
+
+
+def _setting(options: argparse.Namespace) -> float | None:
+    """The number that belongs to the method's knob; one that belongs to another knob is refused."""
+    given = {STEP: options.step, TOLERANCE: options.tolerance, ACCURACY_KNOB: options.accuracy}
+    knob = METHODS[options.method].knob
+    for other, number in given.items():
+        if other != knob and number not in (None, ACCURACY):
+            raise Refused(f"--{other} is not allowed; allowed for {options.method}: --{knob}")
+    return None if given[knob] is None else float(given[knob])

@@ -1,0 +1,72 @@
+"""The studies of what a loop, an effect and a graph cost: `loop`, `effects` and `graph`."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_study_directory, prepare
+
+Parser = argparse.ArgumentParser
+
+
+def add_loop(commands: Any) -> Parser:
+    """`grasp study loop`."""
+    text = "control period against deviation and wall time; largest stable period"
+    sub = add_command(commands, "loop", _loop, text)
+    add_scene(sub)
+    sub.add_argument("--no-graph", action="store_true", help="one process only, without ROS")
+    add_study_directory(sub)
+    return sub
+
+
+def _loop(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import figures, loop, stability
+
+    scene = scenes.load(options.scene, options.settings)
+    left, right = scene.grasp.left, scene.grasp.right
+    prepare()
+    periods = () if options.no_graph else loop.GRAPH_PERIODS_MS
+    points = loop.run(scene, options.output, periods)
+    print(loop.report(points))
+    figures.control_period(points, scene.name, options.output / "control_period.png")
+    for name, arm in (("left", left), ("right", right)):
+        found = stability.limits(arm)
+        print("\n" + stability.report(f"{name} arm", found))
+        figures.stability(*stability.curves(arm, found), options.output / f"stability_{name}.png")
+    print(f"written to {options.output}")
+    return 0
+
+
+def add_effects(commands: Any) -> Parser:
+    """`grasp study effects`."""
+    sub = add_command(commands, "effects", _effects, "what each effect costs: time and size of the bag")
+    add_scene(sub)
+    add_output(sub, "FILE.md", "put table and figure into this text")
+    return sub
+
+
+def _effects(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import effects
+
+    scene = scenes.load(options.scene, options.settings)
+    prepare()
+    effects.run(scene, options.output)
+    return 0
+
+
+def add_graph(commands: Any) -> Parser:
+    """`grasp study graph`."""
+    sub = add_command(commands, "graph", _graph, "lockstep ticks per second, beside a bare rclpy graph")
+    add_scene(sub)
+    return sub
+
+
+def _graph(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import graph
+
+    scene = scenes.load(options.scene, options.settings)
+    prepare()
+    graph.run(scene)
+    return 0

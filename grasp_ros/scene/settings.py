@@ -1,0 +1,53 @@
+"""What `--set` says: numbers that replace those of a file or come beside them, and sections without numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.strict_yaml import load
+from grasp_ros.scene.validation import SceneError
+
+
+def apply(settings: Iterable[str], document: dict[Any, Any]) -> None:
+    """Put settings into the document of a scene, before it is validated.
+
+    Parameters
+    ----------
+    settings : iterable of str
+        "section.key=value" gives a number; "section={}" names a section without numbers, or leaves it as it is.
+    document : dict
+        Changed in place.
+
+    Raises
+    ------
+    SceneError
+        If a setting is neither, or names what no scene has.
+    """
+    for setting in settings:
+        _apply(setting, document)
+
+
+def _apply(setting: str, document: dict[Any, Any]) -> None:
+    match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
+    if match is None:
+        raise SceneError(f"--set {setting}: not understood; allowed: section.key=value, or section={{}}")
+    section, key, value = match.groups()
+    if key is None:
+        if section not in BY_SECTION:
+            raise SceneError(f"--set {setting}: no such section; allowed: {', '.join(BY_SECTION)}")
+        document.setdefault(section, {})
+        return
+    known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
+    if f"{section}.{key}" not in known:
+        raise SceneError(f"--set {setting}: no such key; allowed: {', '.join(known)}")
+    try:
+        number = load(value)
+    except Refused as error:
+        raise SceneError(f"--set {setting}: {error}; allowed: a number") from None
+    numbers = document.setdefault(section, {})
+    if isinstance(numbers, dict):  # anything else is refused with the file
+        numbers[key] = number

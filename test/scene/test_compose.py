@@ -1,0 +1,188 @@
+"""A scene has one constructor from sections, and sections without numbers work wherever a scene is named."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+
+import grasp_ros
+from grasp_ros import scene as scenes
+from grasp_ros.cli.report import compare_recording
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
+from grasp_ros.scene import SceneError, compose, load, parse
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.simulation import simulate
+
+ROOT = Path(grasp_ros.__file__).parent
+BARE = [name for name, effect in BY_SECTION.items() if all(parameter.optional for parameter in effect.parameters)]
+OBJECT = {"time": {"duration_s": 1.0, "control_period_s": 0.01},
+          "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 1.0}}
+
+
+# The constructor.
+
+
+@pytest.mark.parametrize("name", scenes.names())
+def test_the_sections_of_a_file_give_the_scene_of_the_file(name: str) -> None:
+    scene = load(name)
+    assert compose(name, scene.values, title=scene.title, readings=scene.readings, watch=scene.watch) == scene
+
+
+def test_what_is_not_given_is_the_name_or_empty() -> None:
+    scene = compose("alone", OBJECT)
+    assert (scene.name, scene.title, scene.readings, scene.watch) == ("alone", "alone", (), "")
+    assert parse(scene.to_yaml(), "alone", "alone") == scene
+
+
+def test_a_scene_keeps_its_own_numbers() -> None:
+    sections = {section: dict(numbers) for section, numbers in OBJECT.items()}
+    scene = compose("alone", MappingProxyType({name: MappingProxyType(table) for name, table in sections.items()}))
+    sections["object"]["mass_kg"] = 9.0
+    assert scene.values["object"]["mass_kg"] == 2.0
+    table = {"time_s": np.array([0.0, 0.5]).tolist(), "force_N": (1, 2)}
+    forces = compose("table", {**OBJECT, "object_table": table}).values["object_table"]
+    assert forces == {"time_s": (0.0, 0.5), "force_N": (1.0, 2.0)}
+
+
+@pytest.mark.parametrize(
+    ("sections", "texts", "complaint"),
+    [
+        ({**OBJECT, "tilt": {"angle_rad": 9.0, "gravity_m_per_s2": 9.81}}, {}, "odd: tilt.angle_rad: 9.0 is not all"),
+        ({**OBJECT, "tilt": {"angle_rad": 0.1}}, {}, "odd: tilt.gravity_m_per_s2: missing"),
+        ({**OBJECT, "wind": {}}, {}, "odd: wind: unknown key"),
+        ({**OBJECT, "title": "a text"}, {}, "odd: title: unknown key"),
+        ({**OBJECT, "left_contact": {"hertz_N_per_m1_5": 1.0}}, {}, "odd: left_contact: needs left_arm"),
+        ({"object": OBJECT["object"]}, {}, "odd: time: missing"),
+        ({"time": OBJECT["time"]}, {}, "odd: no body"),
+        ({**OBJECT, "object": 5}, {}, "odd: object: 5 is not allowed; allowed: a mapping"),
+        (OBJECT, {"title": 5}, "odd: title: 5 is not allowed; allowed: a text"),
+        (OBJECT, {"watch": None}, "odd: watch: None is not allowed; allowed: a text"),
+        (OBJECT, {"readings": "one"}, "odd: readings: 'one' is not allowed; allowed: a list"),
+        (OBJECT, {"readings": [1]}, "odd: readings: "),
+    ],
+)
+def test_sections_are_validated_like_a_file(sections: Any, texts: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        compose("odd", sections, **texts)
+    assert str(caught.value).startswith(complaint)
+
+
+def test_a_change_keeps_the_texts_and_is_validated() -> None:
+    scene = load("table")
+    heavy = scene.changed({"object.mass_kg": 9, "left_arm_table.force_N": [1.0, 2.0, 3.0]})
+    assert (heavy.title, heavy.readings, heavy.watch) == (scene.title, scene.readings, scene.watch)
+    assert heavy.values["left_arm_table"]["force_N"] == (1.0, 2.0, 3.0)
+    assert scene.changed({}) == scene
+    for name in ("title.x", "tilt.angle_rad", "object", "object.", ".mass_kg"):
+        with pytest.raises(SceneError, match="not in this scene"):
+            scene.changed({name: 1.0})
+    with pytest.raises(SceneError, match="as many forces as times"):
+        scene.changed({"left_arm_table.force_N": [1.0]})
+
+
+def called(path: Path) -> set[str]:
+    """Names of the functions and classes that a file calls, without methods of objects."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    functions = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    modules = ("scenes", "scene", "dataclasses")
+    return {function.id for function in functions if isinstance(function, ast.Name)} | {
+        function.attr for function in functions
+        if isinstance(function, ast.Attribute) and getattr(function.value, "id", "") in modules
+    }
+
+
+def test_nobody_makes_a_scene_around_the_checks() -> None:
+    assert [path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.py") if "Scene" in called(path)] == [
+        "scene/scene.py"
+    ]
+    assert not [path for path in ROOT.rglob("*.py") if "replace" in called(path)]
+
+
+# Sections without numbers.
+
+
+def test_there_are_sections_that_need_no_number() -> None:
+    assert BARE == ["loop", "object_friction"]
+
+
+@pytest.mark.parametrize("section", BARE)
+def test_a_section_without_numbers_is_the_same_everywhere(section: str) -> None:
+    scene = load("case_01", [f"{section}={{}}"])
+    assert scene.values[section] == {}
+    assert scene.values.keys() == load("case_01").values.keys() | {section}
+    assert parse(scene.to_yaml(), "case_01", "topic scene") == scene
+    assert parse(load("case_01").to_yaml() + f"{section}: {{}}\n", "case_01", "file") == scene
+    sections = {**load("case_01").values, section: {}}
+    assert compose("case_01", sections, title=scene.title, readings=scene.readings) == scene
+    zeros = [f"{section}.{parameter.key}=0" for parameter in BY_SECTION[section].parameters]
+    numbered, named = (simulate(load("case_01", ["time.duration_s=2", *settings]), sampled=True)
+                       for settings in (zeros, [f"{section}={{}}"]))
+    assert numbered.state.tobytes() == named.state.tobytes()
+
+
+def test_a_loop_without_numbers_holds_the_commands() -> None:
+    short = ["time.duration_s=2"]
+    named, plain = load("case_01", [*short, "loop={}"]), load("case_01", short)
+    assert named.sampled
+    assert not plain.sampled
+    assert simulate(named).state.tobytes() == simulate(plain, sampled=True).state.tobytes()
+    assert load("case_01", ["loop={}", "left_actuator.limit_N=1"]).values["left_actuator"] == {"limit_N": 1.0}
+
+
+def test_friction_without_numbers_is_none() -> None:
+    short = ["time.duration_s=2"]
+    rough = simulate(load("case_01", [*short, "object_friction={}"]))
+    assert rough.state.tobytes() == simulate(load("case_01", short)).state.tobytes()
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_naming_a_section_takes_no_number_from_it(order: int) -> None:
+    settings = ["loop={}", "loop.delay_ticks=2"][::order]
+    assert load("case_01", settings).values["loop"] == {"delay_ticks": 2}
+    assert load("delay", ["loop={}"]) == load("delay")
+
+
+@pytest.mark.parametrize(
+    ("setting", "complaint"),
+    [
+        ("loop=", "--set loop=: not understood; allowed: section.key=value, or section={}"),
+        ("loop=5", "--set loop=5: not understood"),
+        ("loop={1}", "--set loop={1}: not understood"),
+        ("loop={delay_ticks: 2}", "not understood"),
+        ("title={}", "--set title={}: no such section; allowed: time, left_arm"),
+        ("wind={}", "--set wind={}: no such section"),
+        ("left_actuator={}", "left_actuator.limit_N: missing"),
+        ("loop.delay_ticks={}", "loop.delay_ticks: {} is not allowed; allowed: a whole number"),
+    ],
+)
+def test_what_names_no_section_is_refused(setting: str, complaint: str) -> None:
+    with pytest.raises(SceneError) as caught:
+        load("case_01", [setting])
+    assert complaint in str(caught.value)
+
+
+def test_a_section_that_holds_nothing_is_refused() -> None:
+    with pytest.raises(SceneError, match=r"file: loop: None is not allowed; allowed: a mapping with delay_ticks"):
+        parse(load("case_01").to_yaml() + "loop:\n", "case_01", "file")
+
+
+def test_a_graph_runs_a_scene_with_sections_without_numbers(tmp_path: Path) -> None:
+    """The scene goes through a file, the topic `scene` and the bag."""
+    scene = load("case_01", ["time.duration_s=0.5", *(f"{section}={{}}" for section in BARE)])
+    graph = Graph(scene, tmp_path / "run", ACCURACY)
+    graph.start()
+    try:
+        graph.wait([])
+    finally:
+        statuses = graph.stop()
+    assert set(statuses.values()) == {0}
+    recording = bag.read(graph.bag)
+    assert recording.scene.values == scene.values
+    assert compare_recording(recording, ACCURACY).equal
