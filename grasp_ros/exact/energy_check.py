@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.impact import stored_energy
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.exact.scales import reduced_mass, scales
 from grasp_ros.physics import body_energy as energies
@@ -52,7 +52,7 @@ def body_energy(body: Array, x: float, v: float, x_o: float, t: float) -> Level:
     return Level(own_energy(mass, stiffness, force, x, v), size)
 
 
-@kernel
+@inlined
 def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
     y, given = state.y, plant.given
@@ -67,26 +67,31 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
     return Level(left.value + right.value + own.value + impact, left.size + right.size + own.size + impact)
 
 
-@kernel
+@inlined
 def rises(plant: Plant, state: State, settings: Settings, before: Level, after: Level) -> bool:
     """Whether a rise of the level in one segment is more than rounding and the accuracy explain.
 
-    Steps in contact are as accurate as the impact is large that they are part of, which is looked at if need be.
     Where a feedback drives an arm (c + Kv < 0) energy may come.
     """
     rise, size = after.value - before.value, max(after.size, before.size)
     allowed = ROUNDINGS * EPS + NEGLECTED * settings.tolerance
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
-    if not rise > allowed * size + UNDERFLOW or driven:
+    if driven or not rise > allowed * size + UNDERFLOW:
         return False
+    return rise > allowed * impact_size(plant, state, settings, size)
+
+
+@kernel
+def impact_size(plant: Plant, state: State, settings: Settings, size: float) -> float:
+    """`size` and the energies of the impacts: a step in contact is as accurate as the impact is large."""
     for side in (LEFT, RIGHT):
         if state.mode[side] == Pair.CONTACT:
             _, v = scales(plant, state, settings, side)
             size += 2.0 * reduced_mass(plant.bodies, side) * v * v
-    return rise > allowed * size
+    return size
 
 
-@kernel
+@inlined
 def check_segment(plant: Plant, state: State, settings: Settings, before: Level, after: Level, t: float, idle: int,
                   ballistic: bool) -> Outcome:
     """Whether a segment of t s can be believed; what a ballistic pair has left out comes at once: no comparison."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Flight, Flights, Plant, Regime
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -48,7 +48,7 @@ def launch(body: Array, x: float, v: float) -> Flight:
     return Flight(regime, x, v, x - x_e, x_e, push, sigma, rate, omega0_2)
 
 
-@kernel
+@inlined
 def launch_all(plant: Plant, y: Array) -> Flights:
     """Flights of all bodies from the state y."""
     return Flights(
@@ -146,7 +146,7 @@ def expand_body(body: Array, flight: Flight, t: float, c: Array, lane: int) -> N
         c[i], c[i + 1] = x, v
 
 
-@kernel
+@inlined
 def fly_all(flights: Flights, t: float, y: Array) -> None:
     """Write all positions and velocities after the time t of flight."""
     y[X_L], y[V_L] = fly(flights.left, t)

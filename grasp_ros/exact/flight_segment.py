@@ -213,7 +213,7 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
     out.filled[Filled.OUTPUTS] = row
 
 
-@kernel
+@inlined
 def move(flights: Flights, state: State, t: float) -> None:
     """Move the state on by t seconds. A ballistic pair is much shallower than the positions are exact."""
     y, mode = state.y, state.mode

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from grasp_ros.exact.impact import damping_factor, elastic_force
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.polynomial import first_rise
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, SlideCandidate, State, Tables
@@ -67,7 +67,7 @@ def impact_on_object(plant: Plant, state: State) -> float:
     return total
 
 
-@kernel
+@inlined
 def slide_in_flight(plant: Plant, state: State) -> SlideCandidate:
     """When a sliding object stops in flight: v' = a - c v is solved exactly."""
     slide, v = state.mode[OBJECT], state.y[V_O]
@@ -117,26 +117,32 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
         f[out + k] = total
 
 
-@kernel
+@inlined
 def slide_in_contact(tables: Tables, plant: Plant, state: State, settings: Settings, h: float, out: Output
                      ) -> SlideCandidate:
     """First s in a Taylor step of length h at which the object stops or slips."""
-    n, slide, row = settings.order, state.mode[OBJECT], tables.row
-    if slide == Slide.FREE:
+    if state.mode[OBJECT] == Slide.FREE:
         return SlideCandidate(math.inf, Slide.FREE)
+    return stop_or_slip(tables, plant, state.mode, settings.order, h, out.work)
+
+
+@kernel
+def stop_or_slip(tables: Tables, plant: Plant, mode: Integers, n: int, h: float, work: Integers) -> SlideCandidate:
+    """The same for an object under dry friction."""
+    slide, row = mode[OBJECT], tables.row
     if slide != Slide.STUCK:
         factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
         for k in range(n + 1):
             row[k] = factor * tables.c[LANES * k + V_O]
-        return SlideCandidate(first_rise(row, n, h, 0.0, out.work), Slide.STUCK)
-    impact_series(tables, plant, state.mode, n)
+        return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
+    impact_series(tables, plant, mode, n)
     push = row[0] + plant.given[OBJECT, FORCE]
     row[0] = push - plant.coulomb
-    to_right = first_rise(row, n, h, 0.0, out.work)
+    to_right = first_rise(row, n, h, 0.0, work)
     for k in range(1, n + 1):
         row[k] = -row[k]
     row[0] = -push - plant.coulomb
-    to_left = first_rise(row, n, h, 0.0, out.work)
+    to_left = first_rise(row, n, h, 0.0, work)
     if math.isnan(to_right) or math.isnan(to_left):
         return SlideCandidate(math.nan, Slide.STUCK)
     return SlideCandidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else SlideCandidate(to_left, Slide.LEFTWARD)

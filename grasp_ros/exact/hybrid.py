@@ -11,7 +11,7 @@ from grasp_ros.exact.contact import contact_segment
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
 from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.modes import begin_interval, end_ballistic, leave_corner
+from grasp_ros.exact.modes import begin_interval, end_ballistic, is_ballistic, leave_corner
 from grasp_ros.exact.outputs import may_go_on, write_reached
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.scales import ballistic_time, rate_bound
@@ -68,12 +68,15 @@ def advance(
         if outcome != Outcome.GO_ON:
             return outcome
         leave_corner(plant, state, settings, out)
-        span = min(span, ballistic_time(plant, state, settings))
+        ballistic = is_ballistic(state.mode)
+        if ballistic:
+            span = min(span, ballistic_time(plant, state, settings))
         if state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
             t = contact_segment(tables, plant, state, settings, span, out)
         else:
             t = flight_segment(tables, plant, state, settings, span, out)
-        ballistic = end_ballistic(plant, state, settings, out)
+        if ballistic:
+            end_ballistic(plant, state, settings, out)
         idle = 0 if t > 0.0 else idle + 1
         after = energy_level(plant, state, t)
         outcome = check_segment(plant, state, settings, before, after, t, idle, ballistic)

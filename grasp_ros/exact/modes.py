@@ -35,7 +35,7 @@ from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, other, relative_motion
 from grasp_ros.exact.outputs import record
-from grasp_ros.exact.records import Array, Candidate, Output, Plant, Settings, SlideCandidate, State
+from grasp_ros.exact.records import Array, Candidate, Integers, Output, Plant, Settings, SlideCandidate, State
 from grasp_ros.exact.scales import probe_time, scales, sliver
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -139,7 +139,7 @@ def begin_interval(plant: Plant, state: State, settings: Settings, out: Output) 
 # Rules between segments.
 
 
-@kernel
+@inlined
 def close_resting_pair(plant: Plant, state: State, settings: Settings, side: Body, out: Output) -> None:
     """A pair that rests at u = 0 touches if what acts now presses it together."""
     y, mode = state.y, state.mode
@@ -175,18 +175,19 @@ def leave_corner(plant: Plant, state: State, settings: Settings, out: Output) ->
         mode[LEFT] = mode[RIGHT] = Pair.LEAVING
 
 
-@kernel
-def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -> bool:
-    """Give ballistic pairs a mode again, unless one is still so shallow that its force is below rounding.
+@inlined
+def is_ballistic(mode: Integers) -> bool:
+    """Whether a pair goes without force for a while."""
+    return mode[LEFT] == Pair.BALLISTIC or mode[RIGHT] == Pair.BALLISTIC
 
-    Returns whether there were any: what they left out comes at once.
-    """
+
+@kernel
+def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -> None:
+    """Give ballistic pairs a mode again, unless one is still so shallow that its force is below rounding."""
     y, mode = state.y, state.mode
-    found = False
     for side in (LEFT, RIGHT):
         if mode[side] != Pair.BALLISTIC:
             continue
-        found = True
         u, d = y[U_L + side], approach(y, side)
         if u >= 0.0 and d > 0.0:
             w, _ = scales(plant, state, settings, side)
@@ -195,7 +196,6 @@ def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -
         mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
         if mode[side] == Pair.OPEN:
             record(state, side, Transition.RELEASE, u, d, out)
-    return found
 
 
 # Transitions at the end of a segment.
