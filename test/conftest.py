@@ -17,6 +17,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 
 RUN_SECONDS = 90.0
+SECOND_DOMAIN = "124"  # beside those of this test run and of lonely nodes
 
 
 def grasp(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -44,13 +45,18 @@ def command(
 
 @pytest.fixture(scope="session")
 def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Two directories of `grasp run`, of the same scene: case 1 over its first contacts."""
+    """Directories of two runs of `grasp run` at the same time: case 1 over its first contacts, in a domain each."""
     os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("log"))
-    directories = []
-    for name in ("first", "second"):
-        cwd = tmp_path_factory.mktemp(name)
-        result = grasp("run", "case_01", "--set", "time.duration_s=3", "-o", "run #1", cwd=cwd)
-        assert result.returncode == 0, result.stderr
-        (cwd / "stdout").write_text(result.stdout)
-        directories.append(cwd / "run #1")
-    return directories[0], directories[1]
+    command = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=3", "-o", "run #1"]
+    started = []
+    for name, domain in (("first", os.environ["ROS_DOMAIN_ID"]), ("second", SECOND_DOMAIN)):
+        cwd, environment = tmp_path_factory.mktemp(name), {**os.environ, "ROS_DOMAIN_ID": domain}
+        run = subprocess.Popen(
+            command, cwd=cwd, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        started.append((cwd, run))
+    for cwd, run in started:
+        out, err = run.communicate(timeout=RUN_SECONDS)
+        assert run.returncode == 0, err
+        (cwd / "stdout").write_text(out)
+    return started[0][0] / "run #1", started[1][0] / "run #1"

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import subprocess
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 import rclpy
+from processes import DEADLINE
 from rclpy.executors import SingleThreadedExecutor
 
 from grasp_ros.exact.integrator import compile_kernels
@@ -16,6 +18,21 @@ from grasp_ros.exact.integrator import compile_kernels
 def _kernels() -> None:
     """On disk before several processes, each with a deadline, would compile them at the same time."""
     compile_kernels()
+
+
+@pytest.fixture
+def launch() -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts processes, and ends those that a failed test leaves behind: they would answer the next graph."""
+    started: list[subprocess.Popen[str]] = []
+
+    def call(*command: str, **options: Any) -> subprocess.Popen[str]:
+        started.append(subprocess.Popen(command, text=True, **options))
+        return started[-1]
+
+    yield call
+    for process in started:
+        process.terminate()  # not kill: `grasp run` has processes of its own to end
+        process.wait(DEADLINE)
 
 
 @pytest.fixture

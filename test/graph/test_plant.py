@@ -57,8 +57,8 @@ def test_bad_parameters_are_refused(refusals: list[tuple[int, str]], row: int) -
     assert "Traceback" not in message
 
 
-def test_a_second_plant_on_the_same_topics_is_refused() -> None:
-    plants = [subprocess.Popen([*START, "plant"], stderr=subprocess.PIPE, text=True) for _ in range(2)]
+def test_a_second_plant_on_the_same_topics_is_refused(launch: Any) -> None:
+    plants = [launch(*START, "plant", stderr=subprocess.PIPE) for _ in range(2)]
     wait_for(lambda: any(plant.poll() is not None for plant in plants), "a plant that gives way")
     for plant in plants:
         plant.terminate()
@@ -70,7 +70,7 @@ def test_a_second_plant_on_the_same_topics_is_refused() -> None:
 
 
 def test_plant_drops_what_is_stale_repeated_or_not_finite(
-    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+    launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
 ) -> None:
     """One node plays both controllers and sends garbage between its right answers."""
     peer, executor = node
@@ -98,7 +98,7 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(
     peer.create_subscription(String, SCENE.name, lambda message: scenes.append(message.data), messages.qos(SCENE))
     file = tmp_path / "short.yaml"
     file.write_text(expected.scene.to_yaml())
-    plant = subprocess.Popen([*START, "plant", "--ros-args", "-p", f"scene:={file}"])
+    plant = launch(*START, "plant", "--ros-args", "-p", f"scene:={file}")
     deadline = time.monotonic() + DEADLINE
     while plant.poll() is None:
         assert time.monotonic() < deadline, "the plant does not finish"

@@ -29,9 +29,9 @@ pytestmark = pytest.mark.slow  # real processes
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("moment", ["recording", "starting"])
-def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, moment: str) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run")], text=True,
+def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signal.Signals, moment: str) -> None:
+    process = launch(
+        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run"),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
     recorded = tmp_path / "run" / "bag" / "bag.mcap"
@@ -56,12 +56,12 @@ def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, mo
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_lonely_nodes_end_cleanly_on_a_signal(tmp_path: Path, number: signal.Signals) -> None:
+def test_lonely_nodes_end_cleanly_on_a_signal(launch: Any, tmp_path: Path, number: signal.Signals) -> None:
     """All four at the same time, each in a domain of its own."""
     domains = {"plant": 120, "left_controller": 121, "right_controller": 122, "monitor": 123}
     started = {
-        name: subprocess.Popen([*START, name], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-                               env={**os.environ, "ROS_DOMAIN_ID": str(domain)})
+        name: launch(*START, name, cwd=tmp_path, stderr=subprocess.PIPE,
+                     env={**os.environ, "ROS_DOMAIN_ID": str(domain)})
         for name, domain in domains.items()
     }
     for name, process in started.items():
@@ -127,15 +127,13 @@ sys.exit(start.main("plant"))
 """
 
 
-def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(tmp_path: Path) -> None:
+def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(launch: Any, tmp_path: Path) -> None:
     """A plant that pushes its arms harder than the commands say."""
     options = ["--ros-args", "-p", "wait_for_monitor:=true"]
-    recording = [*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
-    monitor = subprocess.Popen(recording, stderr=subprocess.PIPE, text=True)
+    monitor = launch(*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}", stderr=subprocess.PIPE)
     others = [
-        subprocess.Popen([sys.executable, "-c", WRONG_PLANT, *options], stderr=subprocess.PIPE),
-        *(subprocess.Popen([*START, f"{side}_controller", *options], stderr=subprocess.PIPE)
-          for side in ("left", "right")),
+        launch(sys.executable, "-c", WRONG_PLANT, *options, stderr=subprocess.PIPE),
+        *(launch(*START, f"{side}_controller", *options, stderr=subprocess.PIPE) for side in ("left", "right")),
     ]
     _, err = monitor.communicate(timeout=DEADLINE)
     _, last_words = others[0].communicate(timeout=DEADLINE)
@@ -143,7 +141,7 @@ def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(tmp_path:
         controller.terminate()
         controller.communicate(timeout=DEADLINE)
     assert (monitor.returncode, others[0].returncode) == (1, 1)
-    assert b"the monitor that this run waits for has ended" in last_words
+    assert "the monitor that this run waits for has ended" in last_words
     assert re.search(r"V_c rose by \S+ J more than the work of the held forces, t = \S+ s, mode 0, state \[", err)
     found = bag.read(tmp_path / "bag")
     assert found.alarms == 1
