@@ -9,7 +9,7 @@ NAME = "grasp_ros"
 setup(
     name=NAME,
     version="0.1.0",
-    description="A grasp held together by impacts: exact simulation, control and measurement over ROS 2",
+    description="A grasp held together by Hunt-Crossley impacts: exact simulation, control and measurement over ROS 2",
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),

@@ -1,6 +1,6 @@
 """Oracles of the tests alone; those that the study of hard cases shares are in `grasp_ros.verification.oracles`.
 
-Nothing here but `run` and `ledger` calls a kernel. Everything works in mpmath unless its name says otherwise.
+Nothing here but `run` and `balance_of` calls a kernel. Everything works in mpmath unless its name says otherwise.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from grasp_ros.physics import energy as certificate
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
-from grasp_ros.verification.oracles import Impact, Ledger, balance, first_touch_from_rest, flight, impact, reduced_mass
+from grasp_ros.verification.oracles import Balance, Impact, balance, first_touch_from_rest, flight, impact, reduced_mass
 from grasp_ros.verification.reference import Reference, integrate
 
-__all__ = ["Impact", "Ledger", "first_touch_from_rest", "flight", "impact", "reduced_mass"]  # for the tests
+__all__ = ["Balance", "Impact", "first_touch_from_rest", "flight", "impact", "reduced_mass"]  # for the tests
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 ELASTIC = Arm(1.0, 10.0, 0.0, 5.0, 0.0)
 FREE = Arm(1.0, 0.0, 0.0, 0.0, 0.0)
@@ -66,7 +66,7 @@ def reference_of(name: str, horizon: float, points: int = 201) -> Reference:
     return integrate(scene.grasp, scene.initial_state.tolist(), times, digits=25)
 
 
-# Ledgers, O3.
+# Balances of momentum and energy, O3.
 
 
 class Run(NamedTuple):
@@ -98,7 +98,7 @@ def done(result: Run) -> Integrator:
     return result.integrator
 
 
-def ledger(grasp: Grasp, state: Any, duration: float, **options: Any) -> Ledger:
+def balance_of(grasp: Grasp, state: Any, duration: float, **options: Any) -> Balance:
     """O3 along one trajectory with continuous feedback."""
     events = [event.time for event in run(grasp, state, duration, **options).integrator.events]
     system = System.of(grasp, np.asarray(state, dtype=float))

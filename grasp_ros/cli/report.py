@@ -78,7 +78,7 @@ def describe_recording(recording: Recording) -> list[Row]:
         rows.insert(6, ("V at both ends", _ends(recording.lyapunov[:, 0])))
         rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
         rows.insert(8, ("certificate", scene.certificate_in_words(sampled=True)))
-        rows.insert(9, ("energy from nowhere", f"{recording.alarms} alarms" if recording.alarms else "none"))
+        rows.insert(9, ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"))
     return _with_watch(scene, rows)
 
 

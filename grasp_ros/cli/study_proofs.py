@@ -31,7 +31,7 @@ def _certificate(options: argparse.Namespace) -> int:
 
 def add_hard(commands: Any) -> Parser:
     """`grasp study hard`."""
-    text = "hard cases: what decides, the figure reached, and other solvers beside it"
+    text = "hard cases, family by family: the error reached, and other solvers beside it"
     sub = add_command(commands, "hard", _hard, text)
     add_output(sub, "FILE.md", "put table and figure into this text")
     sub.add_argument("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten")

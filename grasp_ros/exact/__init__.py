@@ -3,3 +3,7 @@
 `integrator` is the door. `hybrid` joins the segments: `flight` between contacts, `contact` with `series` and
 `polynomial` in them; `modes` is the automaton, `friction` that of the object, `energy_check` compares energies.
 """
+
+from grasp_ros.exact.integrator import Event, Integrator, Status
+
+__all__ = ["Event", "Integrator", "Status"]

@@ -8,6 +8,7 @@ from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import kernel
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.exact.scales import reduced_mass, scales
+from grasp_ros.physics import body_energy as energies
 from grasp_ros.physics.layout import (
     DAMPING,
     EPS,
@@ -34,21 +35,21 @@ ROUNDINGS = 128.0  # of the sum of all terms: flights, impacts and differences o
 NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
 MAX_IDLE = 1000  # segments without progress in time
 
+own_energy, energy_size = kernel(energies.body_energy), kernel(energies.energy_size)
+
 
 @kernel
 def body_energy(body: Array, x: float, v: float, x_o: float, t: float) -> Level:
-    """m v^2 + k x^2 - 2 f x of a body (4,) at the end of a segment of t s.
+    """Energy of a body (4,) at the end of a segment of t s; x_o: the object, if the body is an arm.
 
-    The position of an arm in contact follows from that of the object, x_o, and has its digits. A force that carries
-    the body away and a weak spring that brings it back leave small terms at both ends.
+    A force that carries the body away and a weak spring that brings it back leave small terms at both ends.
     """
     mass, stiffness, force = body[MASS], body[STIFFNESS], body[FORCE]
-    kinetic, spring, work = mass * v * v, stiffness * x * x, 2.0 * force * x
-    size = kinetic + (abs(stiffness * x) + 2.0 * abs(force)) * (abs(x) + abs(x_o))
+    size = energy_size(mass, stiffness, force, x, v, abs(x) + abs(x_o))
     if force != 0.0:
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
-    return Level(kinetic + spring - work, size)
+    return Level(own_energy(mass, stiffness, force, x, v), size)
 
 
 @kernel

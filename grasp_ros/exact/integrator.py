@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact import hybrid
+from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
 from grasp_ros.exact.records import Tables
@@ -191,7 +191,7 @@ class Integrator:
         clock, filled = np.zeros(2), np.zeros(2, dtype=np.int64)
         while self.status is Status.DONE:
             allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
-            outcome = hybrid.advance(
+            outcome = advance(
                 *self._tables, self._given, self._bodies, self._pairs, self._coulomb, self._y, self._mode, clock,
                 duration, self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled,
                 self.work,

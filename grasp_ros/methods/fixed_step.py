@@ -6,12 +6,12 @@ at u = 0: no way reaches order 4 through a touch. What is measured near it is or
 
 The paper's method, in its own words and this reading of them:
 
-* Contact is judged by (10) "at the beginning and the end of every time step". Within a step the condition is frozen.
+* Contact is decided by (10) "at the beginning and the end of every time step". Within a step the condition is frozen.
 * If it changes, time and "all state values" at the event come from linear interpolation over the step. The quantity
   that is interpolated is the one that changed sign: u, or u' + 1/p.
 * "For the rest of this time step the response is calculated" under the new condition, with another Runge-Kutta step.
 * Both sides in one step are "the mixture of the previous ones": the earlier event first, the other one in the rest.
-  Each side changes at most once in a step; whatever happens after that is judged at the next beginning.
+  Each side changes at most once in a step; whatever happens after that is decided at the next beginning.
 
 References
 ----------
@@ -183,8 +183,8 @@ def deliver(linear: bool, y: Any, f: Any, z: Any, g: Any, t: float, reached: flo
 
 
 @kernel
-def judge_again(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, found: int) -> int:
-    """Judge (10) at the beginning of a step of the paper's method; returns the number of events, -1 if full.
+def renew_modes(q: Any, y: Any, t: float, mode: Any, changed: Any, events: Any, found: int) -> int:
+    """Evaluate (10) at the beginning of a step of the paper's method; returns the number of events, -1 if full.
 
     A pair that changes exactly here has u at a rounding error of either sign, and keeps its mode.
     """
@@ -219,7 +219,7 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             end = duration
         free[:] = rule != PLAIN
         if rule == PAPER:
-            found = judge_again(q, y, t, mode, changed, events, found)
+            found = renew_modes(q, y, t, mode, changed, events, found)
             if found < 0:
                 return EVENTS_FULL, row, events.shape[0]
         while t < end:

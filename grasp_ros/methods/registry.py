@@ -61,7 +61,7 @@ METHODS: dict[str, Method] = {
         ),
         _fixed(
             "paper", "2 at a touch, 4 elsewhere", "Fukuda, Shoji, Inaba (1990), Simulation Method",
-            "judged at both ends of a step; time and state by linear interpolation, then the rest of the step",
+            "decided at both ends of a step; time and state by linear interpolation, then the rest of the step",
             fixed_step.PAPER,
         ),
         _fixed("rk4", "4; through a touch 2.5", f"{_HAIRER}, II.1", _INSIDE, fixed_step.PLAIN),

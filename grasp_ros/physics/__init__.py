@@ -14,14 +14,27 @@ f_l, f_r        force, command         N          input forces, positive to the 
 u_l, u_r        u                      m          x_l - x_o, x_o - x_r: positive is penetration; (8)
 u'              d, u_rate              m/s        positive is approach
 fw_l, fw_r      impact_force           N          never negative: it pushes arm and object apart; (6), (7)
-H               hertzian                  N/m^1.5    Hertz coefficient; (6), (7)
-p               dissipation            s/m        energy loss of an impact; (6), (7), contact needs u' >= -1/p; (10)
+H               hertzian               N/m^1.5    Hertzian stiffness; (6), (7)
+p               dissipation            s/m        Hunt-Crossley dissipation; (6), (7), contact needs u' >= -1/p; (10)
 V, V'           V, V_rate              J, W       the paper's Lyapunov function and its rate; (16), (18)
 V_c             V_c                    J          V with the Hertz term of every pair with u >= 0
 w, s, G         w, s, g                           regularised variables of a contact, see `series`
 ==============  =====================  =========  ==========================================================
 
-`model` states the equations, `control` the law of a controller, `system` puts a scene into arrays, `layout` says what
-stands where in them, `energy` computes V and its balance, `sampled` the limits of a loop of held commands. `errors`
-holds the base of everything that is refused, here and in the rooms above.
+The impact law is that of Hunt and Crossley (1975), with its tension cut off by (10): fw = H u^(3/2) max(0, 1 + p u')
+for u >= 0. Other authors write its dissipation as
+
+======================================  =====================================  =====================
+where                                   the law there                          in our p and H
+======================================  =====================================  =====================
+Hunt, Crossley (1975)                   k u^n + lambda u^n u', n = 3/2         k = H, lambda = p H
+their restitution at low speed v        e = 1 - alpha v                        alpha = 2 p / 3
+Simbody, `HuntCrossleyForce`            k u^(3/2) (1 + (3/2) c u')             k = H, c = 2 p / 3
+Drake, `hunt_crossley_dissipation` d    k u max(0, 1 + d u'), a linear spring  d = p, no k for H
+MuJoCo, `solref` and `solimp`           a linear spring and damper             none
+======================================  =====================================  =====================
+
+`model` states the equations, `impact_law` the force of a contact, `control` the law of a controller, `system` puts a
+scene into arrays, `layout` says what stands where in them, `energy` computes V and its balance, `sampled` the limits of
+a loop of held commands. `errors` holds the base of everything that is refused, here and in the rooms above.
 """

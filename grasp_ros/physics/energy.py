@@ -1,4 +1,4 @@
-"""The energy of a system: the paper's V, its continuous repair V_c, V', and the ledger of held commands.
+"""The energy of a system: the paper's V, its continuous repair V_c, V', and the energy balance of held commands.
 
 A linear term of a body brings its energy by itself: stiffness k and constant force f, of the arm or of the feedback,
 are the potential k (x - f/k)^2. V_c is known up to a constant where a body has a force but no spring.
@@ -11,12 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.body_energy import body_energy, energy_size
+from grasp_ros.physics.impact_law import stored_energy
+from grasp_ros.physics.layout import DAMPING, EPS, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force, in_contact, penetration
 from grasp_ros.physics.system import COLUMN, System
 
 FLAGS: dict[int, Mode] = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
-EPS = 2.220446049250313e-16
 ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
 
@@ -54,7 +55,7 @@ def energy(system: System, state: Array, external: Array | None = None) -> Energ
         contact = Contact(*system.pairs[side])
         force = hertzian_force(contact, u)
         touching = in_contact(contact, u, d)
-        stored = 0.8 * force * u  # a = b = 4/5, (19)
+        stored = _elastic(system, side, u)
         V_c = V_c + stored
         V = V + np.where(touching, stored, 0.0)
         V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
@@ -62,26 +63,26 @@ def energy(system: System, state: Array, external: Array | None = None) -> Energ
     return Energy(V, V_c, V_rate, mode)
 
 
-class Ledger(NamedTuple):
-    """What became of the energy over one control period, in J of V."""
+class EnergyBalance(NamedTuple):
+    """Energy balance of one control period, in J of V."""
 
     rise: Array  # of twice the energy of the plant by itself
     work: Array  # twice the work of the forces that were held
     rounding: Array  # what rounding may add
 
     @property
-    def unexplained(self) -> Array:
-        """Rise that no work explains; dissipation makes it negative."""
+    def residual(self) -> Array:
+        """Rise less work: minus what was dissipated, so it is never positive but for rounding."""
         return self.rise - self.work
 
     @property
     def alarm(self) -> NDArray[np.bool_]:
-        """Whether energy came from nowhere; also if it is not a number."""
-        return np.logical_not(self.unexplained <= self.rounding)
+        """Whether the residual is positive beyond rounding, or not a number."""
+        return np.logical_not(self.residual <= self.rounding)
 
 
-def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger:
-    """Balance of the energy between states (..., 6) under held forces (..., 3) in N, by body.
+def energy_balance(system: System, before: Array, after: Array, forces: Array) -> EnergyBalance:
+    """Energy balance between states (..., 6) under held forces (..., 3) in N, by body.
 
     Along any motion E(after) - E(before) = sum f (x_after - x_before) - dissipation, with E from the plant's own k,
     its constant forces and the contacts. It holds for any delay, saturation or jitter of the commands, because the
@@ -93,7 +94,7 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
         level, size = _own_energy(system, state)
         for side, u, _ in _pairs(system, state):
             force = hertzian_force(Contact(*system.pairs[side]), u)
-            level = level + 0.8 * force * u
+            level = level + _elastic(system, side, u)
             rounding = rounding + 8.0 * EPS * force * _place(system, side, state)
         levels.append(level)
         rounding = rounding + ROUNDING * size
@@ -101,7 +102,7 @@ def ledger(system: System, before: Array, after: Array, forces: Array) -> Ledger
     for body in system.present:
         work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
         rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _place(system, body, after)
-    return Ledger(levels[1] - levels[0], work, rounding)
+    return EnergyBalance(levels[1] - levels[0], work, rounding)
 
 
 def _mechanical(system: System, bodies: Array, state: Array) -> Array:
@@ -120,18 +121,20 @@ def _mechanical(system: System, bodies: Array, state: Array) -> Array:
 
 
 def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
-    """Twice the energy of the bodies by themselves, and the sum of the sizes of its terms.
-
-    k x^2 - 2 f x, because (f / k)^2 may be large beside it.
-    """
+    """Twice the energy of the bodies by themselves, and the sum of the sizes of its terms."""
     total: Array = np.zeros(np.shape(state)[:-1])
     size: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
         x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
         mass, stiffness, _, force = system.bodies[body]
-        total = total + mass * v * v + stiffness * x * x - 2.0 * force * x
-        size = size + mass * v * v + (stiffness * np.abs(x) + 2.0 * np.abs(force)) * _place(system, body, state)
+        total = total + body_energy(mass, stiffness, force, x, v)
+        size = size + energy_size(mass, stiffness, force, x, v, _place(system, body, state))
     return total, size
+
+
+def _elastic(system: System, side: int, u: Array) -> Array:
+    """Twice the elastic energy of a pair, (19): a = b = 4/5; 0 without penetration."""
+    return np.asarray(2.0 * stored_energy(system.pairs[side, HERTZIAN], np.maximum(u, 0.0)))
 
 
 def _place(system: System, body: int, state: Array) -> Array:

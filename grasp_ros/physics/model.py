@@ -3,6 +3,9 @@
 Everything here is written with the paper's letters; every function works on scalars and on NumPy arrays.
 The integrators in this package do not call it, so that tests can hold their results against it.
 
+The impact law, (6), (7), is that of Hunt and Crossley, see `impact_law`; how its p translates to the symbols of other
+authors stands in the notation, `grasp_ros.physics`.
+
 References
 ----------
 T. Fukuda, Y. Shoji, M. Inaba: Stable Position/Force Control of Robotic Manipulator with Consideration of
@@ -33,7 +36,7 @@ class Arm(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """One pair of arm and object, (6), (7)."""
+    """One pair of arm and object, with the Hunt-Crossley law (6), (7)."""
 
     hertzian: float  # H, N/m^1.5
     dissipation: float  # p, s/m
@@ -74,7 +77,7 @@ def hertzian_force(contact: Contact, u: Array) -> Array:
 
 
 def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
-    """Impact force fw in N, never negative: (6), (7).
+    """Impact force fw in N, never negative: the Hunt-Crossley law (6), (7), cut off by (10).
 
     Parameters
     ----------

@@ -1,9 +1,10 @@
-"""The table of hard cases: what decides, the figure reached, and other methods beside it."""
+"""The page of hard cases, family by family: the error of each case, and those of other methods beside it."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable
+from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,23 +17,24 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.versions import versions
 from grasp_ros.studies import page_figures
-from grasp_ros.studies.document import put, read, write
-from grasp_ros.verification.cases.case import Case, Outcome, Product, Unfinished, judge
+from grasp_ros.studies.document import prose, put, read, table, write
+from grasp_ros.verification.cases.case import Case, Product, Unfinished, Verdict, evaluate
 from grasp_ros.verification.cases.registry import cases
+from grasp_ros.verification.cases.scenes import library
 from grasp_ros.verification.deadline import Deadline, deadline
 
 PART = "the hard cases"  # marked part of the document
 OTHERS = (("lsoda_events", 1e-12), ("paper", 1e-4))  # scipy's best on these scenes; the paper's method, step in s
 SECONDS = 1.5  # that another method may take for a case
-FAR = 1e-3  # a figure that no one would call a result
+FAR = 1e-3  # an error that no one would call a result
 
 
 class Row(NamedTuple):
-    """A case with the figure reached, and those of the other methods, if they were asked."""
+    """A case with our verdict, and those of the other methods, if they were asked."""
 
     case: Case
-    own: Outcome
-    others: list[Outcome]
+    own: Verdict
+    others: list[Verdict]
 
 
 class Other:
@@ -40,6 +42,7 @@ class Other:
 
     def __init__(self, name: str, setting: float) -> None:
         self.name, self._setting = name, setting
+        self.states(library("case_01", 0.1), [0.1])  # compiles here: a deadline must not fire within the compiler
 
     def states(self, scene: Scene, times: Iterable[float]) -> Array:
         """States (n, 6) at ascending times."""
@@ -50,7 +53,7 @@ class Other:
         return motion.state
 
     def events(self, scene: Scene) -> list[Event]:
-        """Switches in the order of time."""
+        """Events in the order of time."""
         return simulate(scene, method=self.name, setting=min(self._setting, scene.duration)).events
 
 
@@ -66,31 +69,40 @@ def run(document: Path | None, *, alone: bool) -> int:
     rows: list[Row] = []
     others = [] if alone else [Other(name, setting) for name, setting in OTHERS]
     for case in tqdm(cases(), desc="hard", file=sys.stderr):
-        own = judge(case, Product(case.max_events, case.max_work))
+        own = evaluate(case, Product(case.max_events, case.max_work))
         rows.append(Row(case, own, [] if case.product_only else [_other(case, other) for other in others]))
-    table = _table(rows)
-    print(table)
+    text_of_rows = _families(rows)
+    print(text_of_rows)
     if document is not None:
         figure = document.with_suffix(".png")
-        drawn = [(row.case.family, row.case.bound, row.own.figure, [other.figure for other in row.others])
+        drawn = [(row.case.family.name, row.case.bound, row.own.error, [other.error for other in row.others])
                  for row in rows]
         page_figures.hard_cases(drawn, [name for name, _ in OTHERS], figure)
-        block = f"{table}\n\n![figures of the hard cases]({figure.name})"
+        block = f"{text_of_rows}\n\n![errors of the hard cases]({figure.name})"
         write(document, put(text, PART, block))
     return 0 if all(row.own.right(row.case) for row in rows) else 1
 
 
-def _other(case: Case, other: Other) -> Outcome:
+def _other(case: Case, other: Other) -> Verdict:
     try:
         with deadline(SECONDS), np.errstate(all="ignore"):
-            return judge(case, other)
+            return evaluate(case, other)
     except Deadline:
-        return Outcome(None, f"not done in {SECONDS:g} s")
+        return Verdict(None, f"not done in {SECONDS:g} s")
     except (ValueError, ArithmeticError, IndexError) as error:  # what it raises is its answer
-        return Outcome(None, f"{type(error).__name__}: {error}")
+        return Verdict(None, f"{type(error).__name__}: {error}")
 
 
-def _table(rows: list[Row]) -> str:
+def _families(rows: list[Row]) -> str:
+    """What was reached in all, and a paragraph and a table for each family."""
+    blocks = [_summary(rows)]
+    for family, group in groupby(rows, key=lambda row: row.case.family):
+        blocks += [f"### {family.name}", prose(family.why), prose(f"*Decided by* {family.oracle}.")]
+        blocks.append(_cases(list(group)))
+    return "\n\n".join(blocks)
+
+
+def _summary(rows: list[Row]) -> str:
     right = sum(row.own.right(row.case) for row in rows)
     machine = ", ".join(f"{name} {version}" for name, version in versions().items())
     lines = [f"{right} of {len(rows)} cases right. {machine}."]
@@ -98,22 +110,25 @@ def _table(rows: list[Row]) -> str:
     for place, (name, setting) in enumerate(OTHERS if compared else ()):
         found = [row.others[place] for row in compared]
         within = sum(other.right(row.case) for row, other in zip(compared, found, strict=True))
-        lost = sum(other.figure is None or not other.figure < FAR for other in found)
+        lost = sum(other.error is None or not other.error < FAR for other in found)
         lines.append(f"`{name}` at {setting:g}: {within} of {len(compared)} within the same bounds, {lost} without a"
                      f" result or off by more than {FAR:g}.")
-    lines += ["", f"| family | case | why it is hard | what decides | promised | reached |{_heads(compared)}",
-              f"|---|---|---|---|---:|---:|{'---:|' * (len(OTHERS) if compared else 0)}"]
-    for row in rows:
-        case, verdict = row.case, "" if row.own.right(row.case) else " **wrong**"
-        others = [_short(other) for other in row.others] or ["-"] * (len(OTHERS) if compared else 0)
-        cells = [case.family, case.name, case.why, case.oracle, f"{case.bound:.1g}", _short(row.own) + verdict, *others]
-        lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
-def _heads(compared: list[Row]) -> str:
-    return "".join(f" {name} |" for name, _ in OTHERS) if compared else ""
+def _cases(rows: list[Row]) -> str:
+    """The cases of a family; a column of notes, and columns of other methods, only where there are any."""
+    others = [name for name, _ in OTHERS] if any(row.others for row in rows) else []
+    noted = any(row.case.note for row in rows)
+    heads = ["case", "promised", "reached", *others, *(["note"] if noted else [])]
+    lines = []
+    for row in rows:
+        wrong = "" if row.own.right(row.case) else " **wrong**"
+        cells = [_short(other) for other in row.others] or ["-"] * len(others)
+        lines.append([row.case.name, f"{row.case.bound:.1g}", _short(row.own) + wrong, *cells,
+                      *([row.case.note] if noted else [])])
+    return table(heads, lines)
 
 
-def _short(outcome: Outcome) -> str:
-    return outcome.status if outcome.figure is None else f"{outcome.figure:.1e}"
+def _short(verdict: Verdict) -> str:
+    return verdict.status if verdict.error is None else f"{verdict.error:.1e}"

@@ -56,7 +56,7 @@ def v_jumps(motions: Sequence[Motion], path: Path) -> None:
 def hard_cases(
     rows: Sequence[tuple[str, float, float | None, Sequence[float | None]]], others: Sequence[str], path: Path
 ) -> None:
-    """Draw what hard cases reach: family, what is promised, our figure, those of other methods; None: no result."""
+    """Draw the errors of hard cases: family, what is promised, ours, those of other methods; None: no result."""
     figure, axes = plt.subplots(figsize=(11.0, 5.0), layout="constrained")
     floor = 1e-17  # where an exact 0 is drawn
     series = [("this package", LEFT_COLOR, "o", [own for _, _, own, _ in rows])]

@@ -1,4 +1,4 @@
-"""How far ahead a scene can be predicted in double precision: accuracy that a scene cannot hold is not for sale."""
+"""How far ahead a scene can be predicted in double precision."""
 
 from __future__ import annotations
 

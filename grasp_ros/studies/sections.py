@@ -82,9 +82,9 @@ def paper(records: Sequence[Record]) -> str:
     return "\n\n".join([
         "## What the paper's method costs",
         table(["scene", "error <= 1e-3", f"as many times `{EXACT}`", "best error tried"], rows),
-        prose("""It judges contact at both ends of a step and interpolates time and state linearly, which makes every
-        touch an error of second order, whatever the order of the Runge-Kutta method around it. Locating the
-        event to rounding instead (`rk4_events`) costs nothing in time. Order 4 is still not reached, because
+        prose("""It decides about contact at the two ends of a step and interpolates time and state linearly, which
+        makes every touch an error of second order, whatever the order of the Runge-Kutta method around it. Locating
+        the event to rounding instead (`rk4_events`) costs no time. Order 4 is still not reached, because
         u^(3/2) has no second derivative at u = 0. For motions as in the paper's figures its method is good
         enough; for numbers it is not."""),
     ])
@@ -139,7 +139,7 @@ def energy(drifts: Sequence[Drift]) -> str:
         "## Energy in the elastic case",
         table(["method", "setting", "worst relative drift", "wall time", "status"], rows),
         prose(f"""Case 2 over {seconds:g} s: nothing dissipates, so V_c must stay what it is. The motion itself cannot
-        be predicted that far, see below; energy is what a long run can be judged by. `discrete_gradient` keeps it
+        be predicted that far, see below; its energy tells whether a long run is right. `discrete_gradient` keeps it
         with any step, through every contact, but follows the motion to second order only."""),
         "![energy drift](accuracy/energy_drift.png)",
     ])
@@ -157,7 +157,7 @@ def prediction(predictions: Sequence[predictability.Prediction]) -> str:
         "## How far ahead a scene can be predicted",
         table(["scene", "growth of a perturbation over the scene", *levels], rows),
         prose(f"""Motions that begin {predictability.ROUNDINGS:g} roundings apart, the worst of {predictability.RUNS}.
-        Where they have parted further than the error you want, no method in double precision has it for sale."""),
+        Where they have parted further than the error you want, no method in double precision can deliver it."""),
         "![prediction](accuracy/prediction.png)",
     ])
 
@@ -195,9 +195,9 @@ def methods() -> str:
         "## The methods", table(["name", "order", "at a touch", "source"], rows),
         prose("""Outside peers, only in the studies: `odeint` (LSODA, its loop over the steps outside Python),
         `cvode_*` (SUNDIALS by scikit-sundae) and `heyoka*` (Taylor series by LLVM, given the same regularisation
-        w = sqrt(u) and a terminal event per event). All have compiled right-hand sides. Tried besides: the other
-        ways of heyoka to generate code, which differ by some percent (`grasp study speed` has them all);
-        numbalsoda, for which there is no wheel for these versions of Python."""),
+        w = sqrt(u) and a terminal event per transition). All have compiled right-hand sides. Also tried: the other
+        ways of heyoka to generate code, which differ by some percent (`grasp study speed` has them all); numbalsoda,
+        which has no wheel for these versions of Python."""),
     ])
 
 

@@ -68,7 +68,7 @@ def run(seconds: float, seed: int, directory: Path) -> int:
                     with writing(path):
                         directory.mkdir(parents=True, exist_ok=True)
                         path.write_text(scene.to_yaml(), encoding="utf-8")
-                    bar.write(f"{check.name}: {check.figure:.3g}, allowed {check.bound:.3g}; scene in {path}")
+                    bar.write(f"{check.name}: {check.error:.3g}, allowed {check.bound:.3g}; scene in {path}")
             bar.set_postfix_str(f"{ends.total()} scenes, {broken} failures", refresh=False)
             bar.update(passed - bar.n)
     print(f"{ends.total()} scenes in {seconds:g} s, seed {seed}, {sampled} of them sampled")

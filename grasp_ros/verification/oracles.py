@@ -22,7 +22,7 @@ mp.dps = 40
 
 
 def first_touch_from_rest(m: Any, stiffness: Any, damping: Any) -> Any:
-    """O4: when an under-damped arm that is released at rest first passes 0."""
+    """O4, in s."""
     s = mpf(damping) / (2 * mpf(m))
     w = mp.sqrt(mpf(stiffness) / mpf(m) - s * s)
     return (mp.pi - mp.atan2(w, s)) / w
@@ -48,7 +48,7 @@ def _exit(z: Any) -> Any:
 
 
 def impact(mu: Any, hertzian: Any, p: Any, speed: Any) -> Impact:
-    """O1 and O2. mu u' du' = -H u^(3/2) (1 + p u') du gives depth and restitution; the duration is a quadrature."""
+    """O1 and O2: depth and restitution from the first integral, the duration by quadrature."""
     mu, hertzian, p, speed = (mpf(value) for value in (mu, hertzian, p, speed))
     if p == 0:
         depth = (5 * mu * speed**2 / (4 * hertzian)) ** mpf("0.4")
@@ -168,7 +168,7 @@ def flight(body: Sequence[Any], x: Any, v: Any, t: Any) -> tuple[Any, Any]:
 
 
 def holding_force(stiffness: Sequence[Any], hertzian: Sequence[Any], overlap: Any) -> Any:
-    """O14: f/K_l + f/K_r + (f/H_l)^(2/3) + (f/H_r)^(2/3) = d for rest points that overlap by d."""
+    """O14, in N."""
     K, H, d = [mpf(k) for k in stiffness], [mpf(h) for h in hertzian], mpf(overlap)
 
     def excess(f: Any) -> Any:
@@ -177,8 +177,8 @@ def holding_force(stiffness: Sequence[Any], hertzian: Sequence[Any], overlap: An
     return mp.findroot(excess, (d * min(K) / 8, d * min(K)), solver="anderson")
 
 
-class Ledger(NamedTuple):
-    """Momentum and energy balance at the ends of the segments between events; all should vanish."""
+class Balance(NamedTuple):
+    """Errors of the balances of momentum and energy at the ends of the segments between events."""
 
     momentum: Array  # relative to the largest of m, C, K times the largest speed, position and its integral
     energy: Array  # relative to V_c(0)
@@ -188,12 +188,12 @@ NODES = 40
 
 
 def balance(system: System, duration: float, events: Sequence[float], solve: Callable[[Array], Array],
-            pieces: int = 16) -> Ledger:
+            parts: int = 16) -> Balance:
     """O3 along one trajectory with continuous feedback.
 
     m_l v_l + m_o v_o + m_r v_r + sum of C x + integral of sum of (K x - f) is constant, and so is V_c + 2 W with W' the
     dissipation. Between events the integrands are analytic after t = middle - half cos(theta), because u^(3/2) becomes
-    theta^3 times an analytic function; Gauss and Legendre do the rest. Long flights are cut into pieces.
+    theta^3 times an analytic function; Gauss and Legendre do the rest. Long flights are cut into parts.
 
     Parameters
     ----------
@@ -203,12 +203,12 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
         Times of all events.
     solve : callable
         From ascending times to states (n, 6).
-    pieces : int
-        Parts of each segment between events; many where bodies swing fast within one.
+    parts : int
+        Of each segment between events; many where bodies swing fast within one.
     """
     bodies = system.closed_loop
     edges = sorted({0.0, duration, *events})
-    edges = [a + (b - a) * j / pieces for a, b in pairwise(edges) for j in range(pieces)]
+    edges = [a + (b - a) * j / parts for a, b in pairwise(edges) for j in range(parts)]
     edges.append(duration)
     x, weight = np.polynomial.legendre.leggauss(NODES)
     theta = 0.5 * np.pi * (x + 1.0)
@@ -239,7 +239,7 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
     P, scale = momentum + pushed, max(scale, float(np.abs(pushed).max()))
     V_c = energy(system, at_edges).V_c
     E = V_c + 2.0 * integral(_dissipation(system, inside))
-    return Ledger((P - P[0]) / scale, (E - E[0]) / V_c[0])
+    return Balance((P - P[0]) / scale, (E - E[0]) / V_c[0])
 
 
 def _dissipation(system: System, y: Array) -> Array:

@@ -15,7 +15,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import PAPER, Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Product
-from grasp_ros.verification.cases.loops import unexplained
+from grasp_ros.verification.cases.loops import residual
 from grasp_ros.verification.cases.scenes import reference
 from grasp_ros.verification.deadline import Deadline, deadline
 from grasp_ros.verification.oracles import balance
@@ -26,7 +26,7 @@ MOST_EVENTS = 2000
 RISE = 1e-12  # of the largest V_c so far: what rounding may add
 BALANCED = 1e-12, 1e-10  # momentum and energy at the default accuracy
 MOST_WORK = 300_000  # a squeezed contact relaxes p H u^(3/2) t / m times, and each time takes a few steps
-FINEST = 128  # pieces between two events
+FINEST = 128  # parts between two events
 SPLIT = 1e-13  # per event
 WORK_STEPS = 20_000  # contact steps beyond which the slow properties are left out
 REFERENCE_STEPS = 100  # those beyond which the reference, which counts in 25 digits, takes too long
@@ -38,13 +38,13 @@ class Check(NamedTuple):
     """What became of a property."""
 
     name: str
-    figure: float
+    error: float
     bound: float
 
     @property
     def holds(self) -> bool:
-        """Whether the figure is within its bound; False for NaN."""
-        return self.figure <= self.bound
+        """Whether the error is within its bound; False for NaN."""
+        return self.error <= self.bound
 
 
 def checks(scene: Scene, compare: bool = False) -> list[Check]:
@@ -64,7 +64,7 @@ def checks(scene: Scene, compare: bool = False) -> list[Check]:
     product = _product()
     if scene.sampled:
         run = product.run(scene, sampled=True)
-        return [*_states(run), Check("work", unexplained(run), 1.0)]
+        return [*_states(run), Check("work", residual(run), 1.0)]
     run = product.run(scene, np.linspace(0.0, scene.duration, POINTS))
     found = [*_states(run), *_certificate(run)]
     if run.work[Work.CONTACT_STEPS] < WORK_STEPS:
@@ -119,7 +119,7 @@ def _may_follow(before: Transition, after: Transition) -> bool:
 
 
 def _certificate(run: Trajectory) -> list[Check]:
-    """V_c never rises; where constant forces shift its zero, or external ones work, the integrator's guard looks."""
+    """V_c never rises; where constant forces shift its zero, or external ones work, the integrator checks."""
     if _pushed(run.scene):
         return []
     V_c = run.energy.V_c
@@ -176,8 +176,8 @@ def _splitting(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> li
                    for part in (half, round(scene.duration - half, 9)))
     rest = started(rest, product.states(first, [half])[0])
     again = product.run(rest, [rest.duration])
-    figure = float((np.abs(again.state[-1] - run.state[-1]) / _sizes(run.state)).max())
-    return [Check("splitting", figure, _divergence(run) * max(growth(), sensitivity(rest, again)))]
+    error = float((np.abs(again.state[-1] - run.state[-1]) / _sizes(run.state)).max())
+    return [Check("splitting", error, _divergence(run) * max(growth(), sensitivity(rest, again)))]
 
 
 def _backwards(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
@@ -187,8 +187,8 @@ def _backwards(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> li
         return []
     back = started(scene, run.state[-1] * FLIP)
     way = _product().run(back, [back.duration])
-    figure = float((np.abs(way.state[-1] * FLIP - scene.initial_state) / _sizes(run.state)).max())
-    return [Check("time reversal", figure, _divergence(run) * max(growth(), sensitivity(back, way)))]
+    error = float((np.abs(way.state[-1] * FLIP - scene.initial_state) / _sizes(run.state)).max())
+    return [Check("time reversal", error, _divergence(run) * max(growth(), sensitivity(back, way)))]
 
 
 def _reference(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
@@ -198,22 +198,22 @@ def _reference(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> li
             expected = reference(scene, [0.0, scene.duration])[-1]
     except (Deadline, RuntimeError):
         return []
-    figure = float((np.abs(run.state[-1] - expected) / _sizes(run.state)).max())
-    return [Check("reference", figure, _divergence(run) * growth())]
+    error = float((np.abs(run.state[-1] - expected) / _sizes(run.state)).max())
+    return [Check("reference", error, _divergence(run) * growth())]
 
 
 def _balances(scene: Scene, run: Trajectory) -> list[Check]:
     """Momentum and energy, where the quadrature between the events converges: that of fast swings does not."""
     times = run.event_table[:, 0].tolist()
     before: Array | None = None
-    for pieces in (8, 32, FINEST):
-        if len(times) * pieces > 10_000:
+    for parts in (8, 32, FINEST):
+        if len(times) * parts > 10_000:
             return []
         product = _product()
-        book = balance(scene.system, scene.duration, times, partial(product.states, scene), pieces)
+        book = balance(scene.system, scene.duration, times, partial(product.states, scene), parts)
         now = np.array([np.abs(book.momentum).max(), np.abs(book.energy).max()])
         agreed = before is not None and bool((np.abs(now - before) <= 0.1 * np.array(BALANCED)).all())
-        if (now <= BALANCED).all() or (pieces == FINEST and agreed):
+        if (now <= BALANCED).all() or (parts == FINEST and agreed):
             return [Check("momentum", float(now[0]), BALANCED[0]), Check("energy", float(now[1]), BALANCED[1])]
         before = now
     return []

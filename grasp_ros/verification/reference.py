@@ -85,7 +85,7 @@ class _Side(NamedTuple):
     damping: Real  # C / m, 1/s
     drive: Real  # f / m, m/s^2
     mass: Real
-    hertz: Real
+    hertzian: Real
     dissipation: Real
 
     def depth(self, y: Vector) -> Real:
@@ -103,7 +103,7 @@ class _Side(NamedTuple):
 
     def gaps(self, phase: Phase) -> list[_Gap]:
         """The events that can end a phase."""
-        if not self.hertz:
+        if not self.hertzian:
             return []
         one, p = self.sign * mpfr(1), self.sign * self.dissipation
         depth, rate = ((1 + 4 * self.side, one), (X_O, -one)), ((2 + 4 * self.side, p), (V_O, -p))
@@ -172,12 +172,12 @@ class _Run:
         fired = []
         for side in sides:
             u, rate = side.depth(self.y), side.rate(self.y)
-            if u > 0 and side.hertz:
+            if u > 0 and side.hertzian:
                 self.phases[side.side] = Phase.PRESSED if 1 + side.dissipation * rate >= 0 else Phase.CLAMPED
                 self.y[7 + side.side] = gmpy2.sqrt(u)
             elif u == 0 and rate >= 0:
                 fired += side.gaps(Phase.APART)
-        self.switch(fired)
+        self.transition(fired)
 
     def pressed(self) -> list[_Side]:
         return [side for side in self.sides if self.phases[side.side] is Phase.PRESSED]
@@ -194,7 +194,7 @@ class _Run:
         f = [mpfr(0)] * 9
         for side in pressed:
             w, rate = y[7 + side.side], side.rate(y)
-            force = side.sign * side.hertz * w * w * w * (1 + side.dissipation * rate)
+            force = side.sign * side.hertzian * w * w * w * (1 + side.dissipation * rate)
             f[2 + 4 * side.side] = -force / side.mass
             f[V_O] += force / self.object_mass
             f[7 + side.side] = rate if len(pressed) == 1 else rate * y[8 - side.side]
@@ -292,7 +292,7 @@ class _Run:
                 break
         self.emit(self.y, y)
         self.y = y
-        self.switch(fired)
+        self.transition(fired)
 
     def press(self) -> None:
         """One step of a contact, cut at the first event."""
@@ -316,9 +316,9 @@ class _Run:
         self.y = end
         pressed = self.pressed()
         if not roots and len(pressed) == 2 and all(self.negligible(side) for side in pressed):
-            self.switch([side.gaps(Phase.PRESSED)[0] for side in pressed])
+            self.transition([side.gaps(Phase.PRESSED)[0] for side in pressed])
         elif roots:
-            self.switch([gap for _, _, gap in roots])
+            self.transition([gap for _, _, gap in roots])
 
     def creep(self, side: _Side, end: Vector, h: Real) -> None:
         """Begin a touch that the other pair's force grows from rest: a step too short for its own to matter."""
@@ -345,7 +345,7 @@ class _Run:
 
     def impulse(self, side: _Side, u: Real, rate: Real, t: Real) -> Real:
         """A bound on the speed that a penetration below u gives in a time t, relative to the rate."""
-        force = side.hertz * u * gmpy2.sqrt(u) * (1 + side.dissipation * rate)
+        force = side.hertzian * u * gmpy2.sqrt(u) * (1 + side.dissipation * rate)
         return force * t / (min(side.mass, self.object_mass) * rate)
 
     def negligible(self, side: _Side) -> bool:
@@ -353,7 +353,7 @@ class _Run:
         w, rate = self.y[7 + side.side], side.rate(self.y)
         return bool(rate < 0 and self.impulse(side, w * w, -rate, -w * w / rate) < self.tiny)
 
-    def switch(self, fired: list[_Gap]) -> None:
+    def transition(self, fired: list[_Gap]) -> None:
         """Let pairs change phase; the vector is at their event."""
         for gap in fired:
             side, now = self.sides[gap.side], self.y[T]
@@ -397,8 +397,8 @@ class _Run:
         clock, spans = mpfr(1), []
         for side in self.pressed():
             mass, w = min(side.mass, self.object_mass), self.y[7 + side.side]
-            speed = max(abs(side.rate(self.y)), gmpy2.sqrt(side.hertz * w**5 / mass))
-            scale = gmpy2.root(mass * speed * speed / side.hertz, 5)
+            speed = max(abs(side.rate(self.y)), gmpy2.sqrt(side.hertzian * w**5 / mass))
+            scale = gmpy2.root(mass * speed * speed / side.hertzian, 5)
             clock *= scale
             spans.append(scale * scale / speed)
         return min(spans) / (6 * clock) if spans else mpfr(0)
@@ -407,12 +407,12 @@ class _Run:
 def _side(side: int, arm: Arm, contact: Contact, force: float, feedback: bool, decimal: bool) -> _Side:
     """The parameters of one side, checked."""
     mass, k, c, kp, kv = (_number(value, decimal) for value in arm)
-    hertz, dissipation = (_number(value, decimal) for value in contact)
+    hertzian, dissipation = (_number(value, decimal) for value in contact)
     stiffness, damping = (k + kp, c + kv) if feedback else (k, c)
-    if mass <= 0 or min(stiffness, damping, hertz, dissipation) < 0:
+    if mass <= 0 or min(stiffness, damping, hertzian, dissipation) < 0:
         raise ValueError(f"a mass must be positive, stiffness, damping, H and p must not be negative: {arm}, {contact}")
     drive = _number(force, decimal) / mass
-    return _Side(side, 1 - 2 * side, stiffness / mass, damping / mass, drive, mass, hertz, dissipation)
+    return _Side(side, 1 - 2 * side, stiffness / mass, damping / mass, drive, mass, hertzian, dissipation)
 
 
 def integrate(

@@ -13,6 +13,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product, Solver, recorded
+from grasp_ros.verification.cases.families import RELATION
 from grasp_ros.verification.cases.scenes import ELASTIC, distance, grasp, library, part
 
 SWAPPED = [4, 5, 2, 3, 0, 1]
@@ -87,12 +88,12 @@ def reversal(scene: Scene, solver: Solver) -> float:
     return float(np.abs(back * FLIP - scene.initial_state).max())
 
 
-def splitting(scene: Scene, pieces: int, solver: Solver) -> float:
+def splitting(scene: Scene, parts: int, solver: Solver) -> float:
     """Difference between one horizon and many, each started from the state before."""
     whole = solver.states(scene, [scene.duration])[0]
-    short = scene.changed({"time.duration_s": round(scene.duration / pieces, 9)})
+    short = scene.changed({"time.duration_s": round(scene.duration / parts, 9)})
     state = scene.initial_state
-    for _ in range(pieces):
+    for _ in range(parts):
         state = solver.states(started(short, state), [short.duration])[0]
     return distance(state[None], whole[None])
 
@@ -124,20 +125,16 @@ def cases() -> Iterator[Case]:
     clamped = grasp([-0.3, 0, 0, 0, 0.2, 0], 5.0, contact=Contact(1e3, 15.0), mass=1.0)
     uneven = grasp([-0.3, 0.1, 0.02, 0.3, 0.5, 0], 5.0, right=Arm(2.0, 3.0, 0.1, 20.0, 1.0), contact=Contact(1e6, 0.5))
     for text, scene in (("case 3", library("case_03", 5.0)), ("clamped", clamped), ("uneven", uneven)):
-        yield Case("relation", f"mirror, {text}", "both sides must be the same code", "O6: bit for bit",
-                   partial(mirror, scene), 0.0)
+        yield Case(RELATION, f"mirror, {text}", partial(mirror, scene), 0.0, "O6")
     for units in ((4.0, 1.0, 1.0), (1.0, 2.0, 1.0), (1.0, 1.0, 8.0), (4.0**-3, 2.0**4, 0.25)):
-        yield Case("relation", f"units times {', '.join(f'{unit:g}' for unit in units)}", "tolerances must scale too",
-                   "O7: bit for bit", partial(scaling, *units, uneven), 0.0)
+        yield Case(RELATION, f"units times {', '.join(f'{unit:g}' for unit in units)}",
+                   partial(scaling, *units, uneven), 0.0, "O7: tolerances scale too")
     backwards = grasp([-0.3, 0.0, 0.05, 0.3, 0.2, -0.1], 5.0, left=ELASTIC, contact=Contact(1e4, 0.0))
-    yield Case("relation", "backwards in time", "every error of the way there is still there on the way back",
-               "O8: the start, m and m/s", partial(reversal, backwards), 1e-10)
-    for pieces in (10, 1000):
-        yield Case("relation", f"5 s in {pieces} pieces", "a piece may begin in any mode, at any depth",
-                   "the same final state", partial(splitting, uneven, pieces), 1e-10)
-    yield Case("relation", "2 or 20001 output times", "outputs must not steer the steps", "bit for bit",
-               partial(_grid, uneven), 0.0, product_only=True)
-    yield Case("relation", "absent or out of reach", "what is not there must not act", "bit for bit", _absent, 0.0,
-               product_only=True)
-    yield Case("relation", "order of the sections", "effects must not depend on it", "bit for bit", _order, 0.0,
-               product_only=True)
+    yield Case(RELATION, "backwards in time", partial(reversal, backwards), 1e-10,
+               "O8: back at the start, m and m/s; errors of both ways add up")
+    for parts in (10, 1000):
+        yield Case(RELATION, f"5 s in {parts} intervals", partial(splitting, uneven, parts), 1e-10,
+                   "the same end, relative; an interval may begin in any mode")
+    yield Case(RELATION, "2 or 20001 output times", partial(_grid, uneven), 0.0, product_only=True)
+    yield Case(RELATION, "an arm absent or out of reach", _absent, 0.0, product_only=True)
+    yield Case(RELATION, "order of the sections", _order, 0.0, product_only=True)

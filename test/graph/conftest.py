@@ -9,6 +9,14 @@ import pytest
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 
+from grasp_ros.exact.integrator import compile_kernels
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kernels() -> None:
+    """On disk before several processes, each with a deadline, would compile them at the same time."""
+    compile_kernels()
+
 
 @pytest.fixture
 def node() -> Iterator[tuple[Any, SingleThreadedExecutor]]:

@@ -81,7 +81,7 @@ def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Pa
     recording = bag.read(two_runs[0] / "bag")
     level = recording.energy
     assert np.array_equal(recording.lyapunov[:, :4], np.stack([*level[:3], level.mode.astype(float)], axis=1))
-    assert (recording.lyapunov[:, 4] <= 1e-12).all()  # no energy from nowhere
+    assert (recording.lyapunov[:, 4] <= 1e-12).all()  # the energy balance closes
     assert recording.lyapunov[:, 4].sum() < -1.0  # what the impacts and dampers have taken
     assert not recording.lyapunov[:, 5].any()
     assert set(recording.lyapunov[:, 3]) == {0.0, 1.0, 2.0, 3.0}

@@ -1,4 +1,4 @@
-"""How a graph and its nodes end: signals, a plant that is gone, energy from nowhere."""
+"""How a graph and its nodes end: signals, a plant that is gone, an energy balance that does not close."""
 
 from __future__ import annotations
 
@@ -7,7 +7,11 @@ import re
 import signal
 import subprocess
 import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +19,8 @@ import rclpy
 from processes import DEADLINE, START, wait_for
 
 from grasp_ros import scene
-from grasp_ros.graph import bag
+from grasp_ros.graph import bag, processes
+from grasp_ros.graph.processes import Graph
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 
@@ -51,36 +56,65 @@ def test_interrupted_run_ends_cleanly(tmp_path: Path, number: signal.Signals, mo
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("name", ["plant", "left_controller", "right_controller", "monitor"])
-def test_lonely_node_ends_cleanly_on_a_signal(tmp_path: Path, name: str, number: signal.Signals) -> None:
-    process = subprocess.Popen(
-        [*START, name], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-        env={**os.environ, "ROS_DOMAIN_ID": "120"},
-    )
-    context = rclpy.Context()
-    rclpy.init(context=context, domain_id=120)
-    observer = rclpy.create_node("observer", context=context)
-    wait_for(lambda: name in observer.get_node_names(), name)
-    process.send_signal(number)
-    _, err = process.communicate(timeout=DEADLINE)
-    observer.destroy_node()
-    context.shutdown()
-    assert process.returncode == 0, err
-    assert "Traceback" not in err
+def test_lonely_nodes_end_cleanly_on_a_signal(tmp_path: Path, number: signal.Signals) -> None:
+    """All four at the same time, each in a domain of its own."""
+    domains = {"plant": 120, "left_controller": 121, "right_controller": 122, "monitor": 123}
+    started = {
+        name: subprocess.Popen([*START, name], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+                               env={**os.environ, "ROS_DOMAIN_ID": str(domain)})
+        for name, domain in domains.items()
+    }
+    for name, process in started.items():
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=domains[name])
+        observer = rclpy.create_node("observer", context=context)
+        wait_for(partial(is_seen, observer, name), name)
+        process.send_signal(number)
+        _, err = process.communicate(timeout=DEADLINE)
+        observer.destroy_node()
+        context.shutdown()
+        assert process.returncode == 0, f"{name}: {err}"
+        assert "Traceback" not in err
 
 
-def test_run_notices_a_plant_that_was_stopped(tmp_path: Path) -> None:
-    process = subprocess.Popen(
-        [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run")], text=True,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )
+def is_seen(observer: Any, name: str) -> bool:
+    return name in observer.get_node_names()
+
+
+def test_run_notices_a_plant_that_was_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Any, signal_handlers: None
+) -> None:
+    monkeypatch.setattr(processes, "TOGETHER_SECONDS", 1.0)
+    graphs: list[Graph] = []
+    start = Graph.start
+
+    def noted(graph: Graph) -> None:
+        graphs.append(graph)
+        start(graph)
+
+    monkeypatch.setattr(Graph, "start", noted)
     recorded = tmp_path / "run" / "bag" / "bag.mcap"
-    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 1_000_000, "a bag that grows")
-    subprocess.run(["pkill", "-TERM", "-f", f"start plant .*{tmp_path}"], check=True)
-    _, err = process.communicate(timeout=DEADLINE)
-    assert process.returncode == 1
-    assert "monitor: still runs although its counterpart has ended" in err
+
+    def stop_the_plant() -> None:
+        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 1_000_000, "a bag that grows")
+        graphs[0].processes["plant"].terminate()
+
+    stopper = threading.Thread(target=stop_the_plant)
+    stopper.start()
+    result = command("run", "case_01", "-o", "run")
+    stopper.join()
+    assert result.returncode == 1
+    assert "monitor: still runs although its counterpart has ended" in result.stderr
     assert bag.read(recorded.parent).counts[JOINT_STATES.name] > 100
+
+
+@pytest.fixture
+def signal_handlers() -> Iterator[None]:
+    """Puts back what `grasp run` changes in its process."""
+    before = {number: signal.getsignal(number) for number in processes.STOP_SIGNALS}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 WRONG_PLANT = """
@@ -93,7 +127,7 @@ sys.exit(start.main("plant"))
 """
 
 
-def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Path) -> None:
+def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(tmp_path: Path) -> None:
     """A plant that pushes its arms harder than the commands say."""
     options = ["--ros-args", "-p", "wait_for_monitor:=true"]
     recording = [*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / 'bag'}"]
@@ -110,7 +144,7 @@ def test_the_monitor_stops_a_graph_where_energy_comes_from_nowhere(tmp_path: Pat
         controller.communicate(timeout=DEADLINE)
     assert (monitor.returncode, others[0].returncode) == (1, 1)
     assert b"the monitor that this run waits for has ended" in last_words
-    assert re.search(r"V_c rose by \S+ J more than the held forces can explain, t = \S+ s, mode 0, state \[", err)
+    assert re.search(r"V_c rose by \S+ J more than the work of the held forces, t = \S+ s, mode 0, state \[", err)
     found = bag.read(tmp_path / "bag")
     assert found.alarms == 1
     assert found.lyapunov[-1, LYAPUNOV_NAMES.index("alarm")] == 1.0

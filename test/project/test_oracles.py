@@ -53,7 +53,7 @@ def test_functions_that_compute_an_oracle_exist(name: str) -> None:
 
 @pytest.mark.parametrize("name", SECTIONS)
 def test_families_of_cases_are_those_that_name_the_oracle(name: str) -> None:
-    families = {case.family for case in cases() if name in NUMBER.findall(case.oracle)}
+    families = {case.family.name for case in cases() if name in NUMBER.findall(case.oracle)}
     assert set(listed(name, "Families")) == (families or {"none"})
 
 

@@ -1,4 +1,4 @@
-"""How runs end: at a budget, where energy comes from nowhere, and never because a kernel took breath."""
+"""How runs end: at a budget, where the energy rises, and never because a kernel took breath."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from grasp_ros.simulation import GRID_POINTS, load, simulate
 
 
 @pytest.mark.parametrize("sampled", [False, True])
-def test_runs_stop_where_energy_comes_from_nowhere(sampled: bool) -> None:
+def test_runs_stop_where_the_energy_rises(sampled: bool) -> None:
     """An object that its surroundings drive, which no scene can ask for."""
     scene = scenes.load("case_01").changed({"time.duration_s": 1.0, "object.velocity_m_per_s": 0.01})
     whole = simulate(scene, sampled=sampled)

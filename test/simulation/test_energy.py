@@ -8,13 +8,13 @@ from documents import case_of
 from oracles import energy
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.energy import Ledger, ledger
+from grasp_ros.physics.energy import EnergyBalance, energy_balance
 from grasp_ros.simulation import Trajectory, simulate
 
 
 @pytest.mark.parametrize("name", scenes.names())
 def test_certificate_holds_or_says_why_not(name: str) -> None:
-    """Where nothing is in doubt V_c never rises; everywhere the ledger leaves no rise unexplained."""
+    """Where nothing is in doubt V_c never rises; everywhere the energy balance closes."""
     scene = scenes.load(name, ["time.duration_s=4.0"])
     if not scene.sampled and not scene.system.external:
         V_c = simulate(scene, grid=np.linspace(0.0, 4.0, 4001)).energy.V_c
@@ -28,23 +28,23 @@ def test_certificate_holds_or_says_why_not(name: str) -> None:
     assert np.abs(book.work).max() > 0.0 or not scene.system.laws
 
 
-def balance(motion: Trajectory) -> Ledger:
+def balance(motion: Trajectory) -> EnergyBalance:
     """Of every control period of a sampled motion."""
-    return ledger(motion.scene.system, motion.state[:-1], motion.state[1:], motion.inputs[:-1])
+    return energy_balance(motion.scene.system, motion.state[:-1], motion.state[1:], motion.inputs[:-1])
 
 
-def test_the_ledger_notices_energy_from_nowhere() -> None:
+def test_the_energy_balance_notices_a_gain() -> None:
     motion = simulate(scenes.load("case_01", ["time.duration_s=1.0"]), sampled=True)
     system, before, after = motion.scene.system, motion.state[500], motion.state[501]
     forces = np.array([*motion.command[500], 0.0])
-    fair = ledger(system, before, after, forces)
+    fair = energy_balance(system, before, after, forces)
     assert not fair.alarm
-    assert fair.unexplained < 0.0  # what the dampers took
+    assert fair.residual < 0.0  # what the dampers took
     faster = after.copy()
-    faster[1] = np.sqrt(after[1] ** 2 - fair.unexplained + 1e-10)  # that, and a bit more, is given back
-    assert ledger(system, before, faster, forces).unexplained == pytest.approx(1e-10, rel=1e-2)
-    assert ledger(system, before, faster, forces).alarm
-    assert ledger(system, before, np.full(6, np.nan), forces).alarm
+    faster[1] = np.sqrt(after[1] ** 2 - fair.residual + 1e-10)  # that, and a bit more, is given back
+    assert energy_balance(system, before, faster, forces).residual == pytest.approx(1e-10, rel=1e-2)
+    assert energy_balance(system, before, faster, forces).alarm
+    assert energy_balance(system, before, np.full(6, np.nan), forces).alarm
 
 
 def test_a_weak_spring_under_a_constant_force_raises_no_alarm() -> None:
@@ -57,7 +57,7 @@ def test_a_weak_spring_under_a_constant_force_raises_no_alarm() -> None:
 
 
 @pytest.mark.parametrize("period", [0.01, 0.1, 0.25])
-def test_work_ledger_of_held_commands(period: float) -> None:
+def test_work_balance_of_held_commands(period: float) -> None:
     """O3: without dissipation the energy of the plant changes by the work of the commands."""
     scene = case_of(
         "case_01",
@@ -79,7 +79,7 @@ def test_work_ledger_of_held_commands(period: float) -> None:
     assert np.abs(work).max() > 1e-3
 
 
-def test_dissipation_is_what_the_ledger_lacks() -> None:
+def test_dissipation_is_what_the_balance_lacks() -> None:
     """O3."""
     scene = case_of("case_01", 2.0, 0.05)
     result = simulate(scene, sampled=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import mp, mpf
-from oracles import impact, ledger, reduced_mass
+from oracles import balance_of, impact, reduced_mass
 
 from grasp_ros import scene as scenes
 from grasp_ros.verification.oracles import chain_speeds, elastic_period, graze, tail_rate
@@ -62,11 +62,11 @@ def test_impact_oracle_solves_its_equation() -> None:
     assert abs(-d / speed / law.restitution - 1) < mpf("1e-8")
 
 
-def test_ledger_notices_a_wrong_model() -> None:
+def test_balance_notices_a_wrong_model() -> None:
     """O3."""
     scene = scenes.load("case_01")
-    good = ledger(scene.grasp, scene.initial_state, 5.0)
-    coarse = ledger(scene.grasp, scene.initial_state, 5.0, accuracy=1e-3)
+    good = balance_of(scene.grasp, scene.initial_state, 5.0)
+    coarse = balance_of(scene.grasp, scene.initial_state, 5.0, accuracy=1e-3)
     assert np.abs(good.energy).max() < 1e-12 < 1e-9 < np.abs(coarse.energy).max()
 
 

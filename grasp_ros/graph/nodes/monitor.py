@@ -16,7 +16,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph.bag import Recorder
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode, run
-from grasp_ros.physics.energy import energy, ledger
+from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -48,8 +48,8 @@ class _Announcements:
 class Monitor(GraspNode):
     """Node `monitor`; parameter bag.
 
-    It puts the messages of a tick together, computes V, V_c, V', the mode and the ledger of the held forces from the
-    states, publishes them, and records all in the order of the ticks, so that two equal runs give equal bags.
+    It puts the messages of a tick together, computes V, V_c, V', the mode and the energy balance of the held forces
+    from the states, publishes them, and records all in the order of the ticks, so that two equal runs give equal bags.
     """
 
     def __init__(self) -> None:
@@ -127,21 +127,21 @@ class Monitor(GraspNode):
         system = self._scene.system
         state, inputs = state_of(message)
         external = system.external_at(time_ns // self._scene.period_ns)
-        unexplained, alarm = 0.0, False
+        residual, alarm = 0.0, False
         if self._before is not None and self._before[0] + self._scene.period_ns == time_ns:
-            balance = ledger(system, self._before[1], state, inputs + self._before[2])
-            unexplained, alarm = float(balance.unexplained), bool(balance.alarm)
+            balance = energy_balance(system, self._before[1], state, inputs + self._before[2])
+            residual, alarm = float(balance.residual), bool(balance.alarm)
         self._before = time_ns, state, external
         level = energy(system, state, external)
         if alarm:
             self.count("alarms")
             self.exit_code = 1  # `grasp run` and a plant that waits for this monitor end; the bag keeps this tick
             self.state = (
-                f"V_c rose by {unexplained!r} J more than the held forces can explain, t = {time_ns / NANOSECONDS} s,"
+                f"V_c rose by {residual!r} J more than the work of the held forces, t = {time_ns / NANOSECONDS} s,"
                 f" mode {int(level.mode)}, state {state.tolist()}"
             )
             self.get_logger().fatal(self.state)
-        return [*(float(value) for value in level), unexplained, float(alarm)]
+        return [*(float(value) for value in level), residual, float(alarm)]
 
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""

@@ -1,4 +1,4 @@
-"""The contact of one pair of arm and object, (6), (7), with or without loss of energy."""
+"""The contact of one pair of arm and object: the Hunt-Crossley law (6), (7), with or without dissipation."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import CONTACTS
 
 PARAMETERS = (
-    Parameter("hertz_N_per_m1_5", 0.0, 1e15, "Hertz coefficient of the impact, H", open_low=True),
-    Parameter("dissipation_s_per_m", 0.0, 1e12, "energy loss of the impact, p", optional=True),
+    Parameter("hertz_N_per_m1_5", 0.0, 1e15, "Hertzian stiffness of the impact, H", open_low=True),
+    Parameter("dissipation_s_per_m", 0.0, 1e12, "Hunt-Crossley dissipation of the impact, p", optional=True),
 )
 
 

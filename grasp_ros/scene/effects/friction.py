@@ -17,7 +17,7 @@ def _build(sections: Sections, system: System) -> None:
 
 EFFECTS = (
     Effect(
-        "object_friction", "the object rubs on its line",
+        "object_friction", "friction of the object on its line, viscous and dry",
         (
             Parameter("viscous_Ns_per_m", 0.0, 1e12, "drag of the object", optional=True),
             Parameter("coulomb_N", 0.0, 1e12, "dry friction, sliding and sticking alike", optional=True),

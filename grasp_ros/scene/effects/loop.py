@@ -24,7 +24,7 @@ EFFECTS = (
             Parameter("delay_ticks", 0, 10_000, "control periods from a state to the command that answers it",
                       optional=True, whole=True),
         ),
-        _build, "V_c may rise by the work of the held commands; the ledger of that work is exact",
+        _build, "V_c may rise by the work of the held commands; the energy balance with that work is exact",
         example={"delay_ticks": 2},
     ),
 )

@@ -12,6 +12,7 @@ from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Event, St
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.verification.cases.families import Family
 
 
 class Unfinished(Exception):  # noqa: N818
@@ -36,7 +37,7 @@ class Product:
     ----------
     max_events, max_work : int
     accuracy : float
-        See `exact.integrator.Integrator`.
+        See `exact.Integrator`.
     runs : list of Trajectory
         All runs so far; what was reached is in them even if a run was stopped.
     """
@@ -82,52 +83,56 @@ class Case:
 
     Attributes
     ----------
-    family, name : str
-    why : str
-        Why it is hard.
-    oracle : str
-        What decides.
-    figure : callable
+    family : Family
+        Why it is hard, and what decides.
+    name : str
+    error : callable
         Runs the case with a solver and returns its error by the oracle, >= 0.
     bound : float
-        What the product promises for the figure.
+        What the product promises for the error.
+    note : str
+        Where the reason or the oracle differs from the family's.
     limit : Status
         A status with which the product may end instead; DONE: none.
     product_only : bool
-        Whether the figure needs more than states and events, which other solvers do not have.
+        Whether the error needs more than states and events, which other solvers do not have.
     max_events, max_work : int
         Budgets of contact events and of work.
     """
 
-    family: str
+    family: Family
     name: str
-    why: str
-    oracle: str
-    figure: Callable[..., float]  # of a Solver, or of the Product
+    error: Callable[..., float]  # of a Solver, or of the Product
     bound: float
+    note: str = ""
     limit: Status = Status.DONE
     product_only: bool = False
     max_events: int = MAX_EVENTS
     max_work: int = MAX_WORK
 
+    @property
+    def oracle(self) -> str:
+        """What decides: the oracle of the family, and where it differs the note."""
+        return f"{self.family.oracle}; {self.note}" if self.note else self.family.oracle
+
 
 @dataclass(frozen=True)
-class Outcome:
+class Verdict:
     """How a case ended."""
 
-    figure: float | None  # None: no result
+    error: float | None  # None: no result
     status: str
 
     def right(self, case: Case) -> bool:
-        """Whether the figure is within the bound, or the status is the announced one."""
-        if self.figure is not None:
-            return self.figure <= case.bound  # False for NaN
+        """Whether the error is within the bound, or the status is the announced one."""
+        if self.error is not None:
+            return self.error <= case.bound  # False for NaN
         return case.limit is not Status.DONE and self.status == case.limit.value
 
 
-def judge(case: Case, solver: Solver) -> Outcome:
+def evaluate(case: Case, solver: Solver) -> Verdict:
     """Run a case."""
     try:
-        return Outcome(float(case.figure(solver)), Status.DONE.value)
+        return Verdict(float(case.error(solver)), Status.DONE.value)
     except Unfinished as reason:
-        return Outcome(None, str(reason))
+        return Verdict(None, str(reason))

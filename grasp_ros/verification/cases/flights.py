@@ -10,11 +10,11 @@ import numpy as np
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.verification.cases.case import Case, Solver, recorded
+from grasp_ros.verification.cases.families import FLIGHT, WAIT
 from grasp_ros.verification.cases.scenes import AWAY, FREE, STANDARD, grasp
 from grasp_ros.verification.oracles import flight
 
 TIMES = (1e-6, 0.1, 1.0, 5.0, 20.0)
-FLIGHT = "matrix exponential with 70 digits, position and velocity, relative to the swing at that time"
 
 
 def _alone(arm: Arm, solver: Solver) -> float:
@@ -58,20 +58,17 @@ def cases() -> Iterator[Case]:
     for offset in (0.0, 1e-15, -1e-15, 1e-12, -1e-12, 1e-8, -1e-8, 1e-4, -1e-4):
         change = f" times 1 {'-' if offset < 0 else '+'} {abs(offset):g}" if offset else ""
         text = f"critical damping{change}"
-        yield Case("flight", text, "both closed forms divide by the difference of the roots", FLIGHT,
-                   partial(_alone, Arm(1.0, 10.0, root * (1.0 + offset), 5.0, 0.0)), 1e-13)
+        yield Case(FLIGHT, text, partial(_alone, Arm(1.0, 10.0, root * (1.0 + offset), 5.0, 0.0)), 1e-13)
     for text, arm in (
         ("c = 1e6, strongly over-damped", Arm(1.0, 10.0, 1e6, 5.0, 0.0)), ("no spring", Arm(1.0, 0.0, 0.7, 0.0, 0.0)),
         ("a spring of 1e-18 N/m", Arm(1.0, 1e-18, 0.7, 0.0, 0.0)), ("no damper", Arm(1.0, 10.0, 0.0, 5.0, 0.0)),
         ("k + Kp = 0 by feedback", Arm(1.0, 10.0, 0.2, -10.0, 0.5)), ("nothing", FREE),
         ("a damper of 1e-18 N s/m", Arm(1.0, 10.0, 1e-18, 5.0, 0.0)),
     ):
-        yield Case("flight", text, "a limit in which a closed form is 0/0 or loses its digits", FLIGHT,
-                   partial(_alone, arm), 2e-13)
+        yield Case(FLIGHT, text, partial(_alone, arm), 2e-13)
     for speed, distance in ((1e-6, 1.0), (1e-3, 1e3), (1.0, 1e6)):
-        yield Case("flight", f"{distance / speed:g} s at {speed:g} m/s", "the touch comes after 1e6 s",
-                   "distance / speed", partial(_long_wait, speed, distance), 4e-16)
+        yield Case(WAIT, f"{distance / speed:g} s at {speed:g} m/s", partial(_long_wait, speed, distance), 4e-16,
+                   "time of the touch: distance / speed, relative")
     for text, arm in (("over-damped", STANDARD._replace(damping=39.0)), ("critical", Arm(1.0, 16.0, 8.0, 0.0, 0.0))):
-        yield Case("flight", f"never arrives: {text}", "the gap tends to 0 for 1e4 s", "O4: no touch, m and m/s",
-                   partial(_never, arm), 0.0)
-    yield Case("flight", "everything at 0 for 1e6 s", "u = 0 and u' = 0 on both sides", "nothing moves", _at_rest, 0.0)
+        yield Case(WAIT, f"never arrives: {text}", partial(_never, arm), 0.0)
+    yield Case(WAIT, "everything at 0 for 1e6 s", _at_rest, 0.0, "u = u' = 0 on both sides")

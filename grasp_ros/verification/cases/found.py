@@ -8,6 +8,7 @@ from typing import Any
 
 from grasp_ros import scene as scenes
 from grasp_ros.verification.cases.case import Case, Product
+from grasp_ros.verification.cases.families import FOUND
 from grasp_ros.verification.properties import checks
 
 SCENES: tuple[tuple[str, str, Mapping[str, Mapping[str, Any]]], ...] = (
@@ -66,6 +67,5 @@ def _violated(sections: Mapping[str, Mapping[str, Any]], _: Product) -> float:
 
 def cases() -> Iterator[Case]:
     """One for each."""
-    for name, why, sections in SCENES:
-        yield Case("found", name, why, "all properties of `grasp study fuzz`", partial(_violated, sections), 0.0,
-                   product_only=True)
+    for name, note, sections in SCENES:
+        yield Case(FOUND, name, partial(_violated, sections), 0.0, note, product_only=True)

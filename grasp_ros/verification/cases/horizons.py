@@ -13,11 +13,11 @@ from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product, Solver
+from grasp_ros.verification.cases.families import BALANCE, ENERGY, HORIZON, LIMIT, MOMENTUM, TAIL
 from grasp_ros.verification.cases.scenes import AWAY, ELASTIC, FREE, STANDARD, grasp, library
 from grasp_ros.verification.oracles import balance, elastic_period, tail_rate
 
 PERIOD = float(elastic_period(1, 15, 10_000, "0.3"))  # s
-MOMENTUM, ENERGY = 1e-13, 2e-12  # what the balances may be off, relative
 
 
 def _energy(seconds: float, points: int, solver: Solver) -> float:
@@ -52,10 +52,10 @@ def _rise_of_tail(name: str, solver: Solver) -> float:
     return float(max(V_c[2] - V_c[1], 0.0) / V_c[0])
 
 
-def balances(scene: Scene, pieces: int, product: Product) -> float:
+def balances(scene: Scene, parts: int, product: Product) -> float:
     """Momentum and energy balance, each in units of what it may be off."""
     events = [event.time for event in product.events(scene)]
-    book = balance(scene.system, scene.duration, events, lambda grid: product.states(scene, grid), pieces)
+    book = balance(scene.system, scene.duration, events, lambda grid: product.states(scene, grid), parts)
     return float(max(np.abs(book.momentum).max() / MOMENTUM, np.abs(book.energy).max() / ENERGY))
 
 
@@ -73,19 +73,15 @@ def _creeps(product: Product) -> float:
 
 def cases() -> Iterator[Case]:
     """All long runs and balances."""
-    yield Case("horizon", "elastic marginal case, 2000 s", "the motion is unpredictable after 50 s; the energy is not",
-               "O3: V_c is constant", partial(_energy, 2000.0, 2001), 2e-12)
-    yield Case("horizon", "elastic marginal case, 2e4 s", "50 000 impacts; errors must not add up",
-               "O3: V_c is constant", partial(_energy, 2e4, 201), 2e-11)
+    yield Case(HORIZON, "elastic marginal case, 2000 s", partial(_energy, 2000.0, 2001), 2e-12)
+    yield Case(HORIZON, "elastic marginal case, 2e4 s", partial(_energy, 2e4, 201), 2e-11)
     for periods, bound in ((1000, 1e-9), (20_000, 1e-7)):
-        yield Case("horizon", f"{periods} periods of O12", "clock and phase must not drift",
-                   "O12: the period, known to 20 digits, s", partial(_periodic, periods), bound)
+        yield Case(HORIZON, f"{periods} periods", partial(_periodic, periods), bound, "O12: phase after the periods, s")
     for seconds, bound in ((1e4, 0.1), (1e5, 0.02)):
-        yield Case("tail", f"{seconds:g} s", "bounces get smaller for ever: no stall, no end",
-                   "O9: V_c against its law", partial(tail, seconds), bound)
+        yield Case(TAIL, f"{seconds:g} s", partial(tail, seconds), bound)
     for name in ("case_01", "case_09", "case_10"):
-        yield Case("tail", f"{name} for 1000 s", "amplitudes fall to 1e-30 m and below", "O3: V_c does not rise",
-                   partial(_rise_of_tail, name), 1e-60, max_work=3_000_000)
+        yield Case(TAIL, f"{name} for 1000 s", partial(_rise_of_tail, name), 1e-60,
+                   "O3: V_c does not rise, relative to V_c(0)", max_work=3_000_000)
     strong = Arm(1.0, 10.0, 0.2, 50.0, 5.0)
     for text, scene in (
         *((name, library(name, 20.0)) for name in ("case_01", "case_02", "case_03", "case_04", "case_07", "case_09")),
@@ -96,10 +92,8 @@ def cases() -> Iterator[Case]:
         ("over-damped and fast", grasp([-0.3, 2.0, 0, 0, 0.5, -2.0], 5.0, left=STANDARD._replace(velocity_gain=9.0))),
         ("0.2 m deep on both sides", grasp([0.2, 0, 0, 0, -0.2, 0], 5.0)),
     ):
-        yield Case("balance", text, "an error that no single state shows",
-                   f"O3: momentum to {MOMENTUM:g}, energy to {ENERGY:g}, in these units",
-                   partial(balances, scene, 128 if "1e-6" in text else 16), 1.0, product_only=True)
-    yield Case("horizon", "more contacts than the budget", "a run must not go on for ever", "the status says so",
-               _budget, 0.0, limit=Status.EVENT_BUDGET, product_only=True, max_events=30)
-    yield Case("horizon", "more work than the budget", "stiff: the squeezed contact creeps out at 1/p",
-               "the status says so", _creeps, 0.0, limit=Status.WORK_BUDGET, product_only=True, max_work=10**5)
+        yield Case(BALANCE, text, partial(balances, scene, 128 if "1e-6" in text else 16), 1.0, product_only=True)
+    yield Case(LIMIT, "more contacts than the budget", _budget, 0.0, limit=Status.EVENT_BUDGET, product_only=True,
+               max_events=30)
+    yield Case(LIMIT, "more work than the budget", _creeps, 0.0, "a squeezed, stiff contact that opens at 1/p",
+               limit=Status.WORK_BUDGET, product_only=True, max_work=10**5)

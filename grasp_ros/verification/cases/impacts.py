@@ -9,15 +9,14 @@ from itertools import product
 import numpy as np
 
 from grasp_ros.exact.integrator import Event
-from grasp_ros.physics.energy import EPS
-from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.layout import EPS, LEFT, Transition
 from grasp_ros.physics.model import Contact
 from grasp_ros.verification.cases.case import Case, Solver, recorded
+from grasp_ros.verification.cases.families import CHAIN, CREEP, EXTREME, IMPACT
 from grasp_ros.verification.cases.scenes import AWAY, FREE, distance, grasp, reference
 from grasp_ros.verification.oracles import chain_speeds, impact_numbers
 
 LOSSES = (0.0, 0.1, 1.0, 10.0, 100.0)  # p v
-LAW = "O1, O2: exit speed and duration of a free impact, relative"
 TOUCHING = {  # O11: mass of the middle body, and the speeds behind a touching chain that was hit with 1
     1.0: (-0.070952353651436871, 0.076403039071206993, 0.994549314580229878),
     0.5: (-0.136122574012185708, 0.355827683353408662, 0.958208732335481377),
@@ -85,35 +84,18 @@ def _creeps(p: float, speed: float, hertzian: float, solver: Solver) -> float:
 def cases() -> Iterator[Case]:
     """All impacts."""
     for hertzian, speed in product((1.0, 1e4, 1e8, 1e12), (1e-6, 1.0, 1e3)):
-        yield Case(
-            "impact", f"H = {hertzian:g}, v = {speed:g} m/s, p v = 0 to 100",
-            "u^(3/2) is only once differentiable; durations from 1e-5 s to 1e2 s", LAW,
-            partial(impact_error, 1.0, 1.0, hertzian, LOSSES, speed), 1e-12,
-        )
+        yield Case(IMPACT, f"H = {hertzian:g}, v = {speed:g} m/s, p v = 0 to 100",
+                   partial(impact_error, 1.0, 1.0, hertzian, LOSSES, speed), 1e-12)
     for m1, m2 in ((1.0, 1e-6), (1.0, 1e6), (1e-6, 1.0), (1e6, 1.0)):
-        yield Case(
-            "impact", f"masses {m1:g} and {m2:g} kg", "the light body moves a million times faster than the heavy one",
-            LAW, partial(impact_error, m1, m2, 1e4, (0.0, 0.3), 1.0), 1e-12,
-        )
+        yield Case(IMPACT, f"masses {m1:g} and {m2:g} kg", partial(impact_error, m1, m2, 1e4, (0.0, 0.3), 1.0), 1e-12)
     for mass, p, seconds, touches in ((1.0, 0.0, 10.0, 2), (0.5, 0.0, 10.0, 3), (1.0, 0.3, 100.0, 3)):
-        yield Case(
-            "impact", f"chain 1:{mass:g}:1, p = {p:g}",
-            "one impact after the other; with p > 0 the last one comes after 75 s of flight",
-            "O10: speeds behind the last impact",
-            partial(chain, mass, 1.0, 1.0, Contact(1e4, p), seconds, chain_speeds(mass, p), touches), 1e-13,
-        )
+        yield Case(CHAIN, f"1:{mass:g}:1 with gaps, p = {p:g}",
+                   partial(chain, mass, 1.0, 1.0, Contact(1e4, p), seconds, chain_speeds(mass, p), touches), 1e-13,
+                   "the last impact comes after 75 s" if p > 0.0 else "")
     for mass, speeds in TOUCHING.items():
-        yield Case(
-            "impact", f"touching chain 1:{mass:g}:1, H = 1e8", "both pairs begin at u = 0, the second one at rest",
-            "O11: speeds behind, whatever H and speed",
-            partial(chain, mass, 0.0, 1.0, Contact(1e8, 0.0), 10.0, speeds, None), 1e-12,
-        )
-    yield Case("impact", "a fast one, then one at 1e-9 m/s", "nine decades of speed in one scene",
-               "reference with 25 digits", _short, 1e-10)
+        yield Case(CHAIN, f"1:{mass:g}:1 without gaps, H = 1e8",
+                   partial(chain, mass, 0.0, 1.0, Contact(1e8, 0.0), 10.0, speeds, None), 1e-12)
+    yield Case(EXTREME, "an impact at 1 m/s, then one at 1e-9 m/s", _short, 1e-10)
     for p, speed, hertzian in ((1e4, 1.0, 1e4), (1e6, 1.0, 1e4), (1e9, 1e3, 1e12), (1e12, 1e-6, 1.0)):
-        yield Case(
-            "impact", f"p = {p:g} s/m, v = {speed:g} m/s",
-            "creeps open along u' = -1/p, which rounding cannot tell from the surface itself",
-            "O2: duration and exit speed; promised are 4 roundings of the speeds, whose difference is 1/p",
-            partial(_creeps, p, speed, hertzian), 4.0 * EPS * p * speed, max_work=5000,
-        )
+        yield Case(CREEP, f"p = {p:g} s/m, v = {speed:g} m/s", partial(_creeps, p, speed, hertzian),
+                   4.0 * EPS * p * speed, max_work=5000)

@@ -10,16 +10,16 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.energy import ledger
+from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Case, Product
+from grasp_ros.verification.cases.families import GROWTH, LIMIT, LOOP
 from grasp_ros.verification.cases.scenes import STANDARD, reference
 
 HALF = 200  # control periods
 LEAST = 1e-300  # J, against 0/0 where nothing moves
-WORK = "(B) of docs/certificate.md: energy that no work explains, over what rounding may add"
 
 
 def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]], **numbers: float) -> Scene:
@@ -31,15 +31,15 @@ def _case_01(period: float, ticks: int, added: Mapping[str, Mapping[str, Any]], 
     return scenes.compose("case_01", {**values, **{key: dict(content) for key, content in added.items()}})
 
 
-def unexplained(trajectory: Trajectory) -> float:
-    """Largest rise of the energy that the held forces do not explain, over the allowance for rounding."""
+def residual(trajectory: Trajectory) -> float:
+    """Largest positive residual of the energy balance of a control period, in units of what rounding may add."""
     states = np.nan_to_num(trajectory.state)
-    book = ledger(trajectory.scene.system, states[:-1], states[1:], trajectory.inputs[:-1])
-    return float((np.maximum(book.unexplained, 0.0) / np.maximum(book.rounding, LEAST)).max())
+    book = energy_balance(trajectory.scene.system, states[:-1], states[1:], trajectory.inputs[:-1])
+    return float((np.maximum(book.residual, 0.0) / np.maximum(book.rounding, LEAST)).max())
 
 
 def _work(scene: Scene, product: Product) -> float:
-    return unexplained(product.run(scene, sampled=True))
+    return residual(product.run(scene, sampled=True))
 
 
 def _alone(period: float, delay: int, ticks: int) -> Scene:
@@ -86,14 +86,11 @@ def cases() -> Iterator[Case]:
         ("limited, noisy, in steps", _case_01(0.01, 2000, {"loop": {}, **limit, **noise})),
         ("a force of 50 N at 3 Hz", _case_01(0.001, 3000, {"object_sine": sine})),
     ):
-        yield Case("loop", text, "held commands do work; the balance must close in every period", WORK,
-                   partial(_work, scene), 1.0, product_only=True)
+        yield Case(LOOP, text, partial(_work, scene), 1.0, product_only=True)
     for period, delay in ((0.27, 0), (0.28, 0), (1.0, 0), (2.0, 0), (0.088, 1), (0.09, 1), (0.06, 3)):
-        yield Case(
-            "loop", f"growth at h = {period:g} s, {delay} periods late", "instability must come as strong as it is",
-            "spectral radius of the sampled loop, per period", partial(_growth, period, delay), 5e-3, product_only=True,
-        )
-    yield Case("loop", "until numbers overflow", "infinities and NaN must not be a result", "the status says so",
-               _overflow, 0.0, limit=Status.NOT_FINITE, product_only=True)
-    yield Case("loop", "3 s in one control period", "all contacts lie between two ticks", "reference with 25 digits",
-               _one_period, 1e-12, product_only=True)
+        yield Case(GROWTH, f"h = {period:g} s, {delay} periods late", partial(_growth, period, delay), 5e-3,
+                   product_only=True)
+    yield Case(LIMIT, "a loop that grows until numbers overflow", _overflow, 0.0, limit=Status.NOT_FINITE,
+               product_only=True)
+    yield Case(LOOP, "3 s in one control period", _one_period, 1e-12,
+               "all contacts lie between two ticks; reference with 25 digits, all states", product_only=True)

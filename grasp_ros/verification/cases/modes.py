@@ -12,6 +12,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Solver, recorded
+from grasp_ros.verification.cases.families import CLAMP, EXTREME, START
 from grasp_ros.verification.cases.scenes import (
     STANDARD,
     contacts,
@@ -23,7 +24,6 @@ from grasp_ros.verification.cases.scenes import (
     reference_run,
 )
 
-REFERENCE = "reference with 25 digits, all states"
 STARTS: dict[str, tuple[float, ...]] = {
     "in contact": (0.005, 0.3, 0.0, 0.0, 0.5, 0.0),
     "deep, 0.3 m": (0.3, 0.0, 0.0, 0.0, 0.5, 0.0),
@@ -111,19 +111,15 @@ def _huge(p: float, solver: Solver) -> float:
 def cases() -> Iterator[Case]:
     """All modes, starts and extremes."""
     for name in CLAMPS:
-        yield Case("clamp", f"clamp and re-entry of {name}", "the surface is met at u > 0, where nothing else changes"
-                   " sign", "their times and depths, computed beforehand with 30 digits, s and m",
-                   partial(_clamps, name), 2e-14)
+        yield Case(CLAMP, f"clamp and re-entry of {name}", partial(_clamps, name), 2e-14,
+                   "their times and depths, known to 30 digits, s and m")
     for text, scene in _clamped():
-        yield Case("clamp", text, "u' = -1/p is crossed in both directions while u > 0", REFERENCE,
-                   partial(_contacts_and_states, scene), 1e-10)
+        yield Case(CLAMP, text, partial(_contacts_and_states, scene), 1e-10)
     for text, state in STARTS.items():
-        yield Case("start", text, "the mode must follow from the state alone", REFERENCE,
-                   partial(_states, grasp(state, 1.0, mass=2.0)), 1e-11)
+        yield Case(START, text, partial(_states, grasp(state, 1.0, mass=2.0)), 1e-11)
     for text, scene in _extreme():
-        yield Case("extreme", text, "time scales that differ by many decades; some of these scenes amplify errors",
-                   REFERENCE, partial(_contacts_and_states, scene), 1e-11)
+        yield Case(EXTREME, text, partial(_contacts_and_states, scene), 1e-11)
     for p in (300.0, 1e4):
-        yield Case("clamp", f"squeezed with p = {p:g}", "creeps along the surface, pressed and pulled by springs",
-                   REFERENCE, partial(_huge, p), 1e-9, limit=Status.STALLED)
+        yield Case(CLAMP, f"squeezed with p = {p:g}", partial(_huge, p), 1e-9,
+                   "creeps along the surface, pressed and pulled by springs", limit=Status.STALLED)
 

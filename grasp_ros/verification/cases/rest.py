@@ -11,6 +11,7 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Product
+from grasp_ros.verification.cases.families import REST
 from grasp_ros.verification.cases.scenes import part
 
 PUSH, HERTZIAN, RATE = 1.0, 1e4, 10.0  # N, N/m^1.5, 1/s
@@ -75,10 +76,9 @@ def _tilted(sign: float, product: Product) -> float:
 def cases() -> Iterator[Case]:
     """All of them."""
     for start, sampled, text in ((0.0, False, "at once"), (1.0, False, "after 1 s"), (1.0, True, "in a sampled run")):
-        yield Case("rest", f"pushed {text}", "u and u' are 0: only the force tells that it is a touch",
-                   "momentum f t, energy f x, relative", partial(_pushes, start, sampled), 1e-13, product_only=True)
-    yield Case("rest", "the same push later", "until then nothing may happen", "the same motion, m and m/s", _later,
-               1e-12, product_only=True)
+        yield Case(REST, f"pushed {text}", partial(_pushes, start, sampled), 1e-13, product_only=True)
+    yield Case(REST, "the same push later", _later, 1e-12, "nothing before it, then the same motion, m and m/s",
+               product_only=True)
     for sign, text, oracle in ((-1.0, "part", "closed form, m"), (1.0, "are pressed together", "energy, J")):
-        yield Case("rest", f"on a tilted line they {text}", "gravity cancels in u''; a higher derivative decides",
-                   oracle, partial(_tilted, sign), 1e-13, product_only=True)
+        yield Case(REST, f"on a tilted line they {text}", partial(_tilted, sign), 1e-13,
+                   f"gravity cancels in u''; {oracle}", product_only=True)

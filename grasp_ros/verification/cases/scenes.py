@@ -1,4 +1,4 @@
-"""Building the scenes of hard cases from few numbers, and what their figures have in common."""
+"""Building the scenes of hard cases from few numbers, and what their errors have in common."""
 
 from __future__ import annotations
 

@@ -10,10 +10,10 @@ import numpy as np
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.verification.cases.case import Case, Product, Solver, recorded
+from grasp_ros.verification.cases.families import EXTREME, GRAZE, TOUCH
 from grasp_ros.verification.cases.scenes import AWAY, FREE, STANDARD, distance, grasp, library, part, reference
 from grasp_ros.verification.oracles import first_peak, first_touch_from_rest
 
-REFERENCE = "reference with 25 digits, all states"
 SYMMETRIC = (-0.4, 0.1, 0.0, 0.0, 0.4, -0.1)
 STIFF = Arm(1.0, 10.0, 0.2, 50.0, 5.0)
 
@@ -93,29 +93,23 @@ def _turning(sides: int, solver: Solver) -> float:
 def cases() -> Iterator[Case]:
     """All touches."""
     for name, damping in (("case_01", 0.7), ("case_02", 0.0), ("case_03", 0.0)):
-        yield Case("touch", f"exactly simultaneous, {name}", "a code without a rule for it loses one of the two",
-                   "O4: time of the first touch, both sides", partial(_first_touch, name, damping), 2e-16)
+        yield Case(TOUCH, f"exactly simultaneous, {name}", partial(_first_touch, name, damping), 2e-16,
+                   "O4: time of the first touch of both sides, relative")
     for arm, p, text in ((STANDARD, 0.1, "standard arms"), (STIFF, 10.0, "clamped and back")):
-        yield Case("touch", f"exactly simultaneous for 5 s, {text}", "every touch and release is double",
-                   "O5: the object stays at exactly 0", partial(symmetric, arm, p, 0.5), 0.0)
+        yield Case(TOUCH, f"exactly simultaneous for 5 s, {text}", partial(symmetric, arm, p, 0.5), 0.0,
+                   "O5: the object stays at exactly 0")
     for exponent in (3, 6, 9, 12, 15, 16):
-        yield Case("touch", f"1e-{exponent} s apart", "between two events and one", REFERENCE,
-                   partial(_apart, 10.0**-exponent), 1e-11)
+        yield Case(TOUCH, f"1e-{exponent} s apart", partial(_apart, 10.0**-exponent), 1e-11)
     for exponent in (4, 6, 8, 10, 12):
-        yield Case(
-            "graze", f"overshoot 1e-{exponent} m", "the gap touches 0 between two steps; its sign there tells nothing",
-            "reference with 25 digits, speed of the object; promised is the overshoot to 5e-15 m",
-            partial(_graze, 10.0**-exponent), 1e-14 * 10.0**exponent,
-        )
+        yield Case(GRAZE, f"overshoot 1e-{exponent} m", partial(_graze, 10.0**-exponent), 1e-14 * 10.0**exponent)
     for overshoot, text in ((0.0, "to the peak, rounded"), (-1e-15, "miss by 1e-15 m"), (-1e-6, "miss by 1e-6 m")):
-        yield Case("graze", text, "no touch may be invented", "O13: the object keeps its rest, m/s",
-                   partial(_graze, overshoot), 1e-20)
-    yield Case("graze", "two crossings within one control period", "the command is held for 0.8 s", REFERENCE,
-               _within_one_period, 1e-11, product_only=True)
+        yield Case(GRAZE, text, partial(_graze, overshoot), 1e-20, "O13: no touch, the object stays at rest, m/s")
+    yield Case(GRAZE, "two crossings within one control period", _within_one_period, 1e-11,
+               "the command is held for 0.8 s; all states, relative", product_only=True)
     for sides, text in ((1, "one arm"), (2, "both arms")):
-        yield Case("touch", f"{text} in a contact that is much too slow", "the impact alone would last for minutes",
-                   "the free swing; the impact force is 1e-15 of the spring's", partial(_turning, sides), 1e-13)
+        yield Case(EXTREME, f"{text} in a contact that is much too slow", partial(_turning, sides), 1e-13,
+                   "the impact would last for minutes, the arm turns after 1.6 ms: its free swing")
     light = Arm(0.01, 400.0, 0.0, 0.0, 0.0)
     for touches, seconds, right, mass in ((1, 0.25, FREE, 1.0), (2, 0.4, FREE, 1.0), (3, 0.1, light, 0.5)):
-        yield Case("touch", f"second side {touches} times during one contact", "all four modes, in turn", REFERENCE,
+        yield Case(TOUCH, f"second side {touches} times during one contact",
                    partial(_during, seconds, right, mass, touches), 1e-10)
