@@ -1,51 +1,191 @@
-"""What the command line refuses: a sentence and exit status 2, no traceback."""
+"""What the command line refuses ends in one line and the status 2; a fault of ours shows its traceback."""
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
-from conftest import grasp
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli import studies
+from grasp_ros.cli.main import main
+
+LONG = "a" * 5000
+SECONDS = 60.0
+
+
+@pytest.fixture
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A working directory full of what is not what it should be."""
+    monkeypatch.chdir(tmp_path)
+    for name, content in {
+        "file": b"x", "bytes.yaml": b"\xff\xfe\x00", "deep.yaml": b"[" * 20_000, "tag.yaml": b"title: !!bool x\n",
+        "date.yaml": b"title: 2001-13-45\n", "empty.npz": b"", "nomarks.md": b"x", "bytes.md": b"\xff",
+        "keys/journal.jsonl": b'{"a": 1}\n', "list/journal.jsonl": b"[]\n", "bytes/journal.jsonl": b"\xff\n",
+        "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
+    }.items():
+        Path(name).parent.mkdir(exist_ok=True)
+        Path(name).write_bytes(content)
+    np.savez("other.npz", a=1)
+    Path("circle.yaml").symlink_to("circle.yaml")
+    return tmp_path
+
+
+def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
+    """A process that has ended."""
+    return subprocess.run(program, capture_output=True, text=True, timeout=SECONDS, check=False)
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("words", "complaint"),
     [
-        (["simulate", "nowhere"], "nowhere: no such scene; allowed: a path that ends in .yaml, or one of case_01"),
-        (["simulate", "nowhere.yaml"], "nowhere.yaml: no such file"),
-        (["simulate", "case_01", "--set", "left_arm.mass_kg=0"], "left_arm.mass_kg: 0 is not allowed; allowed: a num"),
-        (["simulate", "case_01", "--set", "left_arm.mass=1"], "--set left_arm.mass=1: no such key; allowed: "),
-        (["simulate", "case_01", "--set", "mass"], "--set mass: not understood; allowed: section.key=value"),
-        (["simulate", "case_01", "--accuracy", "1"], "exact: accuracy 1.0 is not allowed; allowed: 1e-16 to 0.001"),
-        (["simulate", "case_01", "--grid", "1"], "1 is not allowed; allowed: a whole number >= 2"),
-        (["simulate", "case_01", "--max-work", "1e3"], "1e3 is not allowed; allowed: a whole number >= 1"),
-        (["simulate", "case_01", "--method", "paper", "--tolerance", "1"], "--tolerance is not allowed; allowed for"),
-        (["simulate", "case_01", "--method", "rk4", "--accuracy", "1e-8"], "--accuracy is not allowed; allowed for"),
-        (["simulate", "case_01", "--method", "rk4", "--sampled"], "rk4: only continuous feedback"),
-        (["simulate", "case_01", "-o", "no/such/directory.npz"], "No such file or directory"),
-        (["inspect", "."], "not a bag of this package"),
-        (["plot", "."], "not a bag of this package"),
-        (["plot", "nothing.npz"], "nothing.npz: not a file of `grasp simulate`"),
-        (["plot", "case_01", "-o", "figure.nonsense"], "nonsense"),
+        ("simulate case_01 --grid 1", "argument --grid: 1 is not allowed; allowed: a whole number >= 2"),
+        ("simulate case_01 --max-work 1e3", "argument --max-work: 1e3 is not allowed; allowed: a whole number >= 1"),
+        ("study advise case_01 --error x", "argument --error: invalid float value: 'x'"),
+        ("simulate nowhere", "nowhere: no such scene; allowed: a path that ends in .yaml, or one of case_01"),
+        ("simulate nowhere.yaml", "nowhere.yaml: no such file"),
+        (f"simulate {LONG}.yaml", "cannot be read: File name too long"),
+        ("simulate circle.yaml", "circle.yaml: no such file"),
+        ("simulate bytes.yaml", "bytes.yaml: 'utf-8' codec can't decode byte 0xff"),
+        ("simulate deep.yaml", "deep.yaml: nested too deeply"),
+        ("simulate tag.yaml", "tag.yaml: a value cannot be read"),
+        ("simulate date.yaml", "date.yaml: a value cannot be read: month must be in 1..12"),
+        ("simulate case_01 --set left_arm.mass_kg=0", "left_arm.mass_kg: 0 is not allowed; allowed: a number > 0"),
+        ("simulate case_01 --set left_arm.mass=1", "--set left_arm.mass=1: no such key; allowed: "),
+        ("simulate case_01 --set mass", "--set mass: not understood; allowed: section.key=value"),
+        ("simulate case_01 --set left_arm.mass_kg=2001-13-45", "month must be in 1..12; allowed: a number"),
+        ("simulate case_01 --set left_arm.mass_kg=\a", "special characters are not allowed"),
+        ("simulate case_01 --set a\nb", "--set a b: not understood"),
+        ("simulate case_01 --grid 1000000000000", "--grid: 1000000000000 is not allowed; allowed: as many as fit"),
+        (f"simulate case_01 --grid {10**30}", "is not allowed; allowed: as many as fit into memory"),
+        ("simulate case_01 --sampled --set time.duration_s=1e9 --set time.control_period_s=1e-9",
+         "case_01: control periods: 1000000000000000000 is not allowed"),
+        ("simulate case_01 --accuracy 1", "exact: accuracy 1.0 is not allowed; allowed: 1e-16 to 0.001"),
+        ("simulate case_01 --accuracy nan", "exact: accuracy nan is not allowed"),
+        ("simulate case_01 --method rk4 --max-work 7", "rk4: has no budget of work"),
+        ("simulate case_01 --method rk4 --step nan", "rk4: step nan is not allowed"),
+        ("simulate case_01 --method rk4 --sampled", "rk4: only continuous feedback"),
+        ("simulate case_01 --method paper --tolerance 1", "--tolerance is not allowed; allowed for paper: --step"),
+        ("simulate case_01 --method rk4 --accuracy 1e-8", "--accuracy is not allowed; allowed for rk4: --step"),
+        ("simulate hammer --method rk4", "hammer: right_arm, right_contact, right_feedback: rk4 knows"),
+        ("simulate case_01 -o .", ".: cannot be written: Is a directory"),
+        ("simulate case_01 -o file/x.npz", "file/x.npz: cannot be written: Not a directory"),
+        ("simulate case_01 -o /dev/full", "/dev/full: cannot be written: No space left on device"),
+        (f"simulate case_01 -o {LONG}", "cannot be written: File name too long"),
+        ("run case_01 -o .", ".: cannot be written: File exists"),
+        ("run case_01 -o file/x", "file/x: cannot be written: Not a directory"),
+        ("run case_01 --accuracy 2", "accuracy: 2.0"),
+        ("inspect nothing", "nothing: not a bag of this package"),
+        ("inspect file", "file: not a bag of this package"),
+        ("inspect bag", "bag: not a bag of this package"),
+        (f"plot {LONG}", "cannot be read: File name too long"),
+        ("plot file", "file: no such scene"),
+        ("plot list", "list: not a bag of this package"),
+        ("plot nothing.npz", "nothing.npz: not a file of `grasp simulate`"),
+        ("plot empty.npz", "empty.npz: not a file of `grasp simulate`"),
+        ("plot other.npz", "other.npz: not a file of `grasp simulate`"),
+        ("plot arm_alone -o x.nonsense", "x.nonsense: nonsense is not allowed; allowed: "),
+        ("plot arm_alone -o no/x.png", "no/x.png: cannot be written: No such file or directory"),
+        ("study accuracy --set time.duration_s=1", "--set: allowed: with a SCENE"),
+        ("study accuracy hammer", "hammer: right_arm, right_contact, right_feedback: paper knows"),
+        ("study accuracy case_01 -o file/x", "file/x: cannot be written: Not a directory"),
+        ("study accuracy case_01 --quick -o keys", "keys/journal.jsonl: not the journal of a study"),
+        ("study accuracy case_01 --quick -o list", "list/journal.jsonl: not the journal of a study"),
+        ("study accuracy case_01 --quick -o bytes", "bytes/journal.jsonl: 'utf-8' codec can't decode"),
+        ("study accuracy case_01 --quick -o words", "words/journal.jsonl: not the journal of a study"),
+        ("study advise case_01", "--error, --budget: allowed: exactly one of them"),
+        ("study advise case_01 --budget -1", "--error, --budget: allowed: exactly one of them, a number > 0"),
+        ("study loop hammer", "hammer: not the paper's grasp"),
+        ("study loop case_01 --no-graph --set time.duration_s=1.001", "1.001 is not allowed; allowed: a whole number"),
+        ("study prediction case_01 -o file/x", "file/x: cannot be written"),
+        ("study page --quick --docs file/x", "file/x/accuracy: cannot be written"),
+        ("study speed case_01 --error 0", "--error 0.0 is not allowed; allowed: a number > 0"),
+        ("study speed hammer", "hammer: starts in contact"),
+        ("study effects case_01 -o nothing.md", "nothing.md: cannot be read: No such file or directory"),
+        ("study effects case_01 -o bytes.md", "bytes.md: 'utf-8' codec can't decode"),
+        ("study certificate -o nomarks.md", "the document has no marks; allowed: a text with "),
+        ("study hard -o list", "list: cannot be read: Is a directory"),
+        ("study fuzz --seconds nan", "--seconds nan is not allowed"),
+        ("study fuzz --seed -1", "--seed -1 is not allowed"),
+        ("study graph nothing", "nothing: no such scene"),
     ],
 )
-def test_bad_input_is_refused_in_a_line(command: Any, arguments: list[str], complaint: str) -> None:
-    result = command(*arguments)
+def test_bad_input_ends_in_a_line(workplace: Path, command: Any, words: str, complaint: str) -> None:
+    before = set(workplace.rglob("*"))
+    result = command(*words.split(" "))
+    last = result.stderr.splitlines()[-1]
     assert result.returncode == 2
-    assert complaint in result.stderr
+    assert last.startswith("grasp")
+    assert complaint in last
+    assert not [path for path in set(workplace.rglob("*")) - before if path.is_file()]
+
+
+@pytest.mark.parametrize("fault", [ValueError, OSError, MemoryError, KeyError, TypeError, RuntimeError])
+def test_a_fault_of_ours_is_not_taken_for_bad_input(monkeypatch: pytest.MonkeyPatch, fault: type[Exception]) -> None:
+    def broken(*_: Any, **__: Any) -> None:
+        raise fault("ours")
+
+    monkeypatch.setattr("grasp_ros.cli.simulate.simulate", broken)
+    with pytest.raises(fault, match="ours"):
+        main(["simulate", "case_01"])
+
+
+FAULT = """
+import sys
+from grasp_ros.cli import simulate
+from grasp_ros.cli.main import main
+from grasp_ros.physics.errors import Refused
+def broken(*_, **__):
+    raise {raised}
+simulate.simulate = broken
+sys.exit(main(["simulate", "case_01"]))
+"""
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("raised", "status", "last"),
     [
-        (["simulate", "nowhere.yaml"], "nowhere.yaml: no such file"),
-        (["run", "case_01", "-o", "."], "File exists"),
+        ("Refused('as it is')", 2, "grasp: as it is"),
+        ("ValueError('a fault of ours')", 1, "ValueError: a fault of ours"),
+        ("KeyboardInterrupt", 130, "grasp: interrupted"),
+        ("BrokenPipeError", 0, ""),
     ],
 )
-def test_a_process_that_refuses_shows_no_traceback(tmp_path: Path, arguments: list[str], complaint: str) -> None:
-    result = grasp(*arguments, cwd=tmp_path)
+def test_exit_statuses(raised: str, status: int, last: str) -> None:
+    result = ran([sys.executable, "-c", FAULT.format(raised=raised)])
+    assert result.returncode == status
+    assert [*result.stderr.splitlines(), ""][-2 if last else -1] == last
+    assert ("Traceback" in result.stderr) == (status == 1)
+
+
+@pytest.mark.slow
+def test_a_title_that_the_terminal_cannot_show_is_printed_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "mine.yaml").write_text(scenes.load("arm_alone").to_yaml().replace("title: ", "title: 'ä' #"), "utf-8")
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    result = ran([sys.executable, "-m", "grasp_ros.cli", "simulate", str(tmp_path / "mine.yaml")])
+    assert result.returncode == 0, result.stderr
+    assert "\\xe4" in result.stdout
+
+
+@pytest.mark.slow
+def test_a_study_without_its_packages_names_the_one_that_is_missing() -> None:
+    program = ("import sys; sys.modules['gmpy2'] = None; from grasp_ros.cli.main import main;"
+               " sys.exit(main(['study', 'hard', '--alone']))")
+    result = ran([sys.executable, "-c", program])
     assert result.returncode == 2
-    assert complaint in result.stderr
-    assert "Traceback" not in result.stderr
+    assert result.stderr == "grasp: this study needs gmpy2; pip install 'grasp_ros[study]'\n"
+
+
+def test_a_module_of_ours_that_is_missing_is_a_fault() -> None:
+    def broken(_: Any) -> int:
+        raise ModuleNotFoundError("No module named 'grasp_ros.nothing'", name="grasp_ros.nothing")
+
+    with pytest.raises(ModuleNotFoundError):
+        studies._with_packages(broken, studies.argparse.Namespace())

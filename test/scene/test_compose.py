@@ -173,6 +173,7 @@ def test_a_section_that_holds_nothing_is_refused() -> None:
         parse(load("case_01").to_yaml() + "loop:\n", "case_01", "file")
 
 
+@pytest.mark.slow
 def test_a_graph_runs_a_scene_with_sections_without_numbers(tmp_path: Path) -> None:
     """The scene goes through a file, the topic `scene` and the bag."""
     scene = load("case_01", ["time.duration_s=0.5", *(f"{section}={{}}" for section in BARE)])

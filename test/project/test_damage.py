@@ -1,0 +1,114 @@
+"""Files that were damaged, or are of another shape, are refused or read; nothing else comes of them."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.typesys import Stores, get_typestore
+
+from grasp_ros import scene as scenes
+from grasp_ros import simulation
+from grasp_ros.graph import bag
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.topics import FORCE, JOINT_STATES, LYAPUNOV
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.versions import versions
+
+
+def recorded(path: Path) -> Path:
+    """A bag of three ticks, recorded without a graph."""
+    scene = scenes.load("case_01", ["time.duration_s=0.002"])
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types, zeros = store.types, np.zeros(3)
+    nothing = types["geometry_msgs/msg/Vector3"](x=0.0, y=0.0, z=0.0)
+    wrench = types["geometry_msgs/msg/Wrench"](force=nothing, torque=nothing)
+    recorder = bag.Recorder(path, scene, versions())
+    for time_ns in range(0, (scene.ticks + 1) * scene.period_ns, scene.period_ns):
+        stamp = types["builtin_interfaces/msg/Time"](sec=0, nanosec=time_ns)
+        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+        states = types[JOINT_STATES.type](
+            header=header, name=["left", "object", "right"], position=zeros, velocity=zeros, effort=zeros
+        )
+        for topic in scene.topics:
+            message = states if topic == JOINT_STATES else types[FORCE](header=header, wrench=wrench)
+            if topic == LYAPUNOV:
+                recorder.write_lyapunov(time_ns, [0.0] * 6)
+            else:
+                recorder.write(topic, time_ns, bytes(store.serialize_cdr(message, topic.type)))
+    recorder.close()
+    return path
+
+
+def damaged(content: bytes, rng: np.random.Generator) -> bytes:
+    """Bytes cut off, cut out, or written over."""
+    begin, length = int(rng.integers(len(content))), int(rng.integers(1, 60))
+    other = rng.integers(256, size=length).astype(np.uint8).tobytes()
+    return (content[:begin], content[:begin] + content[begin + length :], content[:begin] + other + content[begin:],
+            content[:begin] + other + content[begin + length :])[int(rng.integers(4))]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_damaged_bag_is_refused_or_read(tmp_path: Path, seed: int) -> None:
+    path, rng = recorded(tmp_path / "bag"), np.random.default_rng(seed)
+    assert len(bag.read(path).tick) == 3
+    refused = 0
+    for file in (path / "bag.mcap", path / "metadata.yaml"):
+        whole = file.read_bytes()
+        for _ in range(20):
+            file.write_bytes(damaged(whole, rng))
+            with contextlib.suppress(bag.BagError):
+                bag.read(path)
+                continue
+            refused += 1
+        file.write_bytes(whole)
+    assert refused > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_a_damaged_simulation_is_refused_or_read(tmp_path: Path, seed: int) -> None:
+    path, rng = tmp_path / "a.npz", np.random.default_rng(seed)
+    simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
+    whole, refused = path.read_bytes(), 0
+    for _ in range(60):
+        path.write_bytes(damaged(whole, rng))
+        with contextlib.suppress(Refused):
+            simulation.load(path)
+            continue
+        refused += 1
+    assert refused > 30
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(["a"] * 5)),
+        ("t", np.array(0.0)), ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))),
+        ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
+        ("scene", "title: 5"), ("setting", "fine"), ("setting", np.zeros(2)),
+    ],
+)
+def test_a_simulation_of_another_shape_is_refused(tmp_path: Path, name: str, value: Any) -> None:
+    path = tmp_path / "a.npz"
+    simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
+    with np.load(path) as data:
+        np.savez(path, **{**data, name: value})
+    with pytest.raises(Refused, match=r"a\.npz: not a file of `grasp simulate`: "):
+        simulation.load(path)
+
+
+def test_a_bag_that_can_no_longer_be_written_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = bag.Recorder(tmp_path / "bag", scenes.load("case_01"), {})
+
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(recorder._writer, "write", full)
+    with pytest.raises(bag.BagError, match=r"bag: cannot be written: No space left on device$"):
+        recorder.write_lyapunov(0, [0.0] * 6)
+    recorder.close()

@@ -1,0 +1,94 @@
+"""Every room refuses with the same exception, the doors to files turn what comes through them into it, nothing else."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import grasp_ros
+from grasp_ros import scene as scenes
+from grasp_ros import simulation
+from grasp_ros.exact.integrator import ACCURACY, Integrator
+from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import decoding, reading, writing
+from grasp_ros.simulation import plots, simulate
+from grasp_ros.studies import document
+from grasp_ros.studies.records import Journal
+
+ROOT = Path(grasp_ros.__file__).parent
+OUR_OWN = ("verification/reference.py", "studies/certificate.py")  # bare ValueErrors that no input of a user reaches
+
+
+REFUSALS: dict[str, Callable[[Path], object]] = {
+    "scene": lambda _: scenes.load("nowhere"),
+    "sections": lambda _: scenes.compose("none", {}),
+    "change": lambda _: scenes.load("case_01").changed({"tilt.angle_rad": 1.0}),
+    "grasp": lambda _: scenes.load("hammer").grasp,
+    "accuracy": lambda _: Integrator(scenes.load("case_01").system, continuous=True, accuracy=1.0),
+    "duration": lambda _: Integrator(scenes.load("case_01").system, continuous=True).advance(-1.0),
+    "grid": lambda _: simulate(scenes.load("case_01"), grid=np.array([2.0, 1.0])),
+    "method": lambda _: simulate(scenes.load("case_01"), method="euler"),
+    "changes": lambda _: simulate(scenes.load("case_01"), changes={0: {"left_feedback.set_point_m": 1.0}}),
+    "simulation": lambda path: simulation.load(path / "nothing.npz"),
+    "bag": lambda path: bag.read(path),
+    "new bag": lambda path: bag.Recorder(path, scenes.load("case_01"), {}),
+    "graph": lambda path: Graph(scenes.load("case_01"), path, ACCURACY).start(),
+    "figure": lambda path: plots.draw(simulate(scenes.load("arm_alone")), path / "figure.nonsense", ""),
+    "marks": lambda _: document.put("text", "part", "block"),
+    "document": lambda path: document.read(path),
+    "journal": lambda path: Journal(path / "file" / "journal"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSALS)
+def test_every_room_refuses_with_the_same_exception(tmp_path: Path, name: str) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(Refused) as caught:
+        REFUSALS[name](tmp_path)
+    assert isinstance(caught.value, ValueError)
+    assert str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_nothing_else_is_raised_for_input() -> None:
+    """A ValueError by its own name says that no input can cause it; nothing is caught that faults of ours raise."""
+    raised, caught = set(), set()
+    for path in ROOT.rglob("*.py"):
+        name = path.relative_to(ROOT).as_posix()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Raise) and getattr(getattr(node.exc, "func", node.exc), "id", "") == "ValueError":
+                raised.add(name)
+            if isinstance(node, ast.ExceptHandler) and (
+                node.type is None or getattr(node.type, "id", "") in ("Exception", "BaseException")
+            ):
+                caught.add(name)
+    assert raised == set(OUR_OWN)
+    assert not caught
+
+
+@pytest.mark.parametrize("door", [reading, writing])
+def test_a_door_names_the_path_and_lets_faults_through(door: Any) -> None:
+    with pytest.raises(Refused, match=r"^my file: cannot be \w+: No such file or directory$"), door("my file"):
+        Path("no/such/file").read_bytes()
+    with pytest.raises(scenes.SceneError), door("my file", scenes.SceneError):
+        raise PermissionError(13, "Permission denied")
+    with pytest.raises(KeyError), door("my file"):
+        raise KeyError("ours")
+    with pytest.raises(BrokenPipeError), writing("my file"):
+        raise BrokenPipeError
+
+
+def test_a_decoder_is_not_believed_and_ours_is() -> None:
+    with pytest.raises(Refused, match=r"^my file: not a thing: MemoryError$"), decoding("my file", "a thing"):
+        raise MemoryError
+    with pytest.raises(AttributeError), decoding("my file", "a thing"):
+        raise AttributeError("ours")
+    with pytest.raises(Refused), decoding("my file", "a thing", also=(AttributeError,)):
+        raise AttributeError("theirs")
