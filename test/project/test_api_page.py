@@ -24,7 +24,9 @@ def blocks(section: str) -> list[str]:
     return re.findall(r"```python\n(.*?)```", SECTIONS[section], re.S)
 
 
-@pytest.mark.parametrize("section", SECTIONS)
+@pytest.mark.parametrize(
+    "section", [pytest.param(name, marks=pytest.mark.slow if name == "Bags" else ()) for name in SECTIONS]
+)
 def test_examples_of_a_section_run(section: str, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch,
                                    tmp_path: Path) -> None:
     namespace: dict[str, Any] = {}
