@@ -13,7 +13,18 @@ from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import rate_lanes
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.polynomial import NOISE, curvatures, first_rise, invert_time, lane_range, values
-from grasp_ros.exact.records import Array, Candidate, Output, Plant, Scale, Settings, State, Step, Tables
+from grasp_ros.exact.records import (
+    Array,
+    Candidate,
+    Output,
+    Plant,
+    Scale,
+    Settings,
+    SlideCandidate,
+    State,
+    Step,
+    Tables,
+)
 from grasp_ros.exact.scales import scales
 from grasp_ros.exact.series import expand_both, expand_one, step_size
 from grasp_ros.physics.layout import (
@@ -22,6 +33,7 @@ from grasp_ros.physics.layout import (
     EPS,
     LANES,
     LEFT,
+    OBJECT,
     RIGHT,
     TIME,
     U_L,
@@ -37,6 +49,7 @@ from grasp_ros.physics.layout import (
     Body,
     Filled,
     Pair,
+    Slide,
     Transition,
     Work,
 )
@@ -205,7 +218,9 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     curvatures(c, n, h, tables.size)
     left = pair_candidate(tables, plant, state, n, LEFT, h, out.work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
-    slide = slide_in_contact(tables, plant, state, settings, h, out)
+    slide = SlideCandidate(math.inf, Slide.FREE)
+    if state.mode[OBJECT] != Slide.FREE:
+        slide = slide_in_contact(tables, plant, state.mode, n, h, out.work)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when) or math.isnan(slide.when):
         return math.nan
     s = min(h, left.when, right.when, slide.when)

@@ -8,7 +8,7 @@ from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.exact.scales import reduced_mass, scales
-from grasp_ros.physics import body_energy as energies
+from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.layout import (
     DAMPING,
     EPS,
@@ -35,50 +35,36 @@ ROUNDINGS = 128.0  # of the sum of all terms: flights, impacts and differences o
 NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
 MAX_IDLE = 1000  # segments without progress in time
 
-own_energy, energy_size = kernel(energies.body_energy), kernel(energies.energy_size)
+own_energy = kernel(body_energy)
 
 
 @kernel
-def body_energy(body: Array, x: float, v: float, x_o: float, t: float) -> Level:
+def level_of(body: Array, x: float, v: float, x_o: float, t: float) -> Level:
     """Energy of a body (4,) at the end of a segment of t s; x_o: the object, if the body is an arm.
 
     A force that carries the body away and a weak spring that brings it back leave small terms at both ends.
     """
     mass, stiffness, force = body[MASS], body[STIFFNESS], body[FORCE]
-    size = energy_size(mass, stiffness, force, x, v, abs(x) + abs(x_o))
+    value, size = own_energy(mass, stiffness, force, x, v, abs(x) + abs(x_o))
     if force != 0.0:
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
-    return Level(own_energy(mass, stiffness, force, x, v), size)
+    return Level(value, size)
 
 
 @inlined
 def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
     y, given = state.y, plant.given
-    own = body_energy(given[OBJECT], y[X_O], y[V_O], 0.0, t)
-    left = body_energy(given[LEFT], y[X_L], y[V_L], y[X_O], t)
-    right = body_energy(given[RIGHT], y[X_R], y[V_R], y[X_O], t)
+    own = level_of(given[OBJECT], y[X_O], y[V_O], 0.0, t)
+    left = level_of(given[LEFT], y[X_L], y[V_L], y[X_O], t)
+    right = level_of(given[RIGHT], y[X_R], y[V_R], y[X_O], t)
     impact = 0.0
     for side in (LEFT, RIGHT):
         u = y[U_L + side]
         if u > 0.0 and state.mode[side] != Pair.ABSENT:
             impact += 2.0 * stored_energy(plant.pairs[side, HERTZIAN], u)
     return Level(left.value + right.value + own.value + impact, left.size + right.size + own.size + impact)
-
-
-@inlined
-def rises(plant: Plant, state: State, settings: Settings, before: Level, after: Level) -> bool:
-    """Whether a rise of the level in one segment is more than rounding and the accuracy explain.
-
-    Where a feedback drives an arm (c + Kv < 0) energy may come.
-    """
-    rise, size = after.value - before.value, max(after.size, before.size)
-    allowed = ROUNDINGS * EPS + NEGLECTED * settings.tolerance
-    driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
-    if driven or not rise > allowed * size + UNDERFLOW:
-        return False
-    return rise > allowed * impact_size(plant, state, settings, size)
 
 
 @kernel
@@ -94,11 +80,18 @@ def impact_size(plant: Plant, state: State, settings: Settings, size: float) -> 
 @inlined
 def check_segment(plant: Plant, state: State, settings: Settings, before: Level, after: Level, t: float, idle: int,
                   ballistic: bool) -> Outcome:
-    """Whether a segment of t s can be believed; what a ballistic pair has left out comes at once: no comparison."""
+    """Whether a segment of t s can be believed: finite, not stalled, and no rise of the energy beyond rounding.
+
+    What a ballistic pair has left out comes at once: no comparison. Where a feedback drives an arm (c + Kv < 0) energy
+    may come.
+    """
     if not math.isfinite(state.y.sum()):
         return Outcome.NOT_FINITE
     if math.isnan(t) or idle > MAX_IDLE:
         return Outcome.STALLED
-    if not ballistic and rises(plant, state, settings, before, after):
-        return Outcome.ENERGY_RISES
-    return Outcome.GO_ON
+    rise, size = after.value - before.value, max(after.size, before.size)
+    allowed = ROUNDINGS * EPS + NEGLECTED * settings.tolerance
+    driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
+    if ballistic or driven or not rise > allowed * size + UNDERFLOW:
+        return Outcome.GO_ON
+    return Outcome.ENERGY_RISES if rise > allowed * impact_size(plant, state, settings, size) else Outcome.GO_ON

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Flight, Flights, Plant, Regime
+import numpy as np
+
+from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.records import Array, Flight, Flights, Regime
 from grasp_ros.physics.layout import (
     DAMPING,
     FORCE,
@@ -18,15 +20,13 @@ from grasp_ros.physics.layout import (
     OBJECT,
     RIGHT,
     STIFFNESS,
-    V_L,
-    V_O,
-    V_R,
     X_L,
     X_O,
     X_R,
+    Body,
 )
 
-FLIGHT_ORDER = 16  # (1/2)^16 / 16! is below rounding, see `expand_flight`
+FLIGHT_ORDER = np.int64(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
 
 
 @kernel
@@ -46,16 +46,6 @@ def launch(body: Array, x: float, v: float) -> Flight:
         return Flight(Regime.OVER, x, v, 0.0, 0.0, push, sigma, rate, omega0_2)
     regime = Regime.UNDER if discriminant > 0.0 else Regime.NEAR
     return Flight(regime, x, v, x - x_e, x_e, push, sigma, rate, omega0_2)
-
-
-@inlined
-def launch_all(plant: Plant, y: Array) -> Flights:
-    """Flights of all bodies from the state y."""
-    return Flights(
-        launch(plant.bodies[LEFT], y[X_L], y[V_L]),
-        launch(plant.bodies[RIGHT], y[X_R], y[V_R]),
-        launch(plant.bodies[OBJECT], y[X_O], y[V_O]),
-    )
 
 
 @kernel
@@ -126,16 +116,17 @@ def expand_flight(bodies: Array, flights: Flights, t: float, c: Array) -> None:
     """
     for i in range(LANES):
         c[i] = 0.0
-    expand_body(bodies[LEFT], flights.left, t, c, X_L)
-    expand_body(bodies[OBJECT], flights.object, t, c, X_O)
-    expand_body(bodies[RIGHT], flights.right, t, c, X_R)
+    expand_body(bodies, LEFT, flights.left, t, c)
+    expand_body(bodies, OBJECT, flights.object, t, c)
+    expand_body(bodies, RIGHT, flights.right, t, c)
 
 
 @kernel
-def expand_body(body: Array, flight: Flight, t: float, c: Array, lane: int) -> None:
-    """Write the Taylor coefficients of one body's position and velocity to `lane` and the next one."""
-    m = body[MASS]
-    force, k, d = body[FORCE] / m, body[STIFFNESS] / m, body[DAMPING] / m
+def expand_body(bodies: Array, body: Body, flight: Flight, t: float, c: Array) -> None:
+    """Write the Taylor coefficients of one body's position and velocity."""
+    row, lane = bodies[body], X_O if body == OBJECT else (X_L if body == LEFT else X_R)
+    m = row[MASS]
+    force, k, d = row[FORCE] / m, row[STIFFNESS] / m, row[DAMPING] / m
     x, v = fly(flight, t)
     c[lane], c[lane + 1] = x, v
     for n in range(FLIGHT_ORDER):
@@ -144,11 +135,3 @@ def expand_body(body: Array, flight: Flight, t: float, c: Array, lane: int) -> N
         force = 0.0
         i = LANES * (n + 1) + lane
         c[i], c[i + 1] = x, v
-
-
-@inlined
-def fly_all(flights: Flights, t: float, y: Array) -> None:
-    """Write all positions and velocities after the time t of flight."""
-    y[X_L], y[V_L] = fly(flights.left, t)
-    y[X_R], y[V_R] = fly(flights.right, t)
-    y[X_O], y[V_O] = fly(flights.object, t)

@@ -12,17 +12,27 @@ allows a longer step, or proves that no root exists.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from grasp_ros.exact.clock import tick, until
-from grasp_ros.exact.flight import FLIGHT_ORDER, displacement, expand_flight, fly, fly_all, launch_all
+from grasp_ros.exact.flight import FLIGHT_ORDER, displacement, expand_flight, fly, launch
 from grasp_ros.exact.friction import slide_in_flight
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, own_acceleration, write_penetrations
 from grasp_ros.exact.modes import leaning, make_transitions
 from grasp_ros.exact.outputs import write_row
 from grasp_ros.exact.polynomial import safe_step, values
-from grasp_ros.exact.records import Array, Candidate, Flight, Flights, Output, Plant, Settings, State, Tables
+from grasp_ros.exact.records import (
+    Array,
+    Candidate,
+    Flights,
+    Motion,
+    Output,
+    PairFlight,
+    Plant,
+    Settings,
+    State,
+    Tables,
+)
 from grasp_ros.exact.scales import probe_time
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -36,6 +46,12 @@ from grasp_ros.physics.layout import (
     STIFFNESS,
     U_L,
     U_R,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
     Body,
     Filled,
     Pair,
@@ -44,28 +60,6 @@ from grasp_ros.physics.layout import (
 )
 
 MAX_ITERATIONS = 10_000_000
-
-
-class PairFlight(NamedTuple):
-    """Arm and object in free flight: all that an event of the pair depends on."""
-
-    arm: Array  # (4,) row of the bodies
-    body: Array  # (4,)
-    arm_flight: Flight
-    body_flight: Flight
-    sign: float  # +1 for the left side, -1 for the right one: u = sign (x - x_o)
-    inverse_p: float  # 1 / p, m/s; only read by a re-entry
-
-
-class Motion(NamedTuple):
-    """Where arm and object are at some time of a flight."""
-
-    x: float  # m
-    v: float  # m/s
-    x_o: float
-    v_o: float
-    u: float  # at the begin exact where the difference of the positions is not
-    d: float  # u'
 
 
 @kernel
@@ -222,7 +216,9 @@ def move(flights: Flights, state: State, t: float) -> None:
         away = displacement(flights.object, t)
         depth_l += displacement(flights.left, t) - away
         depth_r += away - displacement(flights.right, t)
-    fly_all(flights, t, y)
+    y[X_L], y[V_L] = fly(flights.left, t)
+    y[X_R], y[V_R] = fly(flights.right, t)
+    y[X_O], y[V_O] = fly(flights.object, t)
     write_penetrations(y)
     if mode[LEFT] == Pair.BALLISTIC:
         y[U_L] = depth_l
@@ -234,7 +230,11 @@ def move(flights: Flights, state: State, t: float) -> None:
 def flight_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """Fly to the first event or to the end of the span; returns the flight time in s, or nan if a search fails."""
     out.work[Work.FLIGHTS] += 1
-    flights = launch_all(plant, state.y)
+    y, bodies = state.y, plant.bodies
+    flights = Flights(
+        launch(bodies[LEFT], y[X_L], y[V_L]), launch(bodies[RIGHT], y[X_R], y[V_R]),
+        launch(bodies[OBJECT], y[X_O], y[V_O]),
+    )
     left = pair_candidate(plant, state, settings, flights, LEFT, span, out.work)
     right = pair_candidate(plant, state, settings, flights, RIGHT, span, out.work)
     if math.isnan(left.when) or math.isnan(right.when):

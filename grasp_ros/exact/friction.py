@@ -15,7 +15,7 @@ from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.polynomial import first_rise
-from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, SlideCandidate, State, Tables
+from grasp_ros.exact.records import Array, Integers, Plant, SlideCandidate, State, Tables
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -117,18 +117,9 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
         f[out + k] = total
 
 
-@inlined
-def slide_in_contact(tables: Tables, plant: Plant, state: State, settings: Settings, h: float, out: Output
-                     ) -> SlideCandidate:
-    """First s in a Taylor step of length h at which the object stops or slips."""
-    if state.mode[OBJECT] == Slide.FREE:
-        return SlideCandidate(math.inf, Slide.FREE)
-    return stop_or_slip(tables, plant, state.mode, settings.order, h, out.work)
-
-
 @kernel
-def stop_or_slip(tables: Tables, plant: Plant, mode: Integers, n: int, h: float, work: Integers) -> SlideCandidate:
-    """The same for an object under dry friction."""
+def slide_in_contact(tables: Tables, plant: Plant, mode: Integers, n: int, h: float, work: Integers) -> SlideCandidate:
+    """First s in a Taylor step of length h at which an object under dry friction stops or slips."""
     slide, row = mode[OBJECT], tables.row
     if slide != Slide.STUCK:
         factor = -1.0 if slide == Slide.RIGHTWARD else 1.0

@@ -59,7 +59,10 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A kernel that becomes part of its callers: handing over many arrays can cost as much as a short function."""
+    """A kernel that becomes part of its callers, and of what they keep on disk.
+
+    Handing over many arrays can cost as much as a short function.
+    """
     return _compiled(function, counts=False, inline=True)
 
 
@@ -83,7 +86,7 @@ def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> An
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
-        return numba.njit(cache=True, error_model="numpy", _nrt=counts, forceinline=inline)(function)
+        return numba.njit(cache=not inline, error_model="numpy", _nrt=counts, forceinline=inline)(function)
     finally:
         numba.config.CACHE_DIR = before
 

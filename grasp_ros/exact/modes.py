@@ -71,8 +71,9 @@ def leaning(plant: Plant, y: Array, settings: Settings, side: Body) -> float:
 
 
 @kernel
-def mode_of(plant: Plant, y: Array, settings: Settings, side: Body, beside_contact: bool) -> Pair:
-    """Mode of a pair from its state alone; `beside_contact`: whether the other pair is in contact."""
+def mode_of(plant: Plant, state: State, settings: Settings, side: Body) -> Pair:
+    """Mode of a pair from the motion, and at rest at u = 0, where nothing else decides, from the other pair."""
+    y = state.y
     if plant.pairs[side, HERTZIAN] == 0.0:
         return Pair.ABSENT
     u, d = y[U_L + side], approach(y, side)
@@ -82,18 +83,16 @@ def mode_of(plant: Plant, y: Array, settings: Settings, side: Body, beside_conta
         return Pair.CONTACT if damping_factor(plant.pairs[side, DISSIPATION], d) >= 0.0 else Pair.CLAMPED
     if d == 0.0:
         lean = leaning(plant, y, settings, side)
-        return Pair.BALLISTIC if lean > 0.0 or (lean == 0.0 and beside_contact) else Pair.OPEN
+        pushed = lean == 0.0 and state.mode[other(side)] == Pair.CONTACT
+        return Pair.BALLISTIC if lean > 0.0 or pushed else Pair.OPEN
     return Pair.CONTACT if d > 0.0 else Pair.OPEN
 
 
 @kernel
 def initial_modes(plant: Plant, state: State, settings: Settings) -> None:
     """Modes of both pairs for a run that starts here."""
-    y, mode = state.y, state.mode
-    mode[LEFT] = mode_of(plant, y, settings, LEFT, False)
-    mode[RIGHT] = mode_of(plant, y, settings, RIGHT, mode[LEFT] == Pair.CONTACT)
-    if mode[RIGHT] == Pair.CONTACT:
-        mode[LEFT] = mode_of(plant, y, settings, LEFT, True)
+    for side in (LEFT, RIGHT, LEFT):  # the left pair again, because it may follow the right one
+        state.mode[side] = mode_of(plant, state, settings, side)
 
 
 @kernel
@@ -144,7 +143,7 @@ def close_resting_pair(plant: Plant, state: State, settings: Settings, side: Bod
     """A pair that rests at u = 0 touches if what acts now presses it together."""
     y, mode = state.y, state.mode
     if mode[side] == Pair.OPEN and y[U_L + side] == 0.0 and approach(y, side) == 0.0:
-        mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
+        mode[side] = mode_of(plant, state, settings, side)
         if mode[side] != Pair.OPEN:
             record(state, side, Transition.TOUCH, 0.0, 0.0, out)
 
@@ -193,7 +192,7 @@ def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -
             w, _ = scales(plant, state, settings, side)
             if u <= 1e-3 * sliver(settings.tolerance) * w * w:
                 continue
-        mode[side] = mode_of(plant, y, settings, side, mode[other(side)] == Pair.CONTACT)
+        mode[side] = mode_of(plant, state, settings, side)
         if mode[side] == Pair.OPEN:
             record(state, side, Transition.RELEASE, u, d, out)
 

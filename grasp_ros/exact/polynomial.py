@@ -16,6 +16,7 @@ from grasp_ros.exact.records import Array, Step, Tables
 from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R, Work
 
 MAX_ITERATIONS = 100_000
+FIRST, SECOND = np.int64(0), np.int64(2)  # typed: numba would compile `lanes` and `sizes` once more for a literal
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 
 
@@ -58,7 +59,7 @@ def values(c: Array, n: int, s: float, at: Array) -> None:
     even, odd = lanes(c, n), lanes(c, n - 1)
     for k in range(n - 2, 0, -2):
         even, odd = horner(even, square, lanes(c, k)), horner(odd, square, lanes(c, k - 1))
-    total = horner(horner(even, s, odd), s, lanes(c, 0))
+    total = horner(horner(even, s, odd), s, lanes(c, FIRST))
     for lane in range(LANES):
         at[lane] = total[lane]
 
@@ -70,7 +71,7 @@ def curvatures(c: Array, n: int, s: float, size: Array) -> None:
     even, odd = sizes(c, n), sizes(c, n - 1)
     for k in range(n - 2, 2, -2):
         even, odd = horner(even, square, sizes(c, k)), horner(odd, square, sizes(c, k - 1))
-    even = horner(even, square, sizes(c, 2))
+    even = horner(even, square, sizes(c, SECOND))
     for lane in range(LANES):
         size[lane] = (even[lane] + s * odd[lane]) * square
 

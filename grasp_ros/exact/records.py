@@ -115,6 +115,28 @@ class Flights(NamedTuple):
     object: Flight
 
 
+class PairFlight(NamedTuple):
+    """Arm and object in free flight: all that an event of the pair depends on."""
+
+    arm: Array  # (4,) row of the bodies
+    body: Array  # (4,)
+    arm_flight: Flight
+    body_flight: Flight
+    sign: float  # +1 for the left side, -1 for the right one: u = sign (x - x_o)
+    inverse_p: float  # 1 / p, m/s; only read by a re-entry
+
+
+class Motion(NamedTuple):
+    """Where arm and object are at some time of a flight."""
+
+    x: float  # m
+    v: float  # m/s
+    x_o: float
+    v_o: float
+    u: float  # at the begin exact where the difference of the positions is not
+    d: float  # u'
+
+
 class Candidate(NamedTuple):
     """The first event of a pair in a segment."""
 

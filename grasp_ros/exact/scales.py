@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, relative_motion
 from grasp_ros.exact.records import Array, Plant, Settings, State
 from grasp_ros.physics.layout import DAMPING, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, U_L, Body, Pair
 
+FIRST, SECOND, FIFTH = (np.int64(degree) for degree in (1, 2, 5))  # typed: one compilation for all literal numbers
 PROBE = 1e-3  # part of the time constants within which the first derivative that differs decides
 
 
@@ -26,7 +29,7 @@ def rate_bound(bodies: Array) -> float:
     for i in range(3):
         body = bodies[i]
         rate = max(rate, body[DAMPING] / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
-    return power_of_two_root(rate, 1)
+    return power_of_two_root(rate, FIRST)
 
 
 @kernel
@@ -52,7 +55,7 @@ def impact_scales(hertzian: float, mu: float, u: float, d: float, a: float) -> t
     energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
     if a > 0.0:
         energy += mu * a * (mu * a / hertzian) ** (2.0 / 3.0)
-    return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
+    return power_of_two_root(2.5 * energy / hertzian, FIFTH), power_of_two_root(2.0 * energy / mu, SECOND)
 
 
 @inlined
@@ -71,9 +74,9 @@ def scales(plant: Plant, state: State, settings: Settings, side: Body) -> tuple[
             a = max(a, 0.0) + v * v / (w * w) * (mu / bodies[OBJECT, MASS])
     w, v = impact_scales(pairs[side, HERTZIAN], reduced_mass(bodies, side), y[U_L + side], d, a)
     if rate > 0.0:
-        reach = power_of_two_root(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / rate) / rate), 2)
+        reach = power_of_two_root(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / rate) / rate), SECOND)
         w = min(w, reach) if w > 0.0 else reach  # 0 where the energy of a motion that died out underflows
-    return w, max(v, power_of_two_root(abs(d), 1))
+    return w, max(v, power_of_two_root(abs(d), FIRST))
 
 
 @kernel
@@ -84,26 +87,21 @@ def sliver(tolerance: float) -> float:
 
 @kernel
 def ballistic_time(plant: Plant, state: State, settings: Settings) -> float:
-    """How long, in s, the pairs that start at u = 0 may go without force; inf if none does."""
-    longest = math.inf
-    for side in (LEFT, RIGHT):
-        if state.mode[side] == Pair.BALLISTIC:
-            longest = min(longest, forceless_time(plant, state, settings, side))
-    return longest
+    """How long, in s, the pairs that start at u = 0 may go without force: a sliver of their impacts; inf if none does.
 
+    At most half a time constant of the bodies, for `flight.displacement`; then they are ballistic again.
 
-@kernel
-def forceless_time(plant: Plant, state: State, settings: Settings, side: Body) -> float:
-    """How long one pair may go without force: a sliver of its impact.
-
-    At most half a time constant of the bodies, for `flight.displacement`; then it is ballistic again.
-
-    The impulse lost relative to the impact's is of order (time)^2.5 if the pair approaches, and (time)^4 if it
-    starts at rest and is pushed together.
+    The impulse lost relative to the impact's is of order (time)^2.5 if a pair approaches, and (time)^4 if it starts at
+    rest and is pushed together.
     """
-    d = approach(state.y, side)
-    w, v = scales(plant, state, settings, side)
-    if w == 0.0 or v == 0.0:  # only a higher derivative presses it together
-        return probe_time(settings, 0.0)
-    part = sliver(settings.tolerance) if d > 0.0 else 0.3 * settings.tolerance**0.25
-    return min(part * w * w / v, 0.5 / settings.rate if settings.rate > 0.0 else math.inf)
+    longest = 0.5 / settings.rate if settings.rate > 0.0 else math.inf
+    for side in (LEFT, RIGHT):
+        if state.mode[side] != Pair.BALLISTIC:
+            continue
+        w, v = scales(plant, state, settings, side)
+        if w == 0.0 or v == 0.0:  # only a higher derivative presses it together
+            longest = min(longest, probe_time(settings, 0.0))
+        else:
+            part = sliver(settings.tolerance) if approach(state.y, side) > 0.0 else 0.3 * settings.tolerance**0.25
+            longest = min(longest, part * w * w / v)
+    return longest

@@ -48,6 +48,7 @@ from grasp_ros.physics.layout import (
 FACTORS = 32  # numbers of one order in the table of factors: 16 first ones, 16 second ones
 SECOND = 16
 CACHE_LINE = 64  # bytes
+FIRST, UPPER, ONE, TWO = (np.int64(number) for number in (0, 8, 1, 2))  # typed, or `convolve` is compiled for each
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
 
 
@@ -135,7 +136,7 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
     w_1 = g_1 = w_next = u_next = w_before = u_before = g_before = 0.0
     first = second = before = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
-        gv, gd, gl, gr, go, u, q, z = convolve(f, k, 0, 2)
+        gv, gd, gl, gr, go, u, q, z = convolve(f, k, FIRST, TWO)
         u = (u + w_next * w_before) + w_end * w
         q = (q + u_next * u_before) + u_end * u
         g = hertzian * q  # H w^4: the elastic force H w^3, times the w of dt = 2 w ds
@@ -187,8 +188,8 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     w_end_l, w_end_r, u_end_l, u_end_r = w_l, w_r, w_l * w_l, w_r * w_r
     a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
-        gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, 0, 1)
-        u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, 8, 1)
+        gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, FIRST, ONE)
+        u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, UPPER, ONE)
         u_l, u_r = u_l + w_end_l * w_l, u_r + w_end_r * w_r
         q_l, q_r = q_l + u_end_l * u_l, q_r + u_end_r * u_r
         g_l, g_r = hertz_l * ((g_l + a[8] * w_r) + q_l * b[2]), hertz_r * ((g_r + a[9] * w_l) + q_r * b[1])
@@ -242,7 +243,7 @@ def step_size(c: Array, left: bool, right: bool, w_l: float, w_r: float, v: floa
 
 def new_tables(order: int) -> Tables:
     """Workspace for steps of one order; its tables begin at cache lines, which vector loads want."""
-    orders, line = max(order, FLIGHT_ORDER) + 1, CACHE_LINE // 8
+    orders, line = max(order, int(FLIGHT_ORDER)) + 1, CACHE_LINE // 8
     ends = list(itertools.accumulate((LANES * orders, FACTORS * orders, LANES, LANES)))
     room = np.zeros(ends[-1] + order + 1 + line)
     room = room[-(room.ctypes.data // 8) % line :]

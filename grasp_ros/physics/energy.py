@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.body_energy import body_energy, energy_size
+from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import DAMPING, EPS, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force, in_contact, penetration
@@ -127,8 +127,8 @@ def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
     for body in system.present:
         x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
         mass, stiffness, _, force = system.bodies[body]
-        total = total + body_energy(mass, stiffness, force, x, v)
-        size = size + energy_size(mass, stiffness, force, x, v, _place(system, body, state))
+        own, own_size = body_energy(mass, stiffness, force, x, v, _place(system, body, state))
+        total, size = total + own, size + own_size
     return total, size
 
 

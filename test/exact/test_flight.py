@@ -12,9 +12,9 @@ from mpmath import mp, mpf
 from oracles import first_touch_from_rest, flight, flight_array
 
 from grasp_ros.exact.flight import fly, launch
-from grasp_ros.exact.flight_segment import Motion, PairFlight, bound, first_root
+from grasp_ros.exact.flight_segment import bound, first_root
 from grasp_ros.exact.polynomial import safe_step
-from grasp_ros.exact.records import Regime
+from grasp_ros.exact.records import Motion, PairFlight, Regime
 from grasp_ros.physics.layout import Transition, Work
 
 Body = tuple[float, float, float, float]  # m, k, c, f

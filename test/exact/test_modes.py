@@ -119,17 +119,17 @@ def test_events_within_a_few_roundings_happen_together_and_others_do_not() -> No
     ],
 )
 def test_the_mode_follows_from_the_state(side: Body, u: float, d: float, p: float, expected: Pair) -> None:
-    b = bench(side, u, d, p=p)
-    for beside_contact in (False, True):
-        assert mode_of(b.plant, b.state.y, b.settings, side, beside_contact) is expected
+    for beside_mode in (Pair.OPEN, Pair.CONTACT):
+        b = bench(side, u, d, p=p, beside_mode=beside_mode)
+        assert mode_of(b.plant, b.state, b.settings, side) is expected
 
 
 @SIDES
 def test_a_pair_without_contact_is_absent(side: Body) -> None:
     for u in (-0.1, 0.0, 0.1):
-        b = bench(side, u, 0.0, push=1.0)
+        b = bench(side, u, 0.0, push=1.0, beside_mode=Pair.CONTACT)
         b.plant.pairs[side] = 0.0
-        assert mode_of(b.plant, b.state.y, b.settings, side, True) is Pair.ABSENT
+        assert mode_of(b.plant, b.state, b.settings, side) is Pair.ABSENT
 
 
 @SIDES
@@ -151,8 +151,9 @@ def test_a_pair_without_contact_is_absent(side: Body) -> None:
 def test_at_rest_at_zero_the_first_derivative_that_differs_decides(
     side: Body, push: float, object_push: float, beside_contact: bool, expected: Pair
 ) -> None:
-    b = bench(side, 0.0, 0.0, push=push, object_push=object_push)
-    assert mode_of(b.plant, b.state.y, b.settings, side, beside_contact) is expected
+    beside_mode = Pair.CONTACT if beside_contact else Pair.CLAMPED
+    b = bench(side, 0.0, 0.0, push=push, object_push=object_push, beside_mode=beside_mode)
+    assert mode_of(b.plant, b.state, b.settings, side) is expected
 
 
 @SIDES
