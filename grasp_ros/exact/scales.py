@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, relative_motion
 from grasp_ros.exact.records import Array, Plant, Settings, State
 from grasp_ros.physics.layout import DAMPING, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, U_L, Body, Pair
 
-FIRST, SECOND, FIFTH = (np.int64(degree) for degree in (1, 2, 5))  # typed: one compilation for all literal numbers
 PROBE = 1e-3  # part of the time constants within which the first derivative that differs decides
 
 
@@ -29,7 +26,7 @@ def rate_bound(bodies: Array) -> float:
     for i in range(3):
         body = bodies[i]
         rate = max(rate, body[DAMPING] / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
-    return power_of_two_root(rate, FIRST)
+    return power_of_two_root(rate, 1)
 
 
 @kernel
@@ -55,7 +52,7 @@ def impact_scales(hertzian: float, mu: float, u: float, d: float, a: float) -> t
     energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
     if a > 0.0:
         energy += mu * a * (mu * a / hertzian) ** (2.0 / 3.0)
-    return power_of_two_root(2.5 * energy / hertzian, FIFTH), power_of_two_root(2.0 * energy / mu, SECOND)
+    return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
 
 
 @inlined
@@ -74,9 +71,9 @@ def scales(plant: Plant, state: State, settings: Settings, side: Body) -> tuple[
             a = max(a, 0.0) + v * v / (w * w) * (mu / bodies[OBJECT, MASS])
     w, v = impact_scales(pairs[side, HERTZIAN], reduced_mass(bodies, side), y[U_L + side], d, a)
     if rate > 0.0:
-        reach = power_of_two_root(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / rate) / rate), SECOND)
+        reach = power_of_two_root(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / rate) / rate), 2)
         w = min(w, reach) if w > 0.0 else reach  # 0 where the energy of a motion that died out underflows
-    return w, max(v, power_of_two_root(abs(d), FIRST))
+    return w, max(v, power_of_two_root(abs(d), 1))
 
 
 @kernel
