@@ -187,19 +187,19 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
             ) -> None:
     """Write the states at the output times before the end t of a flight.
 
-    The tables belong to fixed pieces of the flight, so that no state depends on the other output times.
+    The tables belong to fixed parts of the flight, so that no state depends on the other output times.
     """
-    row, pace = out.filled[Filled.OUTPUTS], settings.rate
-    piece = -1.0
+    row, rate = out.filled[Filled.OUTPUTS], settings.rate
+    part = -1.0
     begin = 0.0
     while row < out.grid.shape[0]:
         tau = until(state.clock, out.grid[row])
         if not tau < t:
             break
-        own = math.floor(tau * 2.0 * pace)
-        if own != piece:
-            piece = own
-            begin = piece / (2.0 * pace) if piece > 0.0 else 0.0
+        own = math.floor(tau * 2.0 * rate)
+        if own != part:
+            part = own
+            begin = part / (2.0 * rate) if part > 0.0 else 0.0
             expand_flight(plant.bodies, flights, begin, tables.c)
         values(tables.c, FLIGHT_ORDER, tau - begin, tables.at)
         write_row(out, row, tables.at)

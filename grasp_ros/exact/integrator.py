@@ -32,7 +32,7 @@ class Status(Enum):
 
     DONE = "reached the end of the horizon"
     EVENT_BUDGET = "stopped: the event budget is used up before the end of the horizon"
-    NOT_FINITE = "stopped: a state is not finite any more"
+    NOT_FINITE = "stopped: a state is no longer finite"
     WORK_BUDGET = "stopped: the budget of work is used up before the end of the horizon"
     ENERGY_RISES = "stopped: the energy rose by more than rounding explains"
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
@@ -78,7 +78,7 @@ def _workspace(accuracy: float) -> tuple[Tables, Array]:
 
 
 class Integrator:
-    """Integrates one system from its initial state, in pieces of any length.
+    """Integrates one system from its initial state, over intervals of any length.
 
     Parameters
     ----------

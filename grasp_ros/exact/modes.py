@@ -19,7 +19,7 @@ At an event, u = 0 and v_o = 0 are set exactly. Where the state alone does not d
 * At u = 0 the sign of u' decides, and at u' = 0 the sign of the first derivative of u that differs from zero: pressed
   together it is BALLISTIC, otherwise OPEN. Where none differs, it follows the other pair: it is pressed as soon as
   that one is in contact.
-* Such a resting pair is judged again when the inputs change and whenever the other pair is in contact.
+* Such a resting pair gets its mode anew when the inputs change and whenever the other pair is in contact.
 * Both pairs at u = 0 at once, where w_l w_r = 0 would stop the regularised time: approaching, both go BALLISTIC,
   without force for a time in which the impulse left out is below the tolerance; separating, both go LEAVING, without
   the rest of their impulse.
