@@ -45,8 +45,7 @@ from grasp_ros.physics.layout import (
     Z_R,
 )
 
-FACTORS = 32  # numbers of one order in the table of factors: 16 first ones, 16 second ones
-SECOND = 16
+FACTORS, SECOND = 32, 16  # numbers of one order in the table of factors, and where its second factors begin
 CACHE_LINE = 64  # bytes
 FIRST, UPPER, ONE, TWO = (np.int64(number) for number in (0, 8, 1, 2))  # typed, or `convolve` is compiled for each
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
