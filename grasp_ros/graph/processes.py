@@ -87,7 +87,8 @@ class Graph:
         try:
             for name, parameters in settings.items():
                 words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
-                command = [sys.executable, "-m", "grasp_ros.graph.nodes.start", name, "--ros-args", *words]
+                # -P: a checkout in the working directory must not take the place of the package that is running.
+                command = [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", name, "--ros-args", *words]
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stderr=self.errors
                 )

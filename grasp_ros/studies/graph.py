@@ -67,7 +67,7 @@ def bare_speed(ticks: int) -> float:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
     processes = {
         name: subprocess.Popen(
-            [sys.executable, "-m", "grasp_ros.graph.nodes.bare", name, str(ticks)], env=environment,
+            [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.bare", name, str(ticks)], env=environment,
             stderr=subprocess.PIPE,
         )
         for name in ("monitor", "left_controller", "right_controller", "plant")
