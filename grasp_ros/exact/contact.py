@@ -16,6 +16,7 @@ from grasp_ros.exact.polynomial import NOISE, curvatures, first_rise, invert_tim
 from grasp_ros.exact.records import (
     Array,
     Candidate,
+    Integers,
     Output,
     Plant,
     Scale,
@@ -59,7 +60,7 @@ LONGEST = 2.0**500  # step in units of an impact
 
 
 @inlined
-def rise_of_lanes(tables: Tables, n: int, h: float, factor: float, front: int, back: int, offset: float, work: Array
+def rise_of_lanes(tables: Tables, n: int, h: float, factor: float, front: int, back: int, offset: float, work: Integers
                   ) -> float:
     """First s in (0, h] at which offset + factor (c_front - c_back) rises through zero; back < 0: without it."""
     c, row = tables.c, tables.row
@@ -72,7 +73,8 @@ def rise_of_lanes(tables: Tables, n: int, h: float, factor: float, front: int, b
 
 
 @inlined
-def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Array) -> Candidate:
+def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers
+                   ) -> Candidate:
     """First event of one pair within a Taylor step of length h.
 
     Most steps have none, and the ranges of the lanes prove it.
@@ -96,7 +98,7 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
 
 
 @inlined
-def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Array
+def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers
                       ) -> tuple[float, Transition]:
     """First s in (0, h] at which u' crosses -1/p, down out of contact or up back into it; inf if there is none."""
     mode, c = state.mode[side], tables.c
@@ -154,7 +156,7 @@ def begin_series(tables: Tables, plant: Plant, state: State, settings: Settings)
 
 
 @inlined
-def accepted_length(tables: Tables, step: Step, scale: Scale, settings: Settings, span: float, work: Array) -> float:
+def accepted_length(tables: Tables, step: Step, scale: Scale, settings: Settings, span: float, work: Integers) -> float:
     """Length in units of a step that is exact enough, or nan; the values at its end are left in `tables.at`.
 
     G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: the defect at the end of the step consists

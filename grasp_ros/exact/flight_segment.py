@@ -25,6 +25,7 @@ from grasp_ros.exact.records import (
     Array,
     Candidate,
     Flights,
+    Integers,
     Motion,
     Output,
     PairFlight,
@@ -126,7 +127,7 @@ def event_function(kind: Transition, pair: PairFlight, at: Motion, left: float) 
 
 
 @kernel
-def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: float, work: Array) -> float:
+def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: float, work: Integers) -> float:
     """First time in (t, span] at which u rises or falls through 0, or u' rises through -1/p; inf if there is none.
 
     Parameters
@@ -156,7 +157,7 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
 
 @kernel
 def pair_candidate(plant: Plant, state: State, settings: Settings, flights: Flights, side: Body, span: float,
-                   work: Array) -> Candidate:
+                   work: Integers) -> Candidate:
     """First event of one pair in a flight of at most `span` seconds."""
     mode, y = state.mode[side], state.y
     if mode == Pair.BALLISTIC or mode == Pair.ABSENT:

@@ -7,12 +7,11 @@ are even: the even and the odd powers are summed side by side, which halves the 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Step, Tables
+from grasp_ros.exact.records import Array, Integers, Lanes, Step, Tables
 from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R, Work
 
 MAX_ITERATIONS = 100_000
@@ -21,7 +20,7 @@ NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 
 
 @kernel
-def lanes(c: Array, k: int) -> Any:
+def lanes(c: Array, k: int) -> Lanes:
     """The coefficients k."""
     i = np.uint64(LANES) * np.uint64(k)  # unsigned indices spare the test for negative ones
     return (
@@ -31,7 +30,7 @@ def lanes(c: Array, k: int) -> Any:
 
 
 @kernel
-def sizes(c: Array, k: int) -> Any:
+def sizes(c: Array, k: int) -> Lanes:
     """The absolute coefficients k."""
     x = lanes(c, k)
     return (
@@ -41,7 +40,7 @@ def sizes(c: Array, k: int) -> Any:
 
 
 @kernel
-def horner(total: Any, s: float, x: Any) -> Any:
+def horner(total: Lanes, s: float, x: Lanes) -> Lanes:
     """One more coefficient of each lane."""
     return (
         total[0] * s + x[0], total[1] * s + x[1], total[2] * s + x[2], total[3] * s + x[3],
@@ -122,7 +121,7 @@ def curvature_bound(f: Array, n: int, r: float) -> float:
 
 
 @kernel
-def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: Array) -> float:
+def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: Integers) -> float:
     """The root of a polynomial that increases in [low, high] and is negative at low; inf if there is none.
 
     Newton with bisection, from the upper end. Its error is squared by each iteration, so a correction of 1e-9 is
@@ -151,7 +150,7 @@ def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: 
 
 
 @kernel
-def first_rise(f: Array, n: int, h: float, noise: float, work: Array) -> float:
+def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> float:
     """First s in (0, h] at which a polynomial f, with f(0) <= 0, rises through zero; inf if there is none.
 
     The second derivative is bounded by sums of |f_k|, so the steps of `safe_step` cannot jump over a root, until f

@@ -16,6 +16,8 @@ from grasp_ros.physics.layout import Slide, Transition
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Lanes = tuple[float, float, float, float, float, float, float, float]  # one number of each lane
+PerMass = tuple[float, float, float, float]  # 1 / m, k / m, c / m, f / m of a body
 
 
 class Plant(NamedTuple):

@@ -18,13 +18,12 @@ means of high-order Taylor methods, Experimental Mathematics 14 (2005), sections
 
 import itertools
 import math
-from typing import Any
 
 import numpy as np
 
 from grasp_ros.exact.flight import FLIGHT_ORDER
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Tables
+from grasp_ros.exact.records import Array, Lanes, PerMass, Tables
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -61,7 +60,7 @@ def series_order(tolerance: float) -> int:
 
 
 @kernel
-def convolve(f: Array, k: int, lane: int, skip: int) -> Any:
+def convolve(f: Array, k: int, lane: int, skip: int) -> Lanes:
     """Coefficients k of eight products of series, without the terms that hold a coefficient below `skip`.
 
     f has FACTORS numbers for each order. Eight sums in one loop, written out, become one vector instruction each;
@@ -85,15 +84,15 @@ def convolve(f: Array, k: int, lane: int, skip: int) -> Any:
 
 
 @kernel
-def per_mass(body: Array) -> Any:
+def per_mass(body: Array) -> PerMass:
     """Inverse mass, k / m, c / m and f / m of a body."""
     inverse = 1.0 / body[MASS]
     return inverse, body[STIFFNESS] * inverse, body[DAMPING] * inverse, body[FORCE] * inverse
 
 
 @kernel
-def accelerations(left: Any, right: Any, middle: Any, one: float, x_o: float, u_l: float, u_r: float, v_l: float,
-                  v_o: float, v_r: float) -> Any:
+def accelerations(left: PerMass, right: PerMass, middle: PerMass, one: float, x_o: float, u_l: float, u_r: float,
+                  v_l: float, v_o: float, v_r: float) -> tuple[float, float, float]:
     """A coefficient of the bodies' accelerations without impact, (1) to (3); `one` is 1 in order 0, then 0."""
     return (
         (one * left[3] - left[1] * (x_o + u_l)) - left[2] * v_l,
