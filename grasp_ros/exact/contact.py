@@ -208,7 +208,7 @@ def deliver(tables: Tables, step: Step, s: float, t: float, state: State, out: O
 
 @inlined
 def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
-    """One Taylor step, cut at its first event or at the end of the span; returns its time in s, or nan if it fails."""
+    """One Taylor step to its first event, whose transitions it makes, or to the end of the span; its time, or nan."""
     out.work[Work.CONTACT_STEPS] += 1
     c, at, y, n = tables.c, tables.at, state.y, settings.order
     step, scale = begin_series(tables, plant, state, settings)

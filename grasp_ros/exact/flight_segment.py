@@ -229,7 +229,7 @@ def move(flights: Flights, state: State, t: float) -> None:
 
 @inlined
 def flight_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
-    """Fly to the first event or to the end of the span; returns the flight time in s, or nan if a search fails."""
+    """Fly to the first event, make its transitions, or to the end of the span; returns the time in s, nan: failed."""
     out.work[Work.FLIGHTS] += 1
     y, bodies = state.y, plant.bodies
     flights = Flights(

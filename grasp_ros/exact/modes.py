@@ -13,8 +13,12 @@ The object, by dry friction:
 
       RIGHTWARD, LEFTWARD --STICK v to 0, push within F--> STUCK --SLIP push beyond F--> RIGHTWARD, LEFTWARD
 
-A mode is frozen within a segment. An event counts in (0, t] of a segment, once, and never again from an exact zero.
-At an event, u = 0 and v_o = 0 are set exactly. Where the state alone does not decide, these rules do:
+BALLISTIC, of one pair or both, ends in `end_ballistic`; LEAVING ends with its RELEASE. A pair gets into contact in
+`make_transition` (an event), `close_resting_pair` (from rest, a TOUCH) or `initial_modes` (no event).
+
+A mode is frozen within a segment, which calls `make_transitions` at its end. An event counts in (0, t] of a segment,
+once, and never again from an exact zero. At an event, u = 0 and v_o = 0 are set exactly.
+Where the state alone does not decide, these rules do:
 
 * At u = 0 the sign of u' decides, and at u' = 0 the sign of the first derivative of u that differs from zero: pressed
   together it is BALLISTIC, otherwise OPEN. Where none differs, it follows the other pair: it is pressed as soon as
