@@ -89,7 +89,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("plot empty.npz", "empty.npz: not a file of `grasp simulate`"),
         ("plot other.npz", "other.npz: not a file of `grasp simulate`"),
         ("plot arm_alone -o x.nonsense", "x.nonsense: nonsense is not allowed; allowed: "),
-        ("plot arm_alone -o figure", "figure: no ending; allowed: one of eps, "),
+        ("plot arm_alone -o figure", "figure: no ending; allowed: one of "),
         ("plot arm_alone -o .png", ".png: no ending; allowed: "),
         ("plot arm_alone -o no/x.png", "no/x.png: cannot be written: No such file or directory"),
         ("study accuracy --set time.duration_s=1", "--set: allowed: with a SCENE"),

@@ -65,6 +65,30 @@ def test_bad_parameters_are_refused(refusals: list[tuple[int, str]], row: int) -
     assert "Traceback" not in message
 
 
+def test_the_plant_logs_what_its_scene_can_hardly_mean(launch: Any, tmp_path: Path) -> None:
+    odd = scene.load("friction_slide", ["time.duration_s=0.1", "loop={}"])
+    file = tmp_path / "odd.yaml"
+    file.write_text(odd.to_yaml())
+    plant = launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", stderr=subprocess.PIPE)
+    errors = plant.communicate(timeout=DEADLINE)[1]
+    assert plant.returncode == 0
+    assert errors.count(odd.warnings[0]) == 1
+
+
+def test_a_controller_whose_command_overflows_ends(launch: Any, tmp_path: Path) -> None:
+    """The plant drops what is not finite, so that all would wait."""
+    growing = scene.load("arm_alone", ["time.duration_s=900", "time.control_period_s=0.5",
+                                       "left_feedback.velocity_gain_Ns_per_m=50"])
+    file = tmp_path / "growing.yaml"
+    file.write_text(growing.to_yaml())
+    launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", stderr=subprocess.DEVNULL)
+    controller = launch(*START, "left_controller", stderr=subprocess.PIPE)
+    errors = controller.communicate(timeout=DEADLINE)[1]
+    assert controller.returncode == 1
+    assert "the command is no longer finite, t = " in errors
+    assert "Traceback" not in errors
+
+
 def test_a_second_plant_on_the_same_topics_is_refused(launch: Any) -> None:
     plants = [launch(*START, "plant", stderr=subprocess.PIPE) for _ in range(2)]
     wait_for(lambda: any(plant.poll() is not None for plant in plants), "a plant that gives way")

@@ -189,6 +189,28 @@ def test_noise_is_seeded_and_as_large_as_it_says() -> None:
     assert abs(np.corrcoef(noise, right)[0, 1]) < 0.03
 
 
+def test_a_sensor_leaves_a_number_as_it_is_whose_own_rounding_is_wider_than_its_step() -> None:
+    scene = scene_of("arm_alone", "loop={}", "left_sensor.noise_seed=0", "left_sensor.position_step_m=1e-12",
+                     "left_sensor.velocity_step_m_per_s=0.001")
+    (sense,) = scene.system.laws[LEFT].sensing
+    for x in (2.0**53 * 1e-12 * 1.01, 1e300, -1e300, np.inf, -np.inf):
+        assert sense(0, x, 0.0) == (x, 0.0)
+    assert np.isnan(sense(0, np.nan, np.nan)).all()
+    below = 2.0**53 * 1e-12 * 0.99
+    assert sense(0, below, -0.0016) == (1e-12 * round(below / 1e-12), 0.001 * round(-1.6))
+
+
+def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:
+    """Also where a sensor rounds what overflows; and nothing is printed on the way."""
+    scene = scene_of("arm_alone", "time.duration_s=900", "time.control_period_s=0.5", "loop={}",
+                     "left_feedback.velocity_gain_Ns_per_m=50", "left_sensor.noise_seed=1",
+                     "left_sensor.velocity_step_m_per_s=1e-12")
+    run = simulate(scene)
+    assert run.status is Status.NOT_FINITE
+    assert np.isfinite(run.state[:, :2]).all()
+    assert run.energy.V_c[-1] == np.inf
+
+
 def test_quantised_measurements_are_whole_steps() -> None:
     document = {**scenes.load("noise").values}
     for side in ("left", "right"):

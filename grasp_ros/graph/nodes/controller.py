@@ -80,8 +80,9 @@ class Controller(GraspNode):
     def _apply(self, time_ns: int) -> None:
         assert self._scene is not None
         before, self._scene = self._scene, self._scene.changed(self._staged)
-        for warning in set(self._scene.warnings) - set(before.warnings):
-            self.get_logger().warning(warning)
+        for warning in self._scene.warnings:
+            if warning not in before.warnings:
+                self.get_logger().warning(warning)
         self._law = self._scene.system.laws[SIDES[self._side]]
         self._revision += 1
         names, values = list(self._staged), list(self._staged.values())

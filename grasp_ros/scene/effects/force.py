@@ -135,7 +135,7 @@ def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     if not any(forces):
         yield Oddity(f"{section}.force_N", 0.0, "is every force: they have no effect", "a force that is not 0")
     if round(times[0] * NANOSECONDS) >= end:
-        yield Oddity(f"{section}.time_s", times[0], NEVER, f"a first time before time.duration_s, {end / NANOSECONDS!r}")
+        yield Oddity(f"{section}.time_s", times[0], NEVER, f"a begin before time.duration_s, {end / NANOSECONDS!r}")
     elif round(times[-1] * NANOSECONDS) > end:
         meant = f"a last time by time.duration_s, {end / NANOSECONDS!r}"
         yield Oddity(f"{section}.time_s", times[-1], "comes when the run has ended: its force never acts", meant)
