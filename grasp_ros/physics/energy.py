@@ -75,6 +75,7 @@ class EnergyBalance(NamedTuple):
     rounding: Array  # what rounding may add
 
     @property
+    @_OVERFLOW
     def residual(self) -> Array:
         """Rise less work: minus what was dissipated, so it is never positive but for rounding."""
         return self.rise - self.work

@@ -13,6 +13,8 @@ import pytest
 from geometry_msgs.msg import WrenchStamped
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -87,6 +89,27 @@ def test_a_controller_whose_command_overflows_ends(launch: Any, tmp_path: Path) 
     assert controller.returncode == 1
     assert "the command is no longer finite, t = " in errors
     assert "Traceback" not in errors
+
+
+def test_a_controller_logs_what_it_is_told_and_can_hardly_mean(
+    launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    file = tmp_path / "limited.yaml"
+    file.write_text(scene.load("arm_alone", ["time.duration_s=900", "loop={}", "left_actuator.limit_N=9"]).to_yaml())
+    launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", stderr=subprocess.DEVNULL)
+    with (tmp_path / "log").open("w") as log:
+        launch(*START, "left_controller", stderr=log)
+    client = AsyncParameterClient(peer, "left_controller")
+    wait_for(client.services_are_ready, "the controller")
+
+    def told() -> bool:
+        future = client.set_parameters([Parameter("left_actuator.limit_N", value=0)])
+        executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
+        return bool(future.result().results[0].successful)
+
+    wait_for(told, "the new limit")  # refused as long as the controller does not have the scene
+    wait_for(lambda: "left_actuator.limit_N: 0.0 lets no force" in (tmp_path / "log").read_text(), "the warning")
 
 
 def test_a_second_plant_on_the_same_topics_is_refused(launch: Any) -> None:

@@ -12,6 +12,7 @@ from documents import case_of, scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
@@ -209,6 +210,7 @@ def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:
     assert run.status is Status.NOT_FINITE
     assert np.isfinite(run.state[:, :2]).all()
     assert run.energy.V_c[-1] == np.inf
+    assert energy_balance(scene.system, run.state[:-1], run.state[1:], run.inputs[:-1]).alarm[-1]
 
 
 def test_quantised_measurements_are_whole_steps() -> None:
