@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST, compile_kernels
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
 from grasp_ros.physics.errors import Refused
@@ -39,6 +40,19 @@ def add_settings(sub: argparse.ArgumentParser) -> None:
         "--set", dest="settings", action="append", default=[], metavar="section.key=value",
         help="replace a number; section={} names a section without numbers",
     )
+
+
+def load_scene(reference: str, settings: Sequence[str] = ()) -> Scene:
+    """A scene that a command line names; what it can hardly mean goes to the standard error output."""
+    scene = scenes.load(reference, settings)
+    warn(scene)
+    return scene
+
+
+def warn(scene: Scene) -> None:
+    """Print what a scene can hardly mean, a line each."""
+    for warning in scene.warnings:
+        print(f"grasp: warning: {scene.name}: {warning}", file=sys.stderr)
 
 
 def add_accuracy(sub: argparse.ArgumentParser) -> None:

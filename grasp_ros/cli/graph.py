@@ -10,8 +10,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, prepare
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError
 
@@ -29,7 +28,7 @@ def add_to(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
     prepare()
@@ -85,6 +84,7 @@ def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.graph import bag
 
     recording = bag.read(options.bag)
+    warn(recording.scene)
     rows, equal = report.describe_recording(recording), True
     if options.replay:
         prepare()

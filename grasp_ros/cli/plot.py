@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import add_command, add_output, check_memory, prepare
+from grasp_ros.cli.arguments import add_command, add_output, check_memory, load_scene, prepare, warn
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import Trajectory, load, simulate
 
@@ -29,8 +28,13 @@ def _plot(options: argparse.Namespace) -> int:
         there, directory = source.exists(), source.is_dir()
     if directory:
         motion, sampled = bag.read(source), True
+        warn(motion.scene)
+    elif source.suffix == ".npz":
+        motion = load(source)
+        sampled = motion.sampled
+        warn(motion.scene)
     else:
-        motion = load(source) if source.suffix == ".npz" else _simulated(options.source)
+        motion = _simulated(options.source)
         sampled = motion.sampled
     beside = Path(f"{source.resolve()}.png") if directory else source.with_suffix(".png")
     output = options.output or (beside if there else Path(f"{motion.scene.name}.png"))
@@ -40,7 +44,7 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _simulated(reference: str) -> Trajectory:
-    scene = scenes.load(reference)
+    scene = load_scene(reference)
     check_memory(scene, sampled=False)
     prepare()
     return simulate(scene)

@@ -44,7 +44,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     if not method.energy_check and len(trajectory.t):
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
-    return _with_watch(trajectory.scene, rows)
+    return _with_words(trajectory.scene, rows)
 
 
 def _touches(trajectory: Trajectory) -> str:
@@ -79,11 +79,13 @@ def describe_recording(recording: Recording) -> list[Row]:
         rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
         rows.insert(8, ("certificate", scene.certificate_in_words(sampled=True)))
         rows.insert(9, ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"))
-    return _with_watch(scene, rows)
+    return _with_words(scene, rows)
 
 
-def _with_watch(scene: Scene, rows: list[Row]) -> list[Row]:
-    return [*rows, ("watch for", scene.watch)] if scene.watch else rows
+def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
+    """What to watch for, and what the scene can hardly mean."""
+    watch = [("watch for", scene.watch)] if scene.watch else []
+    return [*rows, *watch, *(("warning", warning) for warning in scene.warnings)]
 
 
 class Comparison(NamedTuple):

@@ -15,6 +15,7 @@ from grasp_ros.cli.arguments import (
     add_output,
     add_scene,
     check_memory,
+    load_scene,
     prepare,
     whole,
 )
@@ -62,7 +63,7 @@ def _methods(_: argparse.Namespace) -> int:
 def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.cli.report import describe_trajectory, table
 
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     setting = _setting(options)
     check_memory(scene, options.sampled, options.grid)
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)

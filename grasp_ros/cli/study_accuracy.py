@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import (
     STUDY_DIRECTORY,
     add_command,
@@ -15,6 +14,7 @@ from grasp_ros.cli.arguments import (
     add_scene,
     add_settings,
     add_study_directory,
+    load_scene,
     prepare,
 )
 from grasp_ros.physics.errors import Refused
@@ -68,7 +68,7 @@ def add_advise(commands: Any) -> Parser:
 def _advise(options: argparse.Namespace) -> int:
     from grasp_ros.studies import adviser
 
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     prepare()
     advice, text = adviser.run(scene, options.output, options.error, options.budget, options.quick)
     print(text)
@@ -128,7 +128,7 @@ def add_speed(commands: Any) -> Parser:
 def _speed(options: argparse.Namespace) -> int:
     from grasp_ros.studies import speed
 
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     prepare()
     speed.run(scene, options.error, options.output, STUDY_DIRECTORY)
     return 0
@@ -145,4 +145,4 @@ def _subjects(options: argparse.Namespace) -> Sequence[Scene]:
 
     if options.settings and not options.scenes:
         raise Refused("--set: allowed: with a SCENE")
-    return [scenes.load(name, options.settings) for name in options.scenes] or accuracy.default_scenes()
+    return [load_scene(name, options.settings) for name in options.scenes] or accuracy.default_scenes()

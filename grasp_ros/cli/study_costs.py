@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_study_directory, prepare
+from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_study_directory, load_scene, prepare
 
 Parser = argparse.ArgumentParser
 
@@ -24,7 +23,7 @@ def add_loop(commands: Any) -> Parser:
 def _loop(options: argparse.Namespace) -> int:
     from grasp_ros.studies import figures, loop, stability
 
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     left, right = scene.grasp.left, scene.grasp.right
     prepare()
     periods = () if options.no_graph else loop.GRAPH_PERIODS_MS
@@ -50,7 +49,7 @@ def add_effects(commands: Any) -> Parser:
 def _effects(options: argparse.Namespace) -> int:
     from grasp_ros.studies import effects
 
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     prepare()
     effects.run(scene, options.output)
     return 0
@@ -66,7 +65,7 @@ def add_graph(commands: Any) -> Parser:
 def _graph(options: argparse.Namespace) -> int:
     from grasp_ros.studies import graph
 
-    scene = scenes.load(options.scene, options.settings)
+    scene = load_scene(options.scene, options.settings)
     prepare()
     graph.run(scene)
     return 0

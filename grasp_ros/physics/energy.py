@@ -30,6 +30,10 @@ class Energy(NamedTuple):
     mode: NDArray[np.int64]  # Mode
 
 
+_OVERFLOW = np.errstate(over="ignore", invalid="ignore")  # the energy of a state of 1e200 is infinite, not an error
+
+
+@_OVERFLOW
 def energy(system: System, state: Array, external: Array | None = None) -> Energy:
     """V, V_c, V' and the contact mode of states (..., 6) under continuous feedback.
 
@@ -71,6 +75,7 @@ class EnergyBalance(NamedTuple):
     rounding: Array  # what rounding may add
 
     @property
+    @_OVERFLOW
     def residual(self) -> Array:
         """Rise less work: minus what was dissipated, so it is never positive but for rounding."""
         return self.rise - self.work
@@ -81,6 +86,7 @@ class EnergyBalance(NamedTuple):
         return np.logical_not(self.residual <= self.rounding)
 
 
+@_OVERFLOW
 def energy_balance(system: System, before: Array, after: Array, forces: Array) -> EnergyBalance:
     """Energy balance between states (..., 6) under held forces (..., 3) in N, by body.
 

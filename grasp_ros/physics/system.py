@@ -26,7 +26,7 @@ class ExternalForce(NamedTuple):
 
     body: int
     at: Callable[[int], float]  # tick to N
-    changes: Callable[[int], Iterable[int]]  # ticks of the run, in (0, n), at which it may change, from the number n
+    changes: Callable[[int], Iterable[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n
 
 
 @dataclass

@@ -69,6 +69,11 @@ class Scene:
             effect.build(self.values, system)
         return system
 
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What the scene can hardly mean, a sentence each: the key, its value, why it is odd, and what may be meant."""
+        return tuple(str(oddity) for effect in self.effects for oddity in effect.oddities(self.values, self.system))
+
     @property
     def grasp(self) -> Grasp:
         """The paper's grasp with its gains.

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from heapq import merge
+from itertools import groupby, islice, pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from grasp_ros.simulation.trajectory import Loop, tick_of
 
 Progress = Callable[[float], object] | None
 Changes = Mapping[int, Mapping[str, float]]
+BLOCK = 4096  # intervals whose output times are found at once
 
 
 def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
@@ -63,17 +65,16 @@ class SampledLoop:
         """States (n, 6) at the output times; only the rows reached, if the integrator stops. To be called once."""
         scene = self._scene
         plant = SampledPlant(scene.system, scene.period_ns, integrator)
-        offsets, rest = _split(self._grid, range(scene.ticks + 1), scene.period_ns)
         rows = []
         with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
-            for within in offsets:
+            for _, _, within in _intervals(self._grid, range(scene.ticks + 1), scene.period_ns):
                 rows.append(plant.step(self._answer(plant), within))
                 self._inputs.append(plant.inputs)
                 if plant.status is not Status.DONE:
                     return np.concatenate(rows)
             self._answer(plant)
             self._inputs.append(np.full(3, np.nan))  # nothing has acted yet
-        return np.concatenate([*rows, np.repeat(plant.state[None], rest, axis=0)])
+        return np.concatenate([*rows, _rest(self._grid, scene.ticks, scene.period_ns, plant.state)])
 
     def _answer(self, plant: SampledPlant) -> Array:
         """Commands (3,) in N by body, from the laws as they are now."""
@@ -99,28 +100,37 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     An interval lasts until a force changes: cutting it at every tick would only cost time.
     """
     system = scene.system
-    changes = {tick for force in system.external for tick in force.changes(scene.ticks)}
-    ticks = sorted({0, *changes, scene.ticks})
-    offsets, rest = _split(grid, ticks, scene.period_ns)
+    changes = (force.changes(scene.ticks) for force in system.external)
+    ticks = (tick for tick, _ in groupby(merge([0], *changes, [scene.ticks])))
     rows = []
-    for (begin, end), within in zip(pairwise(ticks), offsets, strict=True):
+    for begin, end, within in _intervals(grid, ticks, scene.period_ns):
         integrator.set_input(system.external_at(begin))
         rows.append(integrator.advance((end - begin) * scene.period_ns / NANOSECONDS, within, scene.time_of(begin)))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
-    return np.concatenate([*rows, np.repeat(integrator.state[None], rest, axis=0)])
+    return np.concatenate([*rows, _rest(grid, scene.ticks, scene.period_ns, integrator.state)])
 
 
-def _split(grid: Array, ticks: Sequence[int], period_ns: int) -> tuple[list[Array | None], int]:
-    """Output times by the intervals [t, t') between ticks, each from its beginning, and how many lie at the end.
+def _intervals(grid: Array, ticks: Iterable[int], period_ns: int) -> Iterator[tuple[int, int, Array | None]]:
+    """Intervals [t, t') between ascending ticks, and the output times in each from its beginning; None without any.
 
-    None stands for an interval without any.
+    The ticks of a run may be more than memory holds: they are taken in blocks.
     """
-    times = np.asarray(ticks) * period_ns / NANOSECONDS
-    lengths = np.diff(ticks) * period_ns / NANOSECONDS
-    bounds = np.searchsorted(grid, times, side="left")
-    last = int(bounds[-1])
-    interval = np.searchsorted(times, grid[:last], side="right") - 1
-    offsets = np.clip(grid[:last] - times[interval], 0.0, lengths[interval])
-    parts = [offsets[first:end] if first < end else None for first, end in pairwise(bounds.tolist())]
-    return parts, len(grid) - last
+    following = iter(ticks)
+    block = list(islice(following, BLOCK))
+    while len(block) > 1:
+        times = np.asarray(block) * period_ns / NANOSECONDS
+        lengths = np.diff(block) * period_ns / NANOSECONDS
+        bounds = np.searchsorted(grid, times, side="left")
+        first, last = int(bounds[0]), int(bounds[-1])
+        interval = np.searchsorted(times, grid[first:last], side="right") - 1
+        offsets = np.clip(grid[first:last] - times[interval], 0.0, lengths[interval])
+        for (begin, end), (low, high) in zip(pairwise(block), pairwise((bounds - first).tolist()), strict=True):
+            yield begin, end, offsets[low:high] if low < high else None
+        block = [block[-1], *islice(following, BLOCK)]
+
+
+def _rest(grid: Array, tick: int, period_ns: int, state: Array) -> Array:
+    """The state (n, 6) at the output times of the last tick and later."""
+    later = len(grid) - int(np.searchsorted(grid, tick * period_ns / NANOSECONDS, side="left"))
+    return np.repeat(state[None], later, axis=0)

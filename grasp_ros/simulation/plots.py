@@ -98,11 +98,13 @@ def save(figure: Figure, path: Path, dpi: int = 150) -> None:
     Raises
     ------
     Refused
-        If matplotlib does not know the format, or the file cannot be written.
+        If the path has no ending, matplotlib does not know the format, or the file cannot be written.
     """
     known, ending = figure.canvas.get_supported_filetypes(), path.suffix.removeprefix(".").lower()
     try:
-        if ending and ending not in known:
+        if not ending:
+            raise Refused(f"{path}: no ending; allowed: one of {', '.join(sorted(known))}")
+        if ending not in known:
             raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
         with writing(path):
             figure.savefig(path, dpi=dpi)

@@ -156,7 +156,7 @@ def run(document: Path | None) -> None:
     Refused
         If the document cannot be read or written, or has no marks.
     """
-    text = "" if document is None else put(put(read(document), JUMPS, ""), LIMITS, "")
+    text = "" if document is None else put(document, put(document, read(document), JUMPS, ""), LIMITS, "")
     limits = limits_table()
     print(limits)
     table = f"{scenes_table()}\n\n{smallest_table(DRAWS, STEPS)}"
@@ -166,7 +166,7 @@ def run(document: Path | None) -> None:
         shown = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 8001)) for name in SCENES[:2]]
         page_figures.v_jumps(shown, figure)
         block = f"{table}\n\n![V and V_c]({figure.name})"
-        write(document, put(put(text, JUMPS, block), LIMITS, limits))
+        write(document, put(document, put(document, text, JUMPS, block), LIMITS, limits))
 
 
 def limits_table() -> str:

@@ -36,8 +36,8 @@ def write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
 
 
-def put(text: str, part: str, block: str) -> str:
-    """The text with a marked part replaced.
+def put(path: Path, text: str, part: str, block: str) -> str:
+    """The text with a marked part replaced; `path` is the document that errors name.
 
     Raises
     ------
@@ -46,7 +46,7 @@ def put(text: str, part: str, block: str) -> str:
     """
     begin, end = f"<!-- begin of {part} -->", f"<!-- end of {part} -->"
     if not (begin in text and end in text.split(begin)[1]):
-        raise Refused(f"the document has no marks; allowed: a text with {begin} and {end}")
+        raise Refused(f"{path}: no marks; allowed: a text with {begin} and {end}")
     before, rest = text.split(begin)
     return f"{before}{begin}\n\n{block}\n\n{end}{rest.split(end)[1]}"
 

@@ -61,9 +61,9 @@ def run(scene: Scene, document: Path | None) -> None:
         If the document cannot be read or written, or has no marks.
     """
     text = None if document is None else read(document)
-    if text is not None:
-        text = put(text, REGISTRY, registry_table())
-        put(text, COSTS, "")  # refuses a text without marks before the work begins
+    if text is not None and document is not None:
+        text = put(document, text, REGISTRY, registry_table())
+        put(document, text, COSTS, "")  # refuses a text without marks before the work begins
     costs = measure(variants(scene), REPEATS, SAMPLED_REPEATS)
     table = _cost_table(scene, costs)
     print(table)
@@ -71,7 +71,7 @@ def run(scene: Scene, document: Path | None) -> None:
         figure = document.with_suffix(".png")
         page_figures.effect_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
         block = f"{table}\n\n![costs of the effects]({figure.name})"
-        write(document, put(text, COSTS, block))
+        write(document, put(document, text, COSTS, block))
 
 
 def registry_table() -> str:

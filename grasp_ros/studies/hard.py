@@ -65,7 +65,7 @@ def run(document: Path | None, *, alone: bool) -> int:
     Refused
         If the document cannot be read or written, or has no marks.
     """
-    text = "" if document is None else put(read(document), PART, "")
+    text = "" if document is None else put(document, read(document), PART, "")
     rows: list[Row] = []
     others = [] if alone else [Other(name, setting) for name, setting in OTHERS]
     for case in tqdm(cases(), desc="hard", file=sys.stderr):
@@ -79,7 +79,7 @@ def run(document: Path | None, *, alone: bool) -> int:
                  for row in rows]
         page_figures.hard_cases(drawn, [name for name, _ in OTHERS], figure)
         block = f"{text_of_rows}\n\n![errors of the hard cases]({figure.name})"
-        write(document, put(text, PART, block))
+        write(document, put(document, text, PART, block))
     return 0 if all(row.own.right(row.case) for row in rows) else 1
 
 

@@ -13,6 +13,8 @@ import pytest
 from geometry_msgs.msg import WrenchStamped
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -63,6 +65,51 @@ def test_bad_parameters_are_refused(refusals: list[tuple[int, str]], row: int) -
     assert status == 2
     assert REFUSED[row][2] in message.splitlines()[-1]
     assert "Traceback" not in message
+
+
+def test_the_plant_logs_what_its_scene_can_hardly_mean(launch: Any, tmp_path: Path) -> None:
+    odd = scene.load("friction_slide", ["time.duration_s=0.1", "loop={}"])
+    file = tmp_path / "odd.yaml"
+    file.write_text(odd.to_yaml())
+    plant = launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", stderr=subprocess.PIPE)
+    errors = plant.communicate(timeout=DEADLINE)[1]
+    assert plant.returncode == 0
+    assert errors.count(odd.warnings[0]) == 1
+
+
+def test_a_controller_whose_command_overflows_ends(launch: Any, tmp_path: Path) -> None:
+    """The plant drops what is not finite, so that all would wait."""
+    growing = scene.load("arm_alone", ["time.duration_s=900", "time.control_period_s=0.5",
+                                       "left_feedback.velocity_gain_Ns_per_m=50"])
+    file = tmp_path / "growing.yaml"
+    file.write_text(growing.to_yaml())
+    launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", stderr=subprocess.DEVNULL)
+    controller = launch(*START, "left_controller", stderr=subprocess.PIPE)
+    errors = controller.communicate(timeout=DEADLINE)[1]
+    assert controller.returncode == 1
+    assert "the command is no longer finite, t = " in errors
+    assert "Traceback" not in errors
+
+
+def test_a_controller_logs_what_it_is_told_and_can_hardly_mean(
+    launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    file = tmp_path / "limited.yaml"
+    file.write_text(scene.load("arm_alone", ["time.duration_s=900", "loop={}", "left_actuator.limit_N=9"]).to_yaml())
+    launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", stderr=subprocess.DEVNULL)
+    with (tmp_path / "log").open("w") as log:
+        launch(*START, "left_controller", stderr=log)
+    client = AsyncParameterClient(peer, "left_controller")
+    wait_for(client.services_are_ready, "the controller")
+
+    def told() -> bool:
+        future = client.set_parameters([Parameter("left_actuator.limit_N", value=0)])
+        executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
+        return bool(future.result().results[0].successful)
+
+    wait_for(told, "the new limit")  # refused as long as the controller does not have the scene
+    wait_for(lambda: "left_actuator.limit_N: 0.0 lets no force" in (tmp_path / "log").read_text(), "the warning")
 
 
 def test_a_second_plant_on_the_same_topics_is_refused(launch: Any) -> None:

@@ -41,7 +41,7 @@ REFUSALS: dict[str, Callable[[Path], object]] = {
     "new bag": lambda path: bag.Recorder(path, scenes.load("case_01"), {}),
     "graph": lambda path: Graph(scenes.load("case_01"), path, ACCURACY).start(),
     "figure": lambda path: plots.draw(simulate(scenes.load("arm_alone")), path / "figure.nonsense", ""),
-    "marks": lambda _: document.put("text", "part", "block"),
+    "marks": lambda path: document.put(path, "text", "part", "block"),
     "document": lambda path: document.read(path),
     "journal": lambda path: Journal(path / "file" / "journal"),
 }

@@ -8,10 +8,11 @@ from documents import scene_of
 from mpmath import mpf
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import simulate
+from grasp_ros.simulation import closed_loop, simulate
 from grasp_ros.simulation.trajectory import tick_times
 from grasp_ros.verification.oracles import holding_force
 
@@ -93,6 +94,22 @@ def test_a_sine_force_is_a_staircase_with_the_values_of_the_sine() -> None:
     found = simulate(scene, sampled=True).state[:, 3]
     assert np.abs(found - exact).max() < 2.0 / turn * (turn * 0.001) ** 2 / 10  # second order in the period
     assert np.abs(found - simulate(scene, grid=tick_times(scene)).state[:, 3]).max() < 1e-15
+
+
+def test_intervals_are_the_same_in_blocks_of_any_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of("sine", "time.duration_s=0.5", "object_pulse.force_N=3", "object_pulse.start_s=0.1",
+                     "object_pulse.length_s=0.05")
+    grid = np.sort(np.concatenate([np.linspace(0.0, 0.5, 777), tick_times(scene)[::7], [0.5, 0.5]]))
+    runs = []
+    for block in (2, 3, 499, 500, 10**6):
+        monkeypatch.setattr(closed_loop, "BLOCK", block)
+        runs.append([simulate(scene, grid=grid, sampled=sampled).state.tobytes() for sampled in (False, True)])
+    assert all(run == runs[0] for run in runs)
+
+
+def test_a_sine_over_more_ticks_than_memory_holds_begins_at_once() -> None:
+    run = simulate(scene_of("sine", "time.duration_s=1e8", "time.control_period_s=1e-9"), max_work=100)
+    assert run.status is Status.WORK_BUDGET
 
 
 def test_a_knocked_object_comes_back() -> None:

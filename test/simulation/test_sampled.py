@@ -12,6 +12,7 @@ from documents import case_of, scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
@@ -187,6 +188,29 @@ def test_noise_is_seeded_and_as_large_as_it_says() -> None:
     assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 0.03
     right = motion.command[:, 1] + 5.0 * motion.state[:, 4] + 0.5 * motion.state[:, 5]
     assert abs(np.corrcoef(noise, right)[0, 1]) < 0.03
+
+
+def test_a_sensor_leaves_a_number_as_it_is_whose_own_rounding_is_wider_than_its_step() -> None:
+    scene = scene_of("arm_alone", "loop={}", "left_sensor.noise_seed=0", "left_sensor.position_step_m=1e-12",
+                     "left_sensor.velocity_step_m_per_s=0.001")
+    (sense,) = scene.system.laws[LEFT].sensing
+    for x in (2.0**53 * 1e-12 * 1.01, 1e300, -1e300, np.inf, -np.inf):
+        assert sense(0, x, 0.0) == (x, 0.0)
+    assert np.isnan(sense(0, np.nan, np.nan)).all()
+    below = 2.0**53 * 1e-12 * 0.99
+    assert sense(0, below, -0.0016) == (1e-12 * round(below / 1e-12), 0.001 * round(-1.6))
+
+
+def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:
+    """Also where a sensor rounds what overflows; and nothing is printed on the way."""
+    scene = scene_of("arm_alone", "time.duration_s=900", "time.control_period_s=0.5", "loop={}",
+                     "left_feedback.velocity_gain_Ns_per_m=50", "left_sensor.noise_seed=1",
+                     "left_sensor.velocity_step_m_per_s=1e-12")
+    run = simulate(scene)
+    assert run.status is Status.NOT_FINITE
+    assert np.isfinite(run.state[:, :2]).all()
+    assert run.energy.V_c[-1] == np.inf
+    assert energy_balance(scene.system, run.state[:-1], run.state[1:], run.inputs[:-1]).alarm[-1]
 
 
 def test_quantised_measurements_are_whole_steps() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -14,7 +15,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode, run
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE
 from grasp_ros.scene.validation import SceneError
 
@@ -78,7 +79,10 @@ class Controller(GraspNode):
 
     def _apply(self, time_ns: int) -> None:
         assert self._scene is not None
-        self._scene = self._scene.changed(self._staged)
+        before, self._scene = self._scene, self._scene.changed(self._staged)
+        for warning in self._scene.warnings:
+            if warning not in before.warnings:
+                self.get_logger().warning(warning)
         self._law = self._scene.system.laws[SIDES[self._side]]
         self._revision += 1
         names, values = list(self._staged), list(self._staged.values())
@@ -93,8 +97,17 @@ class Controller(GraspNode):
             self._apply(time_ns)
         row = message.name.index(self._side)
         force = self._law.command(time_ns // self._scene.period_ns, message.position[row], message.velocity[row])
+        if not math.isfinite(force):  # the plant would not take it, and all would wait
+            self._fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
+            return
         self._commands.publish(messages.wrench(time_ns, force, str(self._revision) if self._revision else ""))
         self.count("answered states")
+
+    def _fail(self, reason: str) -> None:
+        self.state = reason
+        self.get_logger().fatal(reason)
+        self.exit_code = 1
+        self.finished = True
 
 
 def main(name: str, received: Sequence[int]) -> int:

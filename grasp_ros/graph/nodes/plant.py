@@ -40,6 +40,8 @@ class Plant(GraspNode):
         progress = self.read_only("progress", False, "show a progress bar on the terminal")
         scene = scenes.load(name)
         self._scene = scene.changed(self.declare_scene(scene, "plant"))
+        for warning in self._scene.warnings:
+            self.get_logger().warning(warning)
         self._system = self._scene.system
         if not kernels_on_disk():
             self.get_logger().info(COMPILING)

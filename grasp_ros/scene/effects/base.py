@@ -33,6 +33,23 @@ class Problem(NamedTuple):
     allowed: str
 
 
+class Oddity(NamedTuple):
+    """What can be simulated as it is written, but is hardly meant."""
+
+    key: str
+    value: object
+    why: str
+    meant: str
+
+    def __str__(self) -> str:
+        return f"{self.key}: {self.value!r} {self.why}; meant: {self.meant}"
+
+
+def nothing_odd(_: Sections, __: System) -> Iterable[Oddity]:
+    """For effects that always do something."""
+    return ()
+
+
 def no_problem(_: Sections) -> Iterable[Problem]:
     """For effects whose numbers go together in any way."""
     return ()
@@ -63,6 +80,8 @@ class Effect:
         What the plant publishes about it.
     problems : callable
         Finds what is wrong beyond ranges.
+    oddities : callable
+        Finds what a scene can hardly mean, in the sections and the system that they have built.
     example : mapping of str to numbers
         Keys to add to a scene to see what it does; `grasp study effects` does. Empty for what the paper's grasp has.
     """
@@ -77,10 +96,17 @@ class Effect:
     commands: Topic | None = None
     outputs: tuple[Output, ...] = ()
     problems: Callable[[Sections], Iterable[Problem]] = no_problem
+    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing_odd
     example: Numbers = field(default_factory=dict)
 
 
 def period_ns(sections: Sections) -> int:
     """Control period of a scene in ns."""
     seconds: float = sections["time"]["control_period_s"]
+    return round(seconds * NANOSECONDS)
+
+
+def run_ns(sections: Sections) -> int:
+    """Length of a run in ns."""
+    seconds: float = sections["time"]["duration_s"]
     return round(seconds * NANOSECONDS)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 
-from grasp_ros.physics.layout import DISSIPATION, HERTZIAN, LEFT
+import numpy as np
+
+from grasp_ros.physics.layout import DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, OBJECT, STIFFNESS
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
-from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Output, Sections
+from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import CONTACTS
 
+ROUNDING = 1e-9  # of a position: what is less deep is meant to touch
 PARAMETERS = (
     Parameter("hertz_N_per_m1_5", 0.0, 1e15, "Hertzian stiffness of the impact, H", open_low=True),
     Parameter("dissipation_s_per_m", 0.0, 1e12, "Hunt-Crossley dissipation of the impact, p", optional=True),
@@ -30,11 +34,40 @@ def _force(side: int, system: System, _: int, state: Array) -> float:
     return float(impact_force(Contact(*system.pairs[side]), u, d))
 
 
+def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
+    """An arm may start inside the object, as every state of a run may be a start, but hardly beyond its other side."""
+    at, far = SIDES[side], "right" if side == "left" else "left"
+    depths = penetration(system.state)[0::2]
+    depth, gap = float(depths[at]), float(-depths[SIDES[far]])
+    key, value = f"{side}_arm.position_m", sections[f"{side}_arm"]["position_m"]
+    place = sections["object"]["position_m"]
+    if depth <= ROUNDING * np.abs(system.state[0::2]).max():
+        return
+    stored, pressing = 0.4 * system.pairs[at, HERTZIAN] * depth**2.5, _pressing(system, at, depth)
+    if SIDES[far] in system.contacts and 0.0 < gap < depth:
+        why = f"lies {far} of the {far} arm, which does not touch the object"
+        yield Oddity(key, value, why, f"each arm on its side of the object at {place!r}")
+    elif stored > pressing:
+        why = (f"lies {depth:.6g} m inside the object: the contact stores {stored:.3g} J, where motion and forces"
+               f" press in {pressing:.3g} J")
+        yield Oddity(key, value, why, f"{side} of the object at {place!r}, or a little {far} of it")
+
+
+def _pressing(system: System, side: int, depth: float) -> float:
+    """Energy in J with which an arm and the object can be pressed into each other: of motion, and of today's forces."""
+    loop, external, energy = system.closed_loop, system.external_at(0), 0.0
+    for body in (side, OBJECT):
+        x, v = system.state[COLUMN[body] : COLUMN[body] + 2]
+        force = abs(loop[body, FORCE] - loop[body, STIFFNESS] * x) + abs(external[body])
+        energy += 0.5 * loop[body, MASS] * v**2 + force * depth
+    return float(energy)
+
+
 EFFECTS = tuple(
     Effect(
         f"{side}_contact", f"the {side} arm hits the object", PARAMETERS, partial(_build, side),
         "4/5 H u^(5/2) while u >= 0; an impact takes 2 p H u^(3/2) u'^2", needs=(f"{side}_arm", "object"),
-        outputs=(Output(CONTACTS[side], partial(_force, SIDES[side])),),
+        oddities=partial(_odd, side), outputs=(Output(CONTACTS[side], partial(_force, SIDES[side])),),
     )
     for side in SIDES
 )

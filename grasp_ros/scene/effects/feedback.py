@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections
+from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import COMMANDS
 
@@ -27,12 +28,20 @@ def _build(side: str, sections: Sections, system: System) -> None:
     )
 
 
+def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
+    section = f"{side}_feedback"
+    numbers = sections[section]
+    if numbers.get("set_point_m", 0.0) and numbers["position_gain_N_per_m"] == 0.0:
+        meant = "a position_gain_N_per_m that is not 0"
+        yield Oddity(f"{section}.set_point_m", numbers["set_point_m"], "has no effect without a position gain", meant)
+
+
 EFFECTS = tuple(
     Effect(
         f"{side}_feedback", f"controller of the {side} arm: linear state feedback", PARAMETERS, partial(_build, side),
         "Kp x^2, with a set-point or a constant force (k + Kp) (x - x_e)^2; the feedback takes 2 Kv x'^2",
         needs=(f"{side}_arm",), node=f"{side}_controller", commands=COMMANDS[side],
-        example={"set_point_m": 0.05, "feed_forward_N": 0.5},
+        example={"set_point_m": 0.05, "feed_forward_N": 0.5}, oddities=partial(_odd, side),
     )
     for side in SIDES
 )

@@ -14,7 +14,7 @@ from itertools import pairwise
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Problem, Sections, no_problem, period_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Oddity, Output, Problem, Sections, period_ns, run_ns
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
@@ -34,6 +34,9 @@ TABLE = (
     Parameter("time_s", 0.0, 1e9, "times from which the forces act, ascending", several=True),
     Parameter("force_N", -1e12, 1e12, "forces, each until the next time, the last one for good", several=True),
 )
+
+NO_EFFECT = "has no effect"
+NEVER = "comes when the run has ended: nothing ever acts"
 
 A_PULSE = {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}
 A_SINE = {"amplitude_N": 1.0, "frequency_Hz": 2.0}
@@ -101,6 +104,43 @@ def _table_problems(section: str, sections: Sections) -> Iterable[Problem]:
         yield Problem(f"{section}.force_N", forces, f"as many forces as times, {len(times)}")
 
 
+def _sine_problems(section: str, sections: Sections) -> Iterable[Problem]:
+    """A staircase of one step per control period shows faster sines as slower ones."""
+    frequency, highest = sections[section]["frequency_Hz"], 0.5 * NANOSECONDS / period_ns(sections)
+    if frequency > highest:
+        allowed = f"at most {highest!r} Hz, half a turn per control period of time.control_period_s"
+        yield Problem(f"{section}.frequency_Hz", frequency, allowed)
+
+
+def _odd_pulse(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
+    numbers, end = sections[section], run_ns(sections)
+    start, length = numbers["start_s"], numbers["length_s"]
+    if numbers["force_N"] == 0.0:
+        yield Oddity(f"{section}.force_N", 0.0, NO_EFFECT, "a force that is not 0")
+    over = round(start * NANOSECONDS) + round(length * NANOSECONDS) - end
+    if round(start * NANOSECONDS) >= end:
+        yield Oddity(f"{section}.start_s", start, NEVER, f"before time.duration_s, {end / NANOSECONDS!r}")
+    elif over > 0:
+        why = f"reaches {over / NANOSECONDS!r} s beyond the end of the run"
+        yield Oddity(f"{section}.length_s", length, why, f"an end by time.duration_s, {end / NANOSECONDS!r}")
+
+
+def _odd_sine(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
+    if sections[section]["amplitude_N"] == 0.0:
+        yield Oddity(f"{section}.amplitude_N", 0.0, NO_EFFECT, "an amplitude above 0")
+
+
+def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
+    times, forces, end = sections[section]["time_s"], sections[section]["force_N"], run_ns(sections)
+    if not any(forces):
+        yield Oddity(f"{section}.force_N", 0.0, "is every force: they have no effect", "a force that is not 0")
+    if round(times[0] * NANOSECONDS) >= end:
+        yield Oddity(f"{section}.time_s", times[0], NEVER, f"a begin before time.duration_s, {end / NANOSECONDS!r}")
+    elif round(times[-1] * NANOSECONDS) > end:
+        meant = f"a last time by time.duration_s, {end / NANOSECONDS!r}"
+        yield Oddity(f"{section}.time_s", times[-1], "comes when the run has ended: its force never acts", meant)
+
+
 def _total(body: int, system: System, tick: int, _: Array) -> float:
     return float(system.external_at(tick)[body])
 
@@ -108,16 +148,16 @@ def _total(body: int, system: System, tick: int, _: Array) -> float:
 def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
     work = "the force does work: V_c rises by 2 f times the way at most"
-    for kind, parameters, build, problems, example in (
-        ("pulse", PULSE, partial(_build_steps, _pulse), _pulse_problems, A_PULSE),
-        ("sine", SINE, _build_sine, lambda _, sections: no_problem(sections), A_SINE),
-        ("table", TABLE, partial(_build_steps, _table), _table_problems, A_TABLE),
+    for kind, parameters, build, problems, odd, example in (
+        ("pulse", PULSE, partial(_build_steps, _pulse), _pulse_problems, _odd_pulse, A_PULSE),
+        ("sine", SINE, _build_sine, _sine_problems, _odd_sine, A_SINE),
+        ("table", TABLE, partial(_build_steps, _table), _table_problems, _odd_table, A_TABLE),
     ):
         section = f"{name}_{kind}"
         yield Effect(
             section, f"external force on the {name.replace('_', ' ')}: a {kind}", parameters,
             partial(build, section, body), work, needs=(name,), outputs=outputs, problems=partial(problems, section),
-            example=example,
+            oddities=partial(odd, section), example=example,
         )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections
+from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
 
 PARAMETERS = (Parameter("limit_N", 0.0, 1e12, "largest force of the actuator in both directions", live=True),)
@@ -20,11 +21,18 @@ def _build(side: str, sections: Sections, system: System) -> None:
     system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
 
 
+def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
+    section = f"{side}_actuator"
+    if sections[section]["limit_N"] == 0.0:
+        yield Oddity(f"{section}.limit_N", 0.0, f"lets no force of the {side} feedback through", "a limit above 0")
+
+
 EFFECTS = tuple(
     Effect(
         f"{side}_actuator", f"the force of the {side} actuator is limited", PARAMETERS, partial(_build, side),
         "V_c keeps the energy of the unlimited feedback and may rise while the limit acts",
         needs=(f"{side}_feedback", "loop"), node=f"{side}_controller", example={"limit_N": 1.0},
+        oddities=partial(_odd, side),
     )
     for side in SIDES
 )

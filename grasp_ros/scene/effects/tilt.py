@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 from grasp_ros.physics.layout import FORCE, MASS
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import Effect, Sections
+from grasp_ros.scene.effects.base import Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
 
 
@@ -18,6 +19,12 @@ def _build(sections: Sections, system: System) -> None:
         system.bodies[body, FORCE] -= system.bodies[body, MASS] * pull
 
 
+def _odd(sections: Sections, _: System) -> Iterable[Oddity]:
+    for key, value in sections["tilt"].items():
+        if value == 0.0:
+            yield Oddity(f"tilt.{key}", value, "leaves the whole section without effect", "a number that is not 0")
+
+
 EFFECTS = (
     Effect(
         "tilt", "the line is tilted: gravity pulls every body along it",
@@ -25,7 +32,7 @@ EFFECTS = (
             Parameter("angle_rad", -math.pi / 2, math.pi / 2, "angle of the line, positive if the right end is higher"),
             Parameter("gravity_m_per_s2", 0.0, 1e3, "gravitational acceleration"),
         ),
-        _build, "2 m g sin(angle) x of every body: V_c is known up to a constant",
+        _build, "2 m g sin(angle) x of every body: V_c is known up to a constant", oddities=_odd,
         example={"angle_rad": 0.02, "gravity_m_per_s2": 9.81},
     ),
 )
