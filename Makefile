@@ -37,7 +37,7 @@ benchmark: install
 	    --benchmark-columns=min,median,rounds \
 	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))
 
-# Deletes or negates every branch of the automaton in turn; a test must fail for each.
+# Deletes or negates every branch of the automaton and of `rest` in turn; a test must fail for each.
 mutants: install
 	$(BIN)/python test/exact/mutants.py
 

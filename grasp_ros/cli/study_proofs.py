@@ -48,8 +48,11 @@ def _hard(options: argparse.Namespace) -> int:
 def add_fuzz(commands: Any) -> Parser:
     """`grasp study fuzz`."""
     sub = add_command(commands, "fuzz", _fuzz, "random scenes against all properties")
-    sub.add_argument("--seconds", type=float, default=60.0, help="how long (default 60)")
+    sub.add_argument("--seconds", type=float, help="how long (default 60, or until --draws are done)")
+    sub.add_argument("--draws", type=int, help="how many scenes")
+    sub.add_argument("--first", type=int, default=0, help="number of the first draw (default 0)")
     sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
+    sub.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     add_output(sub, "DIRECTORY", "where scenes that fail are written (default fuzz)", Path("fuzz"))
     return sub
 
@@ -57,9 +60,14 @@ def add_fuzz(commands: Any) -> Parser:
 def _fuzz(options: argparse.Namespace) -> int:
     from grasp_ros.verification import fuzz
 
-    if not (math.isfinite(options.seconds) and options.seconds > 0.0):
-        raise Refused(f"--seconds {options.seconds!r} is not allowed; allowed: a number > 0")
-    if options.seed < 0:
-        raise Refused(f"--seed {options.seed} is not allowed; allowed: a whole number >= 0")
+    seconds = 60.0 if options.seconds is None and options.draws is None else options.seconds
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0.0):
+        raise Refused(f"--seconds {seconds!r} is not allowed; allowed: a number > 0")
+    for name, least in (("draws", 1), ("first", 0), ("seed", 0), ("jobs", 1)):
+        value = getattr(options, name)
+        if value is not None and value < least:
+            raise Refused(f"--{name} {value} is not allowed; allowed: a whole number >= {least}")
     prepare()
-    return 1 if fuzz.run(options.seconds, options.seed, options.output) else 0
+    broken = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
+                      jobs=options.jobs)
+    return 1 if broken else 0

@@ -1,4 +1,4 @@
-"""A segment in contact: one Taylor step with its acceptance, its events and its outputs."""
+"""A segment in contact: one Taylor step with its events and its outputs."""
 
 from __future__ import annotations
 
@@ -7,29 +7,31 @@ import math
 import numpy as np
 
 from grasp_ros.exact.clock import tick, until
+from grasp_ros.exact.flight import flights_of, fly
 from grasp_ros.exact.friction import slide_in_contact
 from grasp_ros.exact.impact import damping_factor
-from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import rate_lanes
+from grasp_ros.exact.jit import inlined
+from grasp_ros.exact.kinematics import keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
-from grasp_ros.exact.polynomial import NOISE, curvatures, first_rise, invert_time, lane_range, values
+from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
 from grasp_ros.exact.records import (
     Array,
     Candidate,
+    Flight,
+    Flights,
     Integers,
     Output,
     Plant,
-    Scale,
     Settings,
     SlideCandidate,
     State,
     Step,
     Tables,
 )
-from grasp_ros.exact.scales import scales
-from grasp_ros.exact.series import expand_both, expand_one, step_size
+from grasp_ros.exact.roots import first_rise
+from grasp_ros.exact.scales import new_step
+from grasp_ros.exact.taylor_step import accepted_length, fitted_step
 from grasp_ros.physics.layout import (
-    CHECK,
     DISSIPATION,
     EPS,
     LANES,
@@ -56,7 +58,6 @@ from grasp_ros.physics.layout import (
 )
 
 ALONE = np.int64(-1)  # no second lane
-LONGEST = 2.0**500  # step in units of an impact
 
 
 @inlined
@@ -80,7 +81,7 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
     Most steps have none, and the ranges of the lanes prove it.
     """
     mode, c = state.mode[side], tables.c
-    if mode == Pair.BALLISTIC or mode == Pair.ABSENT:
+    if mode in (Pair.RESTING, Pair.ABSENT):
         return Candidate(math.inf, Transition.TOUCH)
     z = Z_L + side
     low, high = lane_range(tables, z, h)
@@ -115,69 +116,6 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
 
 
 @inlined
-def defect(at: Array, step: Step) -> float:
-    """Difference between the expanded product w_l w_r, or w w, and the product of the expanded factors."""
-    return abs(at[CHECK] - (at[Z_L] if step.left else at[Z_R]) * (at[Z_R] if step.right else at[Z_L]))
-
-
-@kernel
-def vanished_step(tables: Tables, step: Step, span: float, allowed: float) -> float:
-    """Step of a series whose tail has vanished, at rest or by underflow: to the end of the span, or while it agrees."""
-    c, at, n = tables.c, tables.at, step.order
-    h = 1.0
-    values(c, n, h, at)
-    while at[TIME] < span and h < LONGEST:
-        values(c, n, 2.0 * h, at)
-        if not defect(at, step) <= allowed:
-            break
-        h *= 2.0
-    values(c, n, h, at)
-    return h
-
-
-@inlined
-def begin_series(tables: Tables, plant: Plant, state: State, settings: Settings) -> tuple[Step, Scale]:
-    """Write order 0 of the series; returns what they stand for, and the scales of the impact."""
-    c, y = tables.c, state.y
-    left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
-    for lane in range(LANES):
-        c[lane] = y[lane]
-    c[TIME] = 0.0
-    w_l, v_l, w_r, v_r = 1.0, 0.0, 1.0, 0.0
-    if left:
-        c[Z_L] = math.sqrt(y[U_L])
-        w_l, v_l = scales(plant, state, settings, LEFT)
-    if right:
-        c[Z_R] = math.sqrt(y[U_R])
-        w_r, v_r = scales(plant, state, settings, RIGHT)
-    # The unit of s makes the radius of convergence about 1: coefficients must not leave the range of numbers.
-    unit = 1.0 / max(v_l * w_r / w_l, v_r * w_l / w_r, 2.0 * w_l * w_r * settings.rate)
-    return Step(settings.order, unit, left, right), Scale(w_l, w_r, max(v_l, v_r))
-
-
-@inlined
-def accepted_length(tables: Tables, step: Step, scale: Scale, settings: Settings, span: float, work: Integers) -> float:
-    """Length in units of a step that is exact enough, or nan; the values at its end are left in `tables.at`.
-
-    G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: the defect at the end of the step consists
-    of neglected terms only and decides whether the step is accepted. Shortening it costs no new expansion.
-    """
-    c, n, left, right = tables.c, step.order, step.left, step.right
-    h = step_size(c, left, right, scale.w_l, scale.w_r, scale.v, n, settings.tolerance)
-    product = scale.w_l * scale.w_r
-    allowed = (100.0 * settings.tolerance + 100.0 * EPS) * (product if left and right else product**2)
-    if h == math.inf:
-        return vanished_step(tables, step, span, allowed)
-    for _ in range(60):
-        values(c, n, h, tables.at)
-        if defect(tables.at, step) <= allowed:
-            return h
-        work[Work.REJECTED_STEPS] += 1
-        h *= 0.7
-    return math.nan
-
-
-@inlined
 def penetration(z: float, touching: bool) -> float:
     """u of a pair from its lane; w^2, never negative, in contact."""
     return z * z if touching else z
@@ -192,7 +130,16 @@ def write_state(at: Array, step: Step, y: Array) -> None:
 
 
 @inlined
-def deliver(tables: Tables, step: Step, s: float, t: float, state: State, out: Output) -> None:
+def place_free(step: Step, left: Flight, right: Flight, t: float, y: Array) -> None:
+    """Put the arms that touch nothing where they fly: the lanes know them by the object and the gap."""
+    if not step.left:
+        y[X_L], y[V_L], _ = fly(left, t)
+    if not step.right:
+        y[X_R], y[V_R], _ = fly(right, t)
+
+
+@inlined
+def deliver(tables: Tables, step: Step, s: float, t: float, free: Flights, state: State, out: Output) -> None:
     """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
     at = tables.at
     row = out.filled[Filled.OUTPUTS]
@@ -202,6 +149,7 @@ def deliver(tables: Tables, step: Step, s: float, t: float, state: State, out: O
             break
         values(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
         write_state(at, step, out.rows[row])
+        place_free(step, free.left, free.right, tau, out.rows[row])
         row += 1
     out.filled[Filled.OUTPUTS] = row
 
@@ -210,19 +158,14 @@ def deliver(tables: Tables, step: Step, s: float, t: float, state: State, out: O
 def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """One Taylor step to its first event, whose transitions it makes, or to the end of the span; its time, or nan."""
     out.work[Work.CONTACT_STEPS] += 1
-    c, at, y, n = tables.c, tables.at, state.y, settings.order
-    step, scale = begin_series(tables, plant, state, settings)
-    if step.left and step.right:
-        expand_both(c, tables.f, plant.bodies, plant.pairs, step.unit, n)
-    else:
-        expand_one(c, tables.f, plant.bodies, plant.pairs, LEFT if step.left else RIGHT, step.unit, n)
-    h = accepted_length(tables, step, scale, settings, span, out.work)
-    curvatures(c, n, h, tables.size)
+    c, at, y, mode, n = tables.c, tables.at, state.y, state.mode, settings.order
+    step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings), span)
+    h = accepted_length(tables, step, h, settings, out.work)
     left = pair_candidate(tables, plant, state, n, LEFT, h, out.work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
     slide = SlideCandidate(math.inf, Slide.FREE)
-    if state.mode[OBJECT] != Slide.FREE:
-        slide = slide_in_contact(tables, plant, state.mode, n, h, out.work)
+    if mode[OBJECT] != Slide.FREE:
+        slide = slide_in_contact(tables, plant, mode, n, h, out.work)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when) or math.isnan(slide.when):
         return math.nan
     s = min(h, left.when, right.when, slide.when)
@@ -233,9 +176,12 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         s = invert_time(tables, step, span, s, t)
         t = span
         values(c, n, s, at)
+    free = flights_of(plant, y)
     write_state(at, step, y)
+    place_free(step, free.left, free.right, t, y)
     y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
-    deliver(tables, step, s, t, state, out)
+    keep_resting(state)
+    deliver(tables, step, s, t, free, state, out)
     tick(state.clock, t)
     make_transitions(plant, state, left, right, slide, s, out)
     return t

@@ -1,16 +1,17 @@
-"""The energy check: under constant inputs the energy of a segment cannot rise, whatever the contacts do."""
+"""The check of a segment: its energy cannot rise, nor fall by more than its losses, and no touch may be missed."""
 
 from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.impact import stored_energy
+from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.kinematics import arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
-from grasp_ros.exact.scales import reduced_mass, scales
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.layout import (
     DAMPING,
+    DISSIPATION,
     EPS,
     FORCE,
     HERTZIAN,
@@ -26,6 +27,7 @@ from grasp_ros.physics.layout import (
     X_L,
     X_O,
     X_R,
+    Body,
     Outcome,
     Pair,
 )
@@ -39,13 +41,14 @@ own_energy = kernel(body_energy)
 
 
 @kernel
-def level_of(body: Array, x: float, v: float, x_o: float, t: float) -> Level:
-    """Energy of a body (4,) at the end of a segment of t s; x_o: the object, if the body is an arm.
+def level_of(body: Array, x: float, v: float, way: float, t: float) -> Level:
+    """Energy of a body (4,) at the end of a segment of t s.
 
-    A force that carries the body away and a weak spring that brings it back leave small terms at both ends.
+    An arm that touches the object takes its place, with the roundings of a `way` in m. A force that carries the body
+    away and a weak spring that brings it back leave small terms at both ends.
     """
     mass, stiffness, force = body[MASS], body[STIFFNESS], body[FORCE]
-    value, size = own_energy(mass, stiffness, force, x, v, abs(x) + abs(x_o))
+    value, size = own_energy(mass, stiffness, force, x, v, abs(x) + way)
     if force != 0.0:
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
@@ -57,8 +60,9 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
     y, given = state.y, plant.given
     own = level_of(given[OBJECT], y[X_O], y[V_O], 0.0, t)
-    left = level_of(given[LEFT], y[X_L], y[V_L], y[X_O], t)
-    right = level_of(given[RIGHT], y[X_R], y[V_R], y[X_O], t)
+    way = abs(y[X_O]) + t * abs(y[V_O])
+    left = level_of(given[LEFT], y[X_L], y[V_L], way, t)
+    right = level_of(given[RIGHT], y[X_R], y[V_R], way, t)
     impact = 0.0
     for side in (LEFT, RIGHT):
         u = y[U_L + side]
@@ -68,30 +72,53 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
 
 
 @kernel
-def impact_size(plant: Plant, state: State, settings: Settings, size: float) -> float:
-    """`size` and the energies of the impacts: a step in contact is as accurate as the impact is large."""
+def largest_loss(plant: Plant, state: State, settings: Settings, size: float, t: float) -> float:
+    """Bound, in J of V, on what dampers, friction and impacts take in t s from motions that have the energy `size`."""
+    loss = 2.0 * settings.rate * t * size
+    if plant.coulomb > 0.0:
+        loss += 2.0 * plant.coulomb * t * math.sqrt(size / plant.given[OBJECT, MASS])
     for side in (LEFT, RIGHT):
-        if state.mode[side] == Pair.CONTACT:
-            _, v = scales(plant, state, settings, side)
-            size += 2.0 * reduced_mass(plant.bodies, side) * v * v
-    return size
+        pair = plant.pairs[side]
+        if pair[DISSIPATION] > 0.0 and state.mode[side] != Pair.ABSENT:
+            d = math.sqrt(size / reduced_mass(plant.given, side))
+            u = max(state.y[U_L + side], 0.0) + d * t
+            loss += 2.0 * pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u) * d * d * t
+    return loss
+
+
+@inlined
+def penetrates(state: State, side: Body, t: float) -> bool:
+    """Whether an open pair is closed by more than the roundings of a way of t s: a touch has been missed."""
+    u = state.y[U_L + side]
+    if state.mode[side] != Pair.OPEN or u <= 0.0:
+        return False
+    x, v, _ = arm_of(state.y, side)
+    way = abs(x) + abs(state.y[X_O]) + t * (abs(v) + abs(state.y[V_O]))
+    return u > ROUNDINGS * EPS * way + UNDERFLOW
 
 
 @inlined
 def check_segment(plant: Plant, state: State, settings: Settings, before: Level, after: Level, t: float, idle: int,
-                  ballistic: bool) -> Outcome:
-    """Whether a segment of t s can be believed: finite, not stalled, and no rise of the energy beyond rounding.
+                  clamped: bool) -> Outcome:
+    """Whether a segment of t s can be believed.
 
-    What a ballistic pair has left out comes at once: no comparison. Where a feedback drives an arm (c + Kv < 0) energy
-    may come.
+    It must be finite, not stalled, without a touch that was missed, and its energy may neither rise nor fall by more
+    than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come; where a pair was
+    clamped its stored energy goes.
     """
     if not math.isfinite(state.y.sum()):
         return Outcome.NOT_FINITE
     if math.isnan(t) or idle > MAX_IDLE:
         return Outcome.STALLED
+    if penetrates(state, LEFT, t) or penetrates(state, RIGHT, t):
+        return Outcome.PENETRATES
     rise, size = after.value - before.value, max(after.size, before.size)
-    allowed = ROUNDINGS * EPS + NEGLECTED * settings.tolerance
+    rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + UNDERFLOW
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
-    if ballistic or driven or not rise > allowed * size + UNDERFLOW:
+    if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
-    return Outcome.ENERGY_RISES if rise > allowed * impact_size(plant, state, settings, size) else Outcome.GO_ON
+    if rise > 0.0:
+        return Outcome.ENERGY_RISES
+    if clamped or -rise <= rounding + largest_loss(plant, state, settings, size, t):
+        return Outcome.GO_ON
+    return Outcome.ENERGY_FALLS

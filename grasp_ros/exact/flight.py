@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.records import Array, Flight, Flights, Regime
+from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.records import Array, Flight, Flights, Plant, Regime
 from grasp_ros.physics.layout import (
     DAMPING,
     FORCE,
@@ -20,12 +20,16 @@ from grasp_ros.physics.layout import (
     OBJECT,
     RIGHT,
     STIFFNESS,
+    V_L,
+    V_O,
+    V_R,
     X_L,
     X_O,
     X_R,
     Body,
 )
 
+SHORT = 0.25  # of the time constants: there the power series keeps all digits
 FLIGHT_ORDER = np.int64(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
 
 
@@ -48,21 +52,34 @@ def launch(body: Array, x: float, v: float) -> Flight:
     return Flight(regime, x, v, x - x_e, x_e, push, sigma, rate, omega0_2)
 
 
+@inlined
+def flights_of(plant: Plant, y: Array) -> Flights:
+    """Flights of all bodies from y."""
+    return Flights(
+        launch(plant.bodies[LEFT], y[X_L], y[V_L]), launch(plant.bodies[RIGHT], y[X_R], y[V_R]),
+        launch(plant.bodies[OBJECT], y[X_O], y[V_O]),
+    )
+
+
 @kernel
-def fly(flight: Flight, t: float) -> tuple[float, float]:
-    """Position and velocity after the time t >= 0 of flight.
+def fly(flight: Flight, t: float) -> tuple[float, float, float]:
+    """Position, velocity and displacement after the time t >= 0 of flight.
+
+    The displacement of a short flight has its own digits; that of a long one is nan, because it has none.
 
     `UNDER` and `NEAR` (critical or over-damped) describe the swing around the rest position, which decays without
     loss of digits. `OVER` is for an over-damped body whose rest position is too far away to be subtracted from,
     or does not exist; for the same reason short flights use the power series of the equation. expm1 keeps the
-    digits in the limits of equal roots and of a vanishing spring.
+    digits in the limits of equal roots and of a vanishing spring; where the roots are far apart, a velocity is a
+    difference of two decays, never of a decay and what has nearly the same size.
     """
     regime, x, v, swing, x_e, push, sigma, rate, omega0_2 = flight
     if regime == Regime.DRIFT:
-        return x + t * (v + 0.5 * t * push), v + t * push
-    if t * (2.0 * sigma + math.sqrt(omega0_2)) < 0.25:
+        away = t * (v + 0.5 * t * push)
+        return x + away, v + t * push, away
+    if t * (2.0 * abs(sigma) + math.sqrt(omega0_2)) < SHORT:
         away, v = short_flight(v, push, sigma, omega0_2, t)
-        return x + away, v
+        return x + away, v, away
     if regime == Regime.UNDER:
         decay = math.exp(-sigma * t)
         response = decay * math.sin(rate * t) / rate
@@ -70,17 +87,19 @@ def fly(flight: Flight, t: float) -> tuple[float, float]:
         return (
             x_e + swing * (cosine + sigma * response) + v * response,
             v * (cosine - sigma * response) + push * response,
+            math.nan,
         )
-    slow = -omega0_2 / (sigma + rate)
-    fast = -(sigma + rate)
-    decay = math.exp(slow * t)
-    response = decay * t if rate == 0.0 else decay * -math.expm1(-2.0 * rate * t) / (2.0 * rate)
-    cosine = 0.5 * (decay + math.exp(fast * t))
-    velocity = v * (cosine - sigma * response) + push * response
+    fast = -(sigma + rate) if sigma >= 0.0 else omega0_2 / (rate - sigma)
+    slow = omega0_2 / fast if sigma >= 0.0 else rate - sigma
+    slow_decay, fast_decay = math.exp(slow * t), math.exp(fast * t)
+    response = slow_decay * (t if rate == 0.0 else -math.expm1(-2.0 * rate * t) / (2.0 * rate))
+    velocity = v * (fast_decay + slow * response) + push * response
     if regime == Regime.NEAR:
-        return x_e + swing * (cosine + sigma * response) + v * response, velocity
+        return x_e + swing * (slow_decay - slow * response) + v * response, velocity, math.nan
     slow_part = t if slow == 0.0 else math.expm1(slow * t) / slow
-    return x + v * response + push * (slow_part - math.expm1(fast * t) / fast) / (2.0 * rate), velocity
+    fast_part = t if fast == 0.0 else math.expm1(fast * t) / fast
+    x += v * response + push * (slow_part - fast_part) / (2.0 * rate)
+    return x, velocity, math.nan
 
 
 @kernel
@@ -103,12 +122,6 @@ def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float)
 
 
 @kernel
-def displacement(flight: Flight, t: float) -> float:
-    """x(t) - x without their common digits, for a time below both time constants."""
-    return short_flight(flight.v, flight.push, flight.sigma, flight.omega0_2, t)[0]
-
-
-@kernel
 def expand_flight(bodies: Array, flights: Flights, t: float, c: Array) -> None:
     """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
 
@@ -127,7 +140,7 @@ def expand_body(bodies: Array, body: Body, flight: Flight, t: float, c: Array) -
     row, lane = bodies[body], X_O if body == OBJECT else (X_L if body == LEFT else X_R)
     m = row[MASS]
     force, k, d = row[FORCE] / m, row[STIFFNESS] / m, row[DAMPING] / m
-    x, v = fly(flight, t)
+    x, v, _ = fly(flight, t)
     c[lane], c[lane + 1] = x, v
     for n in range(FLIGHT_ORDER):
         share = 1.0 / (n + 1)

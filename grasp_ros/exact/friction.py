@@ -14,8 +14,9 @@ import numpy as np
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, rate_lanes
-from grasp_ros.exact.polynomial import first_rise
 from grasp_ros.exact.records import Array, Integers, Plant, SlideCandidate, State, Tables
+from grasp_ros.exact.rest import DOUBT
+from grasp_ros.exact.roots import first_rise
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -26,6 +27,7 @@ from grasp_ros.physics.layout import (
     MASS,
     OBJECT,
     RIGHT,
+    TIME,
     U_L,
     V_O,
     Z_L,
@@ -118,22 +120,49 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
 
 
 @kernel
-def slide_in_contact(tables: Tables, plant: Plant, mode: Integers, n: int, h: float, work: Integers) -> SlideCandidate:
-    """First s in a Taylor step of length h at which an object under dry friction stops or slips."""
-    slide, row = mode[OBJECT], tables.row
-    if slide != Slide.STUCK:
-        factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
-        for k in range(n + 1):
-            row[k] = factor * tables.c[LANES * k + V_O]
-        return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
-    impact_series(tables, plant, mode, n)
+def doubt(tables: Tables, plant: Plant, mode: Integers) -> float:
+    """Rounding of what pushes the object at the begin of a step, N: of the impact forces, friction and the rest."""
+    c, impacts = tables.c, 0.0
+    for side in (LEFT, RIGHT):
+        if mode[side] == Pair.CONTACT:
+            front, back = rate_lanes(side)
+            loss, w = plant.pairs[side, DISSIPATION], c[Z_L + side]
+            factor = 1.0 + loss * (abs(c[front]) + abs(c[back]))
+            impacts += elastic_force(plant.pairs[side, HERTZIAN], w * w) * factor
+    return DOUBT * (impacts + (abs(plant.given[OBJECT, FORCE]) + plant.coulomb))
+
+
+@kernel
+def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, work: Integers) -> SlideCandidate:
+    """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction."""
+    row, copy = tables.row, tables.start.f
     push = row[0] + plant.given[OBJECT, FORCE]
+    for k in range(n + 1):
+        copy[k] = -row[k]
     row[0] = push - plant.coulomb
     to_right = first_rise(row, n, h, 0.0, work)
-    for k in range(1, n + 1):
-        row[k] = -row[k]
-    row[0] = -push - plant.coulomb
-    to_left = first_rise(row, n, h, 0.0, work)
+    copy[0] = -push - plant.coulomb
+    to_left = first_rise(copy, n, h, 0.0, work)
     if math.isnan(to_right) or math.isnan(to_left):
         return SlideCandidate(math.nan, Slide.STUCK)
     return SlideCandidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else SlideCandidate(to_left, Slide.LEFTWARD)
+
+
+@kernel
+def slide_in_contact(tables: Tables, plant: Plant, mode: Integers, n: int, h: float, work: Integers) -> SlideCandidate:
+    """First s in a Taylor step of length h at which an object under dry friction stops or slips.
+
+    An object that has just slipped is pushed by no more than rounding beyond its friction: the next order decides.
+    """
+    slide, row, c = mode[OBJECT], tables.row, tables.c
+    if slide != Slide.STUCK:
+        factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
+        for k in range(n + 1):
+            row[k] = factor * c[LANES * k + V_O]
+        if row[0] == 0.0:
+            accelerating = c[LANES + TIME] * doubt(tables, plant, mode) / plant.bodies[OBJECT, MASS]
+            if abs(row[1]) <= accelerating:
+                row[1] = 0.0
+        return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
+    impact_series(tables, plant, mode, n)
+    return slip_candidate(tables, plant, n, h, work)

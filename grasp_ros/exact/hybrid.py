@@ -11,16 +11,18 @@ from grasp_ros.exact.contact import contact_segment
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
 from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.modes import begin_interval, end_ballistic, is_ballistic, leave_corner
+from grasp_ros.exact.kinematics import is_clamped
+from grasp_ros.exact.modes import begin_interval, leave_together, settle_resting
 from grasp_ros.exact.outputs import may_go_on, write_reached
-from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, State, Tables
-from grasp_ros.exact.scales import ballistic_time, rate_bound
+from grasp_ros.exact.records import Array, Integers, Output, Plant, Start, State, Tables
+from grasp_ros.exact.scales import is_squeezed, new_settings
+from grasp_ros.exact.start import must_start, start_segment
 from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Outcome, Pair
 
 
 @kernel
 def advance(
-    c: Array, f: Array, at: Array, size: Array, row: Array,
+    c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
     given: Array, bodies: Array, pairs: Array, coulomb: float,
     y: Array, mode: Integers, clock: Array,
     end: float, tolerance: float, max_work: int,
@@ -33,7 +35,7 @@ def advance(
 
     Parameters
     ----------
-    c, f, at, size, row : arrays
+    c, f, at, size, row, start_c, start_f : arrays
         Workspace, `records.Tables`; its size sets the order.
     given, bodies, pairs, coulomb : arrays (3, 4), (3, 4), (2, 2), and float in N
         `records.Plant`.
@@ -51,12 +53,12 @@ def advance(
     Returns
     -------
     int
-        A `layout.Outcome`. If it is neither DONE nor EVENTS_FULL nor WORK_USED, `rows` holds nothing of the segment
-        that failed.
+        A `layout.Outcome`. After SQUEEZED the next step is one of `squeezed.creep`. If it is none of DONE,
+        EVENTS_FULL, WORK_USED and SQUEEZED, `rows` holds nothing of the segment that failed.
     """
-    tables = Tables(c, f, at, size, row)
+    tables = Tables(c, f, at, size, row, Start(start_c, start_f))
     plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, clock)
-    settings = Settings(tolerance, row.shape[0] - 1, rate_bound(given))
+    settings = new_settings(tolerance, row.shape[0] - 1, given)
     out = Output(grid, rows, events, filled, work)
     begin_interval(plant, state, settings, out)
     idle = 0
@@ -67,19 +69,20 @@ def advance(
         outcome = may_go_on(span, max_work, out)
         if outcome != Outcome.GO_ON:
             return outcome
-        leave_corner(plant, state, settings, out)
-        ballistic = is_ballistic(state.mode)
-        if ballistic:
-            span = min(span, ballistic_time(plant, state, settings))
-        if state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
+        settle_resting(plant, state, out)
+        leave_together(plant, state, settings)
+        clamped = is_clamped(state.mode)
+        if must_start(state):
+            t = start_segment(tables, plant, state, settings, span, out)
+        elif state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
+            if is_squeezed(plant, state, span, out):
+                return Outcome.SQUEEZED
             t = contact_segment(tables, plant, state, settings, span, out)
         else:
             t = flight_segment(tables, plant, state, settings, span, out)
-        if ballistic:
-            end_ballistic(plant, state, settings, out)
         idle = 0 if t > 0.0 else idle + 1
         after = energy_level(plant, state, t)
-        outcome = check_segment(plant, state, settings, before, after, t, idle, ballistic)
+        outcome = check_segment(plant, state, settings, before, after, t, idle, clamped)
         if outcome != Outcome.GO_ON:
             out.filled[Filled.OUTPUTS] = reached
             return outcome

@@ -14,6 +14,7 @@ from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
 from grasp_ros.exact.records import Tables
 from grasp_ros.exact.series import new_tables, series_order
+from grasp_ros.exact.squeezed import creep
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EVENT_TIME, FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Transition, Work
@@ -35,6 +36,8 @@ class Status(Enum):
     NOT_FINITE = "stopped: a state is no longer finite"
     WORK_BUDGET = "stopped: the budget of work is used up before the end of the horizon"
     ENERGY_RISES = "stopped: the energy rose by more than rounding explains"
+    ENERGY_FALLS = "stopped: the energy fell by more than its losses explain"
+    PENETRATES = "stopped: a touch was missed, a pair that is open penetrates by more than rounding explains"
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
@@ -57,13 +60,16 @@ def to_events(table: Array) -> list[Event]:
 
 
 _KINDS, _BODIES = tuple(Transition), tuple(Body)
-_OUTPUTS, _EVENTS = (int(counter) for counter in Filled)
+_OUTPUTS, _EVENTS = int(Filled.OUTPUTS), int(Filled.EVENTS)
+_GOES_ON = (Outcome.GO_ON, Outcome.SQUEEZED)
 _NO_TIMES = np.zeros(0)
 _STATUS = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
     Outcome.STALLED: Status.STALLED,
     Outcome.ENERGY_RISES: Status.ENERGY_RISES,
+    Outcome.ENERGY_FALLS: Status.ENERGY_FALLS,
+    Outcome.PENETRATES: Status.PENETRATES,
     Outcome.WORK_USED: Status.WORK_BUDGET,
 }
 
@@ -188,11 +194,13 @@ class Integrator:
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else np.ascontiguousarray(grid, dtype=float)
         out = np.empty((len(times), 6))
-        clock, filled = np.zeros(2), np.zeros(2, dtype=np.int64)
+        clock, filled = np.zeros(2), np.zeros(len(Filled), dtype=np.int64)
+        door = advance
         while self.status is Status.DONE:
             allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
-            outcome = advance(
-                *self._tables, self._given, self._bodies, self._pairs, self._coulomb, self._y, self._mode, clock,
+            outcome = door(
+                *self._tables[:-1], *self._tables.start, self._given, self._bodies, self._pairs, self._coulomb,
+                self._y, self._mode, clock,
                 duration, self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled,
                 self.work,
             )
@@ -202,6 +210,9 @@ class Integrator:
                 self._events.append(rows)
                 self._event_count += len(rows)
                 filled[_EVENTS] = 0
+            door = creep if outcome == Outcome.SQUEEZED else advance
+            if outcome in _GOES_ON:
+                continue
             if outcome == Outcome.EVENTS_FULL:
                 if self._event_count > self._max_events:
                     self.status = Status.EVENT_BUDGET

@@ -46,7 +46,7 @@ def _cache_directory(room: Path) -> Path:
     return directory
 
 
-COMPILING = "compiling the kernels; this happens once after an installation and takes some 15 s"
+COMPILING = "compiling the kernels; this happens once after an installation and takes some 20 s"
 CACHE_DIRECTORY = _cache_directory(Path(__file__).parent)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Plant
+from grasp_ros.exact.records import Array, Integers, Plant, State
 from grasp_ros.physics.layout import (
     DAMPING,
     FORCE,
@@ -21,6 +23,7 @@ from grasp_ros.physics.layout import (
     X_O,
     X_R,
     Body,
+    Pair,
 )
 
 
@@ -34,6 +37,12 @@ def other(side: Body) -> Body:
 def arm_of(y: Array, side: Body) -> tuple[float, float, float]:
     """x and v of an arm, and the sign with which they enter u and u'."""
     return (y[X_L], y[V_L], 1.0) if side == LEFT else (y[X_R], y[V_R], -1.0)
+
+
+@kernel
+def velocity_lane(body: Body) -> int:
+    """Place of a body's velocity in the state; its position stands before it."""
+    return V_O if body == OBJECT else (V_L if body == LEFT else V_R)
 
 
 @kernel
@@ -56,6 +65,16 @@ def write_penetrations(y: Array) -> None:
     y[U_R] = y[X_O] - y[X_R]
 
 
+@inlined
+def keep_resting(state: State) -> None:
+    """A pair at rest stays one: what arm and object differ by after a segment is rounding."""
+    y, mode = state.y, state.mode
+    if mode[LEFT] == Pair.RESTING:
+        y[X_L], y[V_L], y[U_L] = y[X_O], y[V_O], 0.0
+    if mode[RIGHT] == Pair.RESTING:
+        y[X_R], y[V_R], y[U_R] = y[X_O], y[V_O], 0.0
+
+
 @kernel
 def own_acceleration(body: Array, x: float, v: float) -> float:
     """x'' of a body, m/s^2, without impact forces: (1) to (3)."""
@@ -69,3 +88,60 @@ def relative_motion(plant: Plant, y: Array, side: Body) -> tuple[float, float]:
     a = own_acceleration(plant.bodies[side], x, v)
     a_o = own_acceleration(plant.bodies[OBJECT], y[X_O], y[V_O])
     return approach(y, side), sign * (a - a_o)
+
+
+@kernel
+def reduced_mass(bodies: Array, side: Body) -> float:
+    """mu of one pair, kg."""
+    m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
+    return m / (1.0 + m / m_o)  # m_o is infinite if the object sticks
+
+
+@kernel
+def bound(body: Array, q: float, q_rate: float, span: float) -> float:
+    """Bound on |q| for the next `span` seconds, for q with m q'' + c q' + k q = 0.
+
+    x - x_e, x'', x''' are such quantities. The first bound is the energy of q, the second uses the impulse
+    response, which stays below min(t, m/c). What a feedback drives, c < 0,
+    grows by e in the time m/|c|; no span may be longer.
+    """
+    grown = math.e if body[DAMPING] < 0.0 else 1.0
+    if q_rate == 0.0:
+        return grown * abs(q)
+    response = span
+    if body[DAMPING] > 0.0:
+        response = min(response, body[MASS] / body[DAMPING])
+    linear = abs(q) + abs(q_rate) * response
+    if body[STIFFNESS] > 0.0:
+        linear = min(linear, math.sqrt(q * q + q_rate * q_rate * body[MASS] / body[STIFFNESS]))
+    return grown * linear
+
+
+@kernel
+def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, float, float]:
+    """Derivatives `order` >= 2 and order + 1 of a body's flight, m/s^order, and the sum of the sizes of the first."""
+    m, k, c, f = body[MASS], body[STIFFNESS], body[DAMPING], body[FORCE]
+    value, size = own_acceleration(body, x, v), (abs(f) + abs(k * x) + abs(c * v)) / m
+    before, before_size = v, abs(v)
+    for _ in range(order - 2):
+        following, following_size = -(c * value + k * before) / m, (abs(c) * size + k * before_size) / m
+        before, before_size, value, size = value, size, following, following_size
+    return value, -(c * value + k * before) / m, size
+
+
+@inlined
+def is_closed(mode: Pair) -> bool:
+    """Whether a pair is between its touch and its release."""
+    return mode in (Pair.CONTACT, Pair.CLAMPED, Pair.LEAVING)
+
+
+@inlined
+def is_clamped(mode: Integers) -> bool:
+    """Whether a pair is closed without force, so that its stored energy goes."""
+    return mode[LEFT] in (Pair.CLAMPED, Pair.LEAVING) or mode[RIGHT] in (Pair.CLAMPED, Pair.LEAVING)
+
+
+@inlined
+def is_resting(y: Array, side: Body) -> bool:
+    """Whether a pair is at u = u' = 0."""
+    return y[U_L + side] == 0.0 and approach(y, side) == 0.0

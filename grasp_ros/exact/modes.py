@@ -4,43 +4,42 @@ A pair, by condition (10):
 
              TOUCH u up 0                CLAMP u' down -1/p
       OPEN --------------> CONTACT ---------------------------> CLAMPED
-       ^  <--------------    | ^   <---------------------------   |
-       |    RELEASE u down 0 | |        REENTRY u' up -1/p        |
-       |                     v | both at u = 0: BALLISTIC, LEAVING|
-       +----------------------- RELEASE --------------------------+
+      ^ ^  <--------------    ^  |  <--------------------------    |
+      | |   RELEASE u down 0  |  |      REENTRY u' up -1/p         |
+      | +------ RESTING ------+  +---> LEAVING                     |
+      |  parted        pressed: TOUCH     | both about to part     |
+      +-----------------------------------+------ RELEASE ---------+
 
 The object, by dry friction:
 
       RIGHTWARD, LEFTWARD --STICK v to 0, push within F--> STUCK --SLIP push beyond F--> RIGHTWARD, LEFTWARD
 
-BALLISTIC, of one pair or both, ends in `end_ballistic`; LEAVING ends with its RELEASE. A pair gets into contact in
-`make_transition` (an event), `close_resting_pair` (from rest, a TOUCH) or `initial_modes` (no event).
-
 A mode is frozen within a segment, which calls `make_transitions` at its end. An event counts in (0, t] of a segment,
 once, and never again from an exact zero. At an event, u = 0 and v_o = 0 are set exactly.
-Where the state alone does not decide, these rules do:
+Where a pair is on the edge of a mode, at u = 0 or u' = -1/p, one rule decides: the first derivative that differs from
+zero by more than its rounding (`mode_of`). At u = u' = 0 that is one of the orders 2 to 6 of u, with the force of the
+other pair (`rest.leaning`): pressed together it is CONTACT, which `start.start_segment` begins without leaving anything
+out; parted it is OPEN; where none differs it is RESTING, and arm and object move together. An object at rest sticks if
+friction can balance what pushes it; stuck it is a wall. The rule is the same
 
-* At u = 0 the sign of u' decides, and at u' = 0 the sign of the first derivative of u that differs from zero: pressed
-  together it is BALLISTIC, otherwise OPEN. Where none differs, it follows the other pair: it is pressed as soon as
-  that one is in contact.
-* Such a resting pair gets its mode anew when the inputs change and whenever the other pair is in contact.
-* Both pairs at u = 0 at once, where w_l w_r = 0 would stop the regularised time: approaching, both go BALLISTIC,
-  without force for a time in which the impulse left out is below the tolerance; separating, both go LEAVING, without
-  the rest of their impulse.
-* An object at rest sticks if friction can balance what pushes it. One that stops while more pushes it turns around
-  without a rest, and nothing is recorded.
+* at the start: for pairs, object, and pairs again, as friction lets them; no events (`initial_modes`, `initial_slide`);
+* at events and between segments: for pairs at rest without force, which an event beside may press (`settle_resting`),
+  and an object that stops; if more than F pushes it, it turns around unrecorded;
+* at ticks: for the object, and pairs that are LEAVING or about to begin from rest (`begin_interval`).
+
+What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
+one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse.
 """
 
 from __future__ import annotations
 
-from grasp_ros.exact.flight import displacement, launch
 from grasp_ros.exact.friction import apply_friction, impact_on_object, lift_friction
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, arm_of, other, relative_motion
+from grasp_ros.exact.kinematics import approach, is_closed, is_resting, rate_lanes, relative_motion, velocity_lane
 from grasp_ros.exact.outputs import record
-from grasp_ros.exact.records import Array, Candidate, Integers, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.scales import probe_time, scales, sliver
+from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
+from grasp_ros.exact.rest import DOUBT, NEVER, impact_beside, is_negligible, leaning
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EPS,
@@ -59,44 +58,47 @@ from grasp_ros.physics.layout import (
 )
 
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together
+LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
+TURNS = 20.0  # 2 u |u''| beside u'^2 is what u' changes on the way to u = 0
 
 
 # Consistent initialisation: modes from the state.
 
 
 @kernel
-def leaning(plant: Plant, y: Array, settings: Settings, side: Body) -> float:
-    """u of a pair at rest at u = 0 a little later: its sign tells whether it is pressed together; 0: neither."""
-    x, v, sign = arm_of(y, side)
-    t = probe_time(settings, 1.0)
-    far = displacement(launch(plant.bodies[side], x, v), t)
-    far_o = displacement(launch(plant.bodies[OBJECT], y[X_O], y[V_O]), t)
-    return sign * (far - far_o) if abs(far - far_o) > 4.0 * EPS * (abs(far) + abs(far_o)) else 0.0
-
-
-@kernel
-def mode_of(plant: Plant, state: State, settings: Settings, side: Body) -> Pair:
-    """Mode of a pair from the motion, and at rest at u = 0, where nothing else decides, from the other pair."""
+def mode_of(plant: Plant, state: State, side: Body) -> Pair:
+    """Mode of a pair from its motion: at u = 0 and at u' = -1/p by the first derivative that decides."""
     y = state.y
     if plant.pairs[side, HERTZIAN] == 0.0:
         return Pair.ABSENT
     u, d = y[U_L + side], approach(y, side)
-    if u < 0.0:
-        return Pair.OPEN
     if u > 0.0:
-        return Pair.CONTACT if damping_factor(plant.pairs[side, DISSIPATION], d) >= 0.0 else Pair.CLAMPED
-    if d == 0.0:
-        lean = leaning(plant, y, settings, side)
-        pushed = lean == 0.0 and state.mode[other(side)] == Pair.CONTACT
-        return Pair.BALLISTIC if lean > 0.0 or pushed else Pair.OPEN
-    return Pair.CONTACT if d > 0.0 else Pair.OPEN
+        return Pair.CONTACT if surface_side(plant, state, side) >= 0.0 else Pair.CLAMPED
+    if u < 0.0 or d != 0.0:
+        return Pair.CONTACT if u == 0.0 and d > 0.0 else Pair.OPEN
+    order, value = leaning(plant, state, side)
+    if order == NEVER:
+        return Pair.RESTING
+    return Pair.CONTACT if value > 0.0 else Pair.OPEN
 
 
 @kernel
-def initial_modes(plant: Plant, state: State, settings: Settings) -> None:
-    """Modes of both pairs for a run that starts here."""
-    for side in (LEFT, RIGHT, LEFT):  # the left pair again, because it may follow the right one
-        state.mode[side] = mode_of(plant, state, settings, side)
+def surface_side(plant: Plant, state: State, side: Body) -> float:
+    """1 + p u', which is positive in contact; within its rounding, where no force acts, the u'' that moves it."""
+    y, loss = state.y, plant.pairs[side, DISSIPATION]
+    front, back = rate_lanes(side)
+    factor = damping_factor(loss, y[front] - y[back])
+    if abs(factor) > 4.0 * EPS * (1.0 + loss * (abs(y[front]) + abs(y[back]))):
+        return factor
+    return relative_motion(plant, y, side)[1] + impact_beside(plant, state, side)[0]
+
+
+@kernel
+def initial_modes(plant: Plant, state: State) -> None:
+    """Modes of both pairs for a run that starts here, until each follows from the other: both at once, for symmetry."""
+    for _ in range(3):
+        left, right = mode_of(plant, state, LEFT), mode_of(plant, state, RIGHT)
+        state.mode[LEFT], state.mode[RIGHT] = left, right
 
 
 @kernel
@@ -107,7 +109,7 @@ def initial_slide(plant: Plant, state: State) -> None:
     direction = state.y[V_O]
     if direction == 0.0:
         push = impact_on_object(plant, state) + plant.given[OBJECT, FORCE]
-        direction = push if abs(push) > plant.coulomb else 0.0
+        direction = push if abs(push) > plant.coulomb * (1.0 + DOUBT) else 0.0
     if direction == 0.0:
         state.mode[OBJECT] = Slide.STUCK
     else:
@@ -125,80 +127,69 @@ def begin_interval(plant: Plant, state: State, settings: Settings, out: Output) 
     lift_friction(plant)
     if mode[LEFT] == Pair.UNKNOWN:
         mode[OBJECT] = Slide.FREE
-        initial_modes(plant, state, settings)
+        initial_modes(plant, state)
         initial_slide(plant, state)
-        initial_modes(plant, state, settings)  # a pair at rest at u = 0 moves as friction lets it
+        initial_modes(plant, state)  # a pair at rest at u = 0 moves as friction lets it
     if state.clock[0] > 0.0:
         apply_friction(plant, mode)
         return
-    stuck = mode[OBJECT] == Slide.STUCK
+    before = mode[OBJECT]
     initial_slide(plant, state)
-    if stuck and mode[OBJECT] != Slide.STUCK:
+    if before == Slide.STUCK and mode[OBJECT] != Slide.STUCK:
         record(state, OBJECT, Transition.SLIP, 0.0, 0.0, out)
+    elif before in (Slide.RIGHTWARD, Slide.LEFTWARD) and mode[OBJECT] == Slide.STUCK:
+        record(state, OBJECT, Transition.STICK, 0.0, 0.0, out)
     for side in (LEFT, RIGHT):
-        close_resting_pair(plant, state, settings, side, out)
+        if mode[side] == Pair.LEAVING or (mode[side] == Pair.CONTACT and is_resting(state.y, side)):
+            settle(state, side, mode_of(plant, state, side), out)
 
 
 # Rules between segments.
 
 
-@inlined
-def close_resting_pair(plant: Plant, state: State, settings: Settings, side: Body, out: Output) -> None:
-    """A pair that rests at u = 0 touches if what acts now presses it together."""
-    y, mode = state.y, state.mode
-    if mode[side] == Pair.OPEN and y[U_L + side] == 0.0 and approach(y, side) == 0.0:
-        mode[side] = mode_of(plant, state, settings, side)
-        if mode[side] != Pair.OPEN:
-            record(state, side, Transition.TOUCH, 0.0, 0.0, out)
-
-
-@inlined
-def leave_corner(plant: Plant, state: State, settings: Settings, out: Output) -> None:
-    """Take both pairs off the corner w_l = w_r = 0, where the product w_l w_r stops the regularised time."""
+@kernel
+def settle(state: State, side: Body, following: Pair, out: Output) -> None:
+    """Give a pair its mode anew, and record a touch or a release if it was not, or is no longer, in contact."""
     mode, y = state.mode, state.y
-    for side in (LEFT, RIGHT):
-        if mode[other(side)] == Pair.CONTACT:
-            close_resting_pair(plant, state, settings, side, out)
+    before = is_closed(mode[side])
+    mode[side] = following
+    if is_closed(following) != before:
+        kind = Transition.RELEASE if before else Transition.TOUCH
+        record(state, side, kind, y[U_L + side], approach(y, side), out)
+
+
+@inlined
+def waits(state: State, side: Body) -> bool:
+    """Whether a pair without force is at u = u' = 0."""
+    return state.mode[side] in (Pair.OPEN, Pair.RESTING) and is_resting(state.y, side)
+
+
+@inlined
+def settle_resting(plant: Plant, state: State, out: Output) -> None:
+    """Pairs at u = u' = 0 without force: what acts now may press them together, one of them the other, too."""
+    waits_l, waits_r = waits(state, LEFT), waits(state, RIGHT)
+    if not (waits_l or waits_r):
+        return
+    for _ in range(2):
+        left = mode_of(plant, state, LEFT) if waits_l else state.mode[LEFT]
+        right = mode_of(plant, state, RIGHT) if waits_r else state.mode[RIGHT]
+        settle(state, LEFT, left, out)
+        settle(state, RIGHT, right, out)
+
+
+@inlined
+def leave_together(plant: Plant, state: State, settings: Settings) -> None:
+    """Take both pairs off a release at one instant, where the product w_l w_r stops the regularised time."""
+    mode, y = state.mode, state.y
     if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT:
         return
-    shallow = sliver(settings.tolerance)
-    approaching = 0
-    separating = 0
     for side in (LEFT, RIGHT):
         d, a = relative_motion(plant, y, side)
-        w, _ = scales(plant, state, settings, side)
         u = y[U_L + side]
-        if d >= 0.0 and u < 0.3 * shallow * w * w:
-            approaching += 1
-        elif d < 0.0 and u < shallow * w * w and 20.0 * u * abs(a) < d * d:
-            separating += 1
-    if approaching == 2:
-        mode[LEFT] = mode[RIGHT] = Pair.BALLISTIC
-    elif separating == 2:
-        mode[LEFT] = mode[RIGHT] = Pair.LEAVING
-
-
-@inlined
-def is_ballistic(mode: Integers) -> bool:
-    """Whether a pair goes without force for a while."""
-    return mode[LEFT] == Pair.BALLISTIC or mode[RIGHT] == Pair.BALLISTIC
-
-
-@kernel
-def end_ballistic(plant: Plant, state: State, settings: Settings, out: Output) -> None:
-    """Give ballistic pairs a mode again, unless one is still so shallow that its force is below rounding."""
-    y, mode = state.y, state.mode
-    for side in (LEFT, RIGHT):
-        if mode[side] != Pair.BALLISTIC:
-            continue
-        u, d = y[U_L + side], approach(y, side)
-        if u >= 0.0 and d > 0.0:
-            w, _ = scales(plant, state, settings, side)
-            if u <= 1e-3 * sliver(settings.tolerance) * w * w:
-                continue
-        mode[side] = mode_of(plant, state, settings, side)
-        if mode[side] == Pair.OPEN:
-            record(state, side, Transition.RELEASE, u, d, out)
+        leaves = d < 0.0 and TURNS * (u / -d) * abs(a) < -d  # in this order, because squares underflow
+        if not (leaves and is_negligible(plant, side, u, d, LEFT_OUT * settings.tolerance)):
+            return
+    mode[LEFT] = mode[RIGHT] = Pair.LEAVING
 
 
 # Transitions at the end of a segment.
@@ -220,12 +211,14 @@ def make_transitions(plant: Plant, state: State, left: Candidate, right: Candida
 def make_transition(state: State, side: Body, kind: Transition, out: Output) -> None:
     """The reset map of a pair: its next mode, u = 0 at a touch and a release, and the record of the event.
 
-    A touch that rounding invents at the turning point of a grazing approach has u' <= 0 and is no event.
+    A touch whose u' has been lost to rounding finds a pair at rest: it is `settle_resting` that decides.
     """
     y, mode, d = state.y, state.mode, approach(state.y, side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
         y[U_L + side] = 0.0
+        y[velocity_lane(side) - 1] = y[X_O]  # the places agree but for rounding
     if kind == Transition.TOUCH and d <= 0.0:
+        y[velocity_lane(side)] = y[V_O]
         return
     if kind == Transition.RELEASE:
         mode[side] = Pair.OPEN

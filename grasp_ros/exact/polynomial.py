@@ -1,4 +1,4 @@
-"""Tables of eight polynomials side by side: their values, first roots, and the inverse of the time.
+"""Tables of eight polynomials side by side: their values, their ranges, and the inverse of the time.
 
 Coefficient k of a lane stands at LANES k + lane, so that one pass evaluates all lanes in vector instructions. Orders
 are even: the even and the odd powers are summed side by side, which halves the time until the result is there.
@@ -11,10 +11,9 @@ import math
 import numpy as np
 
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Integers, Lanes, Step, Tables
-from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R, Work
+from grasp_ros.exact.records import Array, Lanes, Step, Tables
+from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R
 
-MAX_ITERATIONS = 100_000
 FIRST, SECOND = np.int64(0), np.int64(2)  # typed: numba would compile `lanes` and `sizes` once more for a literal
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 
@@ -37,6 +36,21 @@ def sizes(c: Array, k: int) -> Lanes:
         abs(x[0]), abs(x[1]), abs(x[2]), abs(x[3]),
         abs(x[4]), abs(x[5]), abs(x[6]), abs(x[7]),
     )
+
+
+@kernel
+def larger(x: Lanes, z: Lanes) -> Lanes:
+    """The larger number of each lane."""
+    return (
+        max(x[0], z[0]), max(x[1], z[1]), max(x[2], z[2]), max(x[3], z[3]),
+        max(x[4], z[4]), max(x[5], z[5]), max(x[6], z[6]), max(x[7], z[7]),
+    )
+
+
+@kernel
+def products(x: Lanes, s: float) -> Lanes:
+    """Each lane times s."""
+    return (x[0] * s, x[1] * s, x[2] * s, x[3] * s, x[4] * s, x[5] * s, x[6] * s, x[7] * s)
 
 
 @kernel
@@ -88,101 +102,6 @@ def lane_range(tables: Tables, lane: int, s: float) -> tuple[float, float]:
     return middle - width, middle + width
 
 
-@kernel
-def safe_step(g: float, g_rate: float, curvature: float) -> float:
-    """Smallest h > 0 with g + g' h + M h^2 / 2 = 0 for g <= 0; inf if there is none.
-
-    An exact zero at the start does not count: for g = 0 and g' < 0 the second root is returned.
-    """
-    if curvature <= 0.0:
-        return -g / g_rate if g_rate > 0.0 else math.inf
-    root = math.sqrt(g_rate * g_rate - 2.0 * curvature * g)
-    return (root - g_rate) / curvature if g_rate <= 0.0 else -2.0 * g / (root + g_rate)
-
-
-@kernel
-def value_and_rate(f: Array, n: int, s: float) -> tuple[float, float]:
-    """One polynomial of degree n, and its derivative, at s."""
-    value = f[n]
-    rate = 0.0
-    for k in range(n - 1, -1, -1):
-        rate = rate * s + value
-        value = value * s + f[k]
-    return value, rate
-
-
-@kernel
-def curvature_bound(f: Array, n: int, r: float) -> float:
-    """Bound on the second derivative of a polynomial in [0, r]."""
-    total = 0.0
-    for k in range(n, 1, -1):
-        total = total * r + k * (k - 1) * abs(f[k])
-    return total
-
-
-@kernel
-def root_of_rise(f: Array, n: int, low: float, high: float, noise: float, work: Integers) -> float:
-    """The root of a polynomial that increases in [low, high] and is negative at low; inf if there is none.
-
-    Newton with bisection, from the upper end. Its error is squared by each iteration, so a correction of 1e-9 is
-    the last one needed.
-    """
-    value, rate = value_and_rate(f, n, high)
-    if value <= 0.0:
-        return high if value >= -noise else math.inf
-    s = high
-    for _ in range(200):
-        following = s - value / rate if rate > 0.0 else low
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        elif abs(following - s) <= 1e-9 * s:
-            return following
-        if high - low <= 2.0 * EPS * high:
-            return following
-        s = following
-        work[Work.ROOT_ITERATIONS] += 1
-        value, rate = value_and_rate(f, n, s)
-        if value > 0.0:
-            high = s
-        else:
-            low = s
-    return s
-
-
-@kernel
-def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> float:
-    """First s in (0, h] at which a polynomial f, with f(0) <= 0, rises through zero; inf if there is none.
-
-    The second derivative is bounded by sums of |f_k|, so the steps of `safe_step` cannot jump over a root, until f
-    is known to increase all the way to h. Within `noise`, or the rounding noise of its terms, f counts as negative.
-    """
-    size = 0.0
-    for k in range(n, -1, -1):
-        size = size * h + abs(f[k])
-    noise = max(noise, EPS * size)
-    curvature = curvature_bound(f, n, h)
-    s = 0.0
-    value, rate = f[0], f[1]
-    last = 0.0
-    for _ in range(MAX_ITERATIONS):
-        work[Work.ROOT_ITERATIONS] += 1
-        if value < -noise and rate > curvature * (h - s):
-            return root_of_rise(f, n, s, h, noise, work)
-        step = safe_step(min(value, -noise), rate, curvature)
-        reach = 4.0 * max(step, last)
-        if reach < h - s:  # a bound for the neighbourhood alone allows a longer step
-            nearby = curvature_bound(f, n, s + reach)
-            step = min(reach, safe_step(min(value, -noise), rate, nearby))
-        last = max(step, EPS * h)
-        s += last
-        if not s <= h:
-            return math.inf if s > h else math.nan
-        value, rate = value_and_rate(f, n, s)
-        if value >= -noise and rate > 0.0:
-            return s
-    return math.nan
-
-
 @inlined
 def invert_time(tables: Tables, step: Step, tau: float, high: float, total: float) -> float:
     """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
@@ -194,7 +113,7 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
     slope = c[LANES + TIME]
     bend = (total - slope * high) / (high * high)
     s = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))
-    low, top = 0.0, high
+    low = 0.0
     if not low < s < high:
         s = 0.5 * high
     for _ in range(200):
@@ -208,12 +127,13 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
             low = s
         twice = 2.0 * w_l * w_r
         newton = rest / (unit * twice)
-        following = s - newton / (1.0 - newton * unit * (w_r * w_r * d_l + w_l * w_l * d_r) / twice)
+        bend = newton * unit * (w_r * w_r * d_l + w_l * w_l * d_r) / twice  # large where w has a root near
+        following = s - newton / (1.0 - bend)
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - s) <= 1e-6 * top:
+        elif abs(following - s) <= 1e-6 * s and abs(bend) <= 1e-6:
             return following
-        if high - low <= 2.0 * EPS * top:
+        if high - low <= 2.0 * EPS * high:
             return following
         s = following
     return s

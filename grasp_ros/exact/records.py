@@ -42,6 +42,7 @@ class Settings(NamedTuple):
 
     tolerance: float  # first neglected Taylor term, relative to the impact
     order: int  # of the Taylor series
+    first: float  # tolerance^(1 / (order + 1)): where the first neglected term of a series with radius 1 reaches it
     rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `scales.rate_bound`
 
 
@@ -53,6 +54,13 @@ class Output(NamedTuple):
     events: Array  # (m, 5) time s, body, Transition, u m, u' m/s
     filled: Integers  # (2,) rows in use, see `layout.Filled`
     work: Integers  # (4,) counters, see `layout.Work`
+
+
+class Start(NamedTuple):
+    """Workspace of `start`: coefficients of the state and of the factors of the force."""
+
+    c: Array  # (LANES (n + 1),)
+    f: Array  # (2 ROWS (n + 1),)
 
 
 class Tables(NamedTuple):
@@ -67,6 +75,7 @@ class Tables(NamedTuple):
     at: Array  # (LANES,) values of the lanes at some s
     size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
     row: Array  # (order + 1,) one polynomial
+    start: Start
 
 
 class Step(NamedTuple):
@@ -76,14 +85,6 @@ class Step(NamedTuple):
     unit: float  # of s, such that the radius of convergence is about 1
     left: bool  # whether the left pair is in contact
     right: bool
-
-
-class Scale(NamedTuple):
-    """Sizes of an impact, powers of two, see `scales.scales`."""
-
-    w_l: float  # of w = sqrt(u), left; 1 where the pair is not in contact
-    w_r: float
-    v: float  # of u', m/s
 
 
 class Regime(IntEnum):
@@ -125,6 +126,9 @@ class PairFlight(NamedTuple):
     arm_flight: Flight
     body_flight: Flight
     sign: float  # +1 for the left side, -1 for the right one: u = sign (x - x_o)
+    u: float  # at the begin, m
+    alike: bool  # equal rates: they move relative to each other as one such body
+    horizon: float  # time in s for which a bound may be taken: what a feedback drives may grow
     inverse_p: float  # 1 / p, m/s; only read by a re-entry
 
 
@@ -135,8 +139,20 @@ class Motion(NamedTuple):
     v: float  # m/s
     x_o: float
     v_o: float
-    u: float  # at the begin exact where the difference of the positions is not
+    u: float  # in a short flight exact where the difference of the positions is not
     d: float  # u'
+    size: float  # what the roundings of u are relative to, m
+
+
+class EventFunction(NamedTuple):
+    """A function g of time, for some time to come, that rises through 0 at an event."""
+
+    value: float  # g
+    rate: float  # g'
+    curvature: float  # bound on |g''|
+    noise: float  # rounding of g
+    bend: float  # g'' now, or a little more
+    growth: float  # bound on |g'''|
 
 
 class Candidate(NamedTuple):
@@ -151,6 +167,13 @@ class SlideCandidate(NamedTuple):
 
     when: float
     what: Slide  # the mode that follows; after a stop `modes.slide_of` decides
+
+
+class Leaning(NamedTuple):
+    """Where a pair at rest at u = 0 goes: the first derivative of u that differs from zero."""
+
+    order: float  # of it; see `rest.leaning` for what is no derivative
+    value: float  # m/s^order; > 0: pressed together, inf: by the other pair, which has only just begun
 
 
 class Level(NamedTuple):

@@ -1,16 +1,29 @@
-"""How fast and how deep: the rates of the bodies, the scales of an impact, and the times that follow from them."""
+"""How fast the regularised time runs: the unit of a Taylor step, from the state alone; the step may correct it."""
 
 from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.impact import stored_energy
+from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, other, relative_motion
-from grasp_ros.exact.records import Array, Plant, Settings, State
-from grasp_ros.physics.layout import DAMPING, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, U_L, Body, Pair
+from grasp_ros.exact.kinematics import other, reduced_mass, relative_motion
+from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Step
+from grasp_ros.exact.rest import impact_beside
+from grasp_ros.physics.layout import (
+    DAMPING,
+    DISSIPATION,
+    HERTZIAN,
+    LEFT,
+    MASS,
+    RIGHT,
+    STIFFNESS,
+    U_L,
+    Body,
+    Filled,
+    Pair,
+)
 
-PROBE = 1e-3  # part of the time constants within which the first derivative that differs decides
+STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
 
 
 @kernel
@@ -25,80 +38,72 @@ def rate_bound(bodies: Array) -> float:
     rate = 0.0
     for i in range(3):
         body = bodies[i]
-        rate = max(rate, body[DAMPING] / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
+        rate = max(rate, abs(body[DAMPING]) / body[MASS], math.sqrt(body[STIFFNESS] / body[MASS]))
     return power_of_two_root(rate, 1)
 
 
 @kernel
-def probe_time(settings: Settings, without_rate: float) -> float:
-    """A time within which the first derivative that differs decides; `without_rate` where nothing sets a rate."""
-    return PROBE / settings.rate if settings.rate > 0.0 else without_rate
-
-
-@kernel
-def reduced_mass(bodies: Array, side: Body) -> float:
-    """mu of one pair, kg."""
-    m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
-    return m / (1.0 + m / m_o)  # m_o is infinite if the object sticks
+def new_settings(tolerance: float, order: int, given: Array) -> Settings:
+    """What the accuracy of a run rests on."""
+    return Settings(tolerance, order, math.exp(math.log(tolerance) / (order + 1)), rate_bound(given))
 
 
 @inlined
-def impact_scales(hertzian: float, mu: float, u: float, d: float, a: float) -> tuple[float, float]:
-    """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards).
-
-    The energy is that of the present motion and penetration, and of the motion that an acceleration a > 0 from
-    outside will bring: it presses the pair to the depth (mu a / H)^(2/3).
-    """
+def impact_scales(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float]:
+    """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards)."""
     energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
-    if a > 0.0:
-        energy += mu * a * (mu * a / hertzian) ** (2.0 / 3.0)
     return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
 
 
 @inlined
-def scales(plant: Plant, state: State, settings: Settings, side: Body) -> tuple[float, float]:
-    """Scales of w and u' of one pair's impact; the other pair's impact may push it.
+def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
+    """Scale of w of a pair in contact, and the rate at which w turns in its own regularised time.
 
-    An impact that would last longer than the bodies take to turn by themselves gets no deeper than they let it.
+    dt = 2 w ds: like an impact, with v / w; under a steady acceleration a with sqrt(2 a); under the dissipation with
+    2 p H w^4 / mu. The other pair pushes, too.
     """
-    y, bodies, pairs, rate = state.y, plant.bodies, plant.pairs, settings.rate
-    d, a = relative_motion(plant, y, side)
+    hertzian, mu, u = plant.pairs[side, HERTZIAN], reduced_mass(plant.bodies, side), state.y[U_L + side]
+    d, a = relative_motion(plant, state.y, side)
+    w, v = impact_scales(hertzian, mu, u, d)
+    a = abs(a)
     beside = other(side)
-    if state.mode[beside] in (Pair.CONTACT, Pair.BALLISTIC):
-        mu = reduced_mass(bodies, beside)
-        w, v = impact_scales(pairs[beside, HERTZIAN], mu, y[U_L + beside], approach(y, beside), 0.0)
-        if w > 0.0:
-            a = max(a, 0.0) + v * v / (w * w) * (mu / bodies[OBJECT, MASS])
-    w, v = impact_scales(pairs[side, HERTZIAN], reduced_mass(bodies, side), y[U_L + side], d, a)
-    if rate > 0.0:
-        reach = power_of_two_root(4.0 * (y[U_L + side] + (abs(d) + max(a, 0.0) / rate) / rate), 2)
-        w = min(w, reach) if w > 0.0 else reach  # 0 where the energy of a motion that died out underflows
-    return w, max(v, power_of_two_root(abs(d), 1))
+    if state.mode[beside] == Pair.CONTACT:
+        a += abs(impact_beside(plant, state, side)[0])
+    rate = max(v / w if w > 0.0 else 0.0, math.sqrt(2.0 * a))
+    stiff = plant.pairs[side, DISSIPATION] * hertzian / mu
+    return w, max(rate, 2.0 * stiff * (u * u))
 
 
-@kernel
-def sliver(tolerance: float) -> float:
-    """Part of an impact's depth whose impulse, of relative size sliver^2.5, is below the tolerance."""
-    return 0.3 * tolerance**0.4
+@inlined
+def new_step(plant: Plant, state: State, settings: Settings) -> Step:
+    """A step from here, in a unit of s in which its coefficients neither grow nor shrink by many decades.
 
-
-@kernel
-def ballistic_time(plant: Plant, state: State, settings: Settings) -> float:
-    """How long, in s, the pairs that start at u = 0 may go without force: a sliver of their impacts; inf if none does.
-
-    At most half a time constant of the bodies, for `flight.displacement`; then they are ballistic again.
-
-    The impulse lost relative to the impact's is of order (time)^2.5 if a pair approaches, and (time)^4 if it starts at
-    rest and is pushed together.
+    With both pairs in contact dt = 2 w_l w_r ds: each turns at its rate times the w of the other one.
     """
-    longest = 0.5 / settings.rate if settings.rate > 0.0 else math.inf
-    for side in (LEFT, RIGHT):
-        if state.mode[side] != Pair.BALLISTIC:
-            continue
-        w, v = scales(plant, state, settings, side)
-        if w == 0.0 or v == 0.0:  # only a higher derivative presses it together
-            longest = min(longest, probe_time(settings, 0.0))
-        else:
-            part = sliver(settings.tolerance) if approach(state.y, side) > 0.0 else 0.3 * settings.tolerance**0.25
-            longest = min(longest, part * w * w / v)
-    return longest
+    left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
+    w_l, rate_l, w_r, rate_r = 1.0, 0.0, 1.0, 0.0
+    if left:
+        w_l, rate_l = turning_rate(plant, state, LEFT)
+    if right:
+        w_r, rate_r = turning_rate(plant, state, RIGHT)
+    fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
+    unit = 1.0 / fastest if fastest > 0.0 else 1.0
+    return Step(settings.order, unit, left, right)
+
+
+@inlined
+def relaxation(plant: Plant, state: State, side: Body) -> float:
+    """Rate p H u^1.5 / mu at which u' of a pair in contact relaxes, 1/s; 0 without contact."""
+    u, pair = state.y[U_L + side], plant.pairs[side]
+    if state.mode[side] != Pair.CONTACT or not u > 0.0:
+        return 0.0
+    return pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u) / reduced_mass(plant.bodies, side)
+
+
+@inlined
+def is_squeezed(plant: Plant, state: State, span: float, out: Output) -> bool:
+    """Whether a contact relaxes so fast that an implicit step may be worth its price; a trial that failed waits."""
+    if not max(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT)) * span > STIFF:
+        return False
+    out.filled[Filled.WAIT] -= 1
+    return out.filled[Filled.WAIT] < 0

@@ -21,9 +21,11 @@ import math
 
 import numpy as np
 
+from grasp_ros.exact.collocation import ROW, WORKSPACE
 from grasp_ros.exact.flight import FLIGHT_ORDER
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Lanes, PerMass, Tables
+from grasp_ros.exact.records import Array, Lanes, PerMass, Start, Tables
+from grasp_ros.exact.start import ORDER
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -47,7 +49,6 @@ from grasp_ros.physics.layout import (
 FACTORS, SECOND = 32, 16  # numbers of one order in the table of factors, and where its second factors begin
 CACHE_LINE = 64  # bytes
 FIRST, UPPER, ONE, TWO = (np.int64(number) for number in (0, 8, 1, 2))  # typed, or `convolve` is compiled for each
-TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
 
 
 def series_order(tolerance: float) -> int:
@@ -219,31 +220,12 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)
 
 
-@inlined
-def step_size(c: Array, left: bool, right: bool, w_l: float, w_r: float, v: float, n: int, tolerance: float) -> float:
-    """Step in s / unit at which the first neglected term is `tolerance` times the scales of the impact.
-
-    The radius of convergence is estimated from the last TAIL coefficients of w and of the velocities. A state at
-    rest gives inf.
-    """
-    growth = -math.inf  # logarithm of the inverse radius
-    for k in range(n - TAIL + 1, n + 1):
-        i = LANES * k
-        size = max(abs(c[i + V_L]), abs(c[i + V_O]), abs(c[i + V_R])) / v
-        if left:
-            size = max(size, abs(c[i + Z_L]) / w_l)
-        if right:
-            size = max(size, abs(c[i + Z_R]) / w_r)
-        if size > 0.0:
-            growth = max(growth, math.log(size) / k)
-    return math.exp(math.log(tolerance) / (n + 1) - growth) if growth > -math.inf else math.inf
-
-
 def new_tables(order: int) -> Tables:
     """Workspace for steps of one order; its tables begin at cache lines, which vector loads want."""
     orders, line = max(order, int(FLIGHT_ORDER)) + 1, CACHE_LINE // 8
-    ends = list(itertools.accumulate((LANES * orders, FACTORS * orders, LANES, LANES)))
+    ends = list(itertools.accumulate((LANES * orders, max(FACTORS * orders, WORKSPACE), LANES, ROW)))
     room = np.zeros(ends[-1] + order + 1 + line)
     room = room[-(room.ctypes.data // 8) % line :]
     c, f, at, size, row = np.split(room, ends)
-    return Tables(c, f, at, size, row[: order + 1])
+    start = LANES * (int(ORDER) + 1)
+    return Tables(c, f, at, size, row[: order + 1], Start(np.zeros(start), np.zeros(start)))

@@ -36,7 +36,7 @@ class Pair(IntEnum):
     CONTACT = 1  # condition (10) holds
     CLAMPED = 2  # u > 0 and u' < -1/p: no force, may re-enter
     LEAVING = 3  # u > 0, separating, the rest of its impulse is below the tolerance
-    BALLISTIC = 4  # starts at u = 0 without force, while the impulse left out is below the tolerance
+    RESTING = 4  # u = u' = 0 without force: arm and object move together
     ABSENT = 5  # a body is missing, or its contact: never any force
 
 
@@ -70,13 +70,18 @@ class Outcome(IntEnum):
     STALLED = 3
     ENERGY_RISES = 4
     WORK_USED = 5
+    SQUEEZED = 6  # a contact is stiff: an implicit step is cheaper
+    ENERGY_FALLS = 7
+    PENETRATES = 8
 
 
 class Filled(IntEnum):
-    """Counters of the rows in use."""
+    """Counters of the rows in use, and of the steps for which no implicit one is tried."""
 
     OUTPUTS = 0
     EVENTS = 1
+    WAIT = 2  # contact steps until the next trial
+    PENALTY = 3  # their number after the last trial that failed
 
 
 class Work(IntEnum):

@@ -13,7 +13,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.scenes import horizon
 
-NUMBERS = 80  # of a draw
+NUMBERS = 160  # of a draw
 
 
 class Draw:
@@ -36,14 +36,8 @@ class Draw:
         return next(self._numbers) < part
 
 
-def draw_scene(numbers: Sequence[float]) -> Scene:
-    """A scene of the paper's kind with numbers over ten decades, with or without the loop and its effects.
-
-    Parameters
-    ----------
-    numbers : sequence of NUMBERS floats in [0, 1)
-    """
-    draw = Draw(numbers)
+def draw_ordinary(draw: Draw) -> Scene:
+    """A scene of the paper's kind with numbers over ten decades, with or without the loop and its effects."""
     size, speed = draw.decades(-3.0, 1.0), draw.decades(-3.0, 2.0)
     sections: dict[str, dict[str, Any]] = {}
     slowest = 0.0
@@ -72,7 +66,7 @@ def draw_scene(numbers: Sequence[float]) -> Scene:
         _take_losses(sections)
     if draw.chance(0.3):
         _add_effects(draw, sections, speed**2 / size)
-    return scenes.compose("drawn", sections)
+    return scenes.compose("drawn", sections, title="ordinary")
 
 
 def _add_loop(draw: Draw, sections: dict[str, dict[str, Any]], seconds: float) -> None:

@@ -2,36 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import cache, partial
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, FORCE, LEFT, OBJECT, RIGHT, Transition, Work
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene import PAPER, Scene
+from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
-from grasp_ros.verification.cases.case import Product
-from grasp_ros.verification.cases.loops import residual
-from grasp_ros.verification.cases.scenes import reference
-from grasp_ros.verification.deadline import Deadline, deadline
-from grasp_ros.verification.oracles import balance
-from grasp_ros.verification.relations import FLIP, SWAPPED, mirrored, scaled, started
+from grasp_ros.verification.cases.case import Product, Unfinished
+from grasp_ros.verification.companions import mirror, short_periods, units
+from grasp_ros.verification.motion import ledgers
+from grasp_ros.verification.replay import findings
+from grasp_ros.verification.restarts import digits, reversal, splitting
+from grasp_ros.verification.roundings import DIED_OUT
+from grasp_ros.verification.segments import Detail, detail, grid_of, pieces_of, rule
 
-POINTS = 201
 MOST_EVENTS = 2000
-RISE = 1e-12  # of the largest V_c so far: what rounding may add
-BALANCED = 1e-12, 1e-10  # momentum and energy at the default accuracy
-MOST_WORK = 300_000  # a squeezed contact relaxes p H u^(3/2) t / m times, and each time takes a few steps
-FINEST = 128  # parts between two events
-SPLIT = 1e-13  # per event
-WORK_STEPS = 20_000  # contact steps beyond which the slow properties are left out
-REFERENCE_STEPS = 100  # those beyond which the reference, which counts in 25 digits, takes too long
-REFERENCE_SECONDS = 3.0
-UNDERFLOW = 1e-200  # what has died out so far loses digits, in other units others
+MOST_WORK = 10_000  # of a run
+CHEAP = 3_000  # work beyond which the relations that need more runs are left out
+OUTPUTS = 201  # of a run that stalls
+LIMIT = 100.0  # units of rounding
+REFINED = 8  # parts of a piece, where its balance fails: is it the quadrature?
+SPLIT, SHORT = 4, 50  # every how many scenes a run is started anew, and compared with short control periods
+FALLS = 0.5  # part of the distance that may be left at a sixteenth of the period
 
 
 class Check(NamedTuple):
@@ -40,6 +41,7 @@ class Check(NamedTuple):
     name: str
     error: float
     bound: float
+    skipped: int = 0  # pieces that the quadrature does not resolve
 
     @property
     def holds(self) -> bool:
@@ -47,48 +49,130 @@ class Check(NamedTuple):
         return self.error <= self.bound
 
 
-def checks(scene: Scene, compare: bool = False) -> list[Check]:
-    """All properties that can be checked for a scene.
+class Examination(NamedTuple):
+    """What became of a scene."""
+
+    end: str  # the status of its run
+    checks: list[Check]
+
+    @property
+    def broken(self) -> list[Check]:
+        """Properties that do not hold."""
+        return [check for check in self.checks if not check.holds]
+
+
+def examine(scene: Scene, every: bool = True, max_work: int = MOST_WORK, compare: bool = False
+            ) -> Examination:
+    """Run a scene and check all properties that can be checked for it.
 
     Parameters
     ----------
     scene : Scene
+    every : bool
+        Also those that take more runs and are not worth it for each of many scenes.
+    max_work : int
+        Budget of each run.
     compare : bool
-        Also compare it with the reference, if that takes no longer than some seconds.
-
-    Raises
-    ------
-    Unfinished
-        If the run ends with another status than DONE: that is an answer, not a failure.
+        Also with the reference, if that takes no longer than some seconds.
     """
-    product = _product()
-    if scene.sampled:
-        run = product.run(scene, sampled=True)
-        return [*_states(run), Check("work", residual(run), 1.0)]
-    run = product.run(scene, np.linspace(0.0, scene.duration, POINTS))
-    found = [*_states(run), *_certificate(run)]
-    if run.work[Work.CONTACT_STEPS] < WORK_STEPS:
-        found += _relations(scene, run)
-    if scene.values.keys() != PAPER or _pushed(scene):
-        return found
-    growth = cache(partial(sensitivity, scene, run))  # two more runs, for up to three properties
-    if run.work[Work.CONTACT_STEPS] < WORK_STEPS:
-        found += [*_splitting(scene, run, growth), *_backwards(scene, run, growth), *_balances(scene, run)]
-    if compare and run.work[Work.CONTACT_STEPS] < REFERENCE_STEPS:
-        found += _reference(scene, run, growth)
-    return found
+    product = Product(MOST_EVENTS, max_work)
+    with np.errstate(over="ignore", invalid="ignore", under="ignore", divide="ignore"):
+        try:
+            first = product.run(scene, None if scene.sampled else [0.0, scene.duration])
+        except Unfinished:
+            run = product.runs[-1]
+            return Examination(run.status.value, [_end(run, product)])
+        return Examination(first.status.value, list(_checks(first, product, every, compare)))
 
 
-def _pushed(scene: Scene) -> bool:
-    """Whether constant or external forces act."""
-    return bool(scene.system.external) or bool(scene.system.closed_loop[:, FORCE].any())
+def _end(run: Trajectory, product: Product) -> Check:
+    """Whether a run may end like this: out of budget, or stalled where a motion has died out."""
+    error = float(run.status in (Status.STALLED, Status.ENERGY_RISES))
+    if run.status is Status.STALLED:
+        with suppress(Unfinished):
+            product.run(run.scene, np.linspace(0.0, run.scene.duration, OUTPUTS), run.sampled)
+        error = float(_smallest(product.runs[-1]) > DIED_OUT)
+    if run.status is Status.NOT_FINITE and not run.sampled:
+        error = 1.0
+    return Check(f"ends {run.status.name}", error, 0.0)
 
 
-def _product() -> Product:
-    return Product(MOST_EVENTS, MOST_WORK)
+def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
+    close = look(first, 1, product)
+    run = close.run
+    same = np.array_equal(first.event_table, run.event_table)
+    same &= np.array_equal(np.nan_to_num(first.state[-1]), np.nan_to_num(run.state[-1]))
+    yield Check("grid independence", float(not same), 0.0)
+    yield from states(run)
+    if first.sampled:
+        yield Check("held inputs", _held(first), 0.0)
+    yield from _balances(close, product)
+    for finding in findings(close):
+        yield Check(finding.name, finding.error, LIMIT)
+    spent = int(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] + run.work[Work.ROOT_ITERATIONS])
+    if spent <= CHEAP:
+        yield from _companions(close, first, product, every, compare)
 
 
-def _states(run: Trajectory) -> list[Check]:
+def _companions(close: Detail, first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
+    """What takes more runs; one that ends as no run may is a failure, too."""
+    part = zlib.crc32(close.run.state[-1].tobytes()) / 2**32
+    relations: list[tuple[int, Callable[[], Iterator[tuple[str, float]]], float]] = [
+        (1, partial(mirror, first, product), 0.0),
+        (1, partial(units, first, product, _smallest(close.run)), 0.0),
+        (SPLIT, partial(splitting, close, part * SPLIT % 1.0, product), LIMIT),
+        (SPLIT, partial(reversal, first, product), LIMIT),
+        (SHORT, partial(short_periods, first, product), FALLS),
+    ]
+    if compare:
+        relations.append((1, partial(digits, first, product), LIMIT))
+    for rarely, relation, bound in relations:
+        if not every and part * rarely >= 1.0:
+            continue
+        try:
+            for name, error in relation():
+                yield Check(name, error, bound)
+        except Unfinished:
+            yield _end(product.runs[-1], product)
+
+
+def _smallest(run: Trajectory) -> float:
+    """The smallest number that is not 0 in states and differences, in m or m/s."""
+    numbers = np.abs(np.nan_to_num(np.concatenate([run.state.ravel(), *penetration(run.state)])))
+    return float(numbers[numbers > 0.0].min(initial=np.inf))
+
+
+def look(run: Trajectory, parts: int, product: Product) -> Detail:
+    """The same run with outputs at the nodes of its pieces."""
+    pieces, table = pieces_of(run), rule(parts)
+    grid = grid_of(pieces, table)
+    again = product.run(run.scene, np.append(grid.ravel(), run.scene.duration))
+    return detail(again, pieces, table, grid)
+
+
+def _held(run: Trajectory) -> float:
+    """Number of ticks at which other inputs acted than the laws answer to the states, late by the delay."""
+    system, states = run.scene.system, np.nan_to_num(run.state)
+    answers = [np.zeros(3)] * system.delay + [system.commands(tick, state) for tick, state in enumerate(states[:-1])]
+    wanted = [answers[tick] + system.external_at(tick) for tick in range(len(states) - 1)]
+    return float(np.count_nonzero((np.array(wanted) != run.inputs[:-1]).any(axis=1)))
+
+
+def _balances(close: Detail, product: Product) -> Iterator[Check]:
+    """Equations of motion and energy; a failure counts if a finer quadrature finds it, too."""
+    finer: dict[str, Array] | None = None
+    for ledger in ledgers(close):
+        error = np.where(ledger.resolved, ledger.error, 0.0)
+        skipped = int(np.count_nonzero(~ledger.resolved))
+        if not error.max(initial=0.0) <= LIMIT:
+            if finer is None:
+                finer = {entry.name: np.where(entry.resolved, entry.error, 0.0)
+                         for entry in ledgers(look(close.run, REFINED, product))}
+            error = np.where(finer[ledger.name] <= LIMIT, np.minimum(error, finer[ledger.name]), error)
+        yield Check(ledger.name, float(error.max(initial=0.0)), LIMIT, skipped)
+
+
+def states(run: Trajectory) -> list[Check]:
     """Finite, all there, forces never negative, events in order and alternating."""
     system = run.scene.system
     u_l, d_l, u_r, d_r = penetration(run.state)
@@ -116,104 +200,3 @@ def _may_follow(before: Transition, after: Transition) -> bool:
         Transition.STICK: (Transition.SLIP,), Transition.SLIP: (Transition.STICK,),
     }
     return after in allowed[before]
-
-
-def _certificate(run: Trajectory) -> list[Check]:
-    """V_c never rises; where constant forces shift its zero, or external ones work, the integrator checks."""
-    if _pushed(run.scene):
-        return []
-    V_c = run.energy.V_c
-    size = np.maximum.accumulate(V_c)[:-1]
-    rise = np.diff(V_c) / np.where(size > 0.0, size, 1.0)
-    return [Check("V_c", float(rise.max()), RISE)]
-
-
-def sensitivity(scene: Scene, run: Trajectory) -> float:
-    """How much a change of the start by 1e-10 of its size has become at the end, at least 1."""
-    state = scene.initial_state
-    size = _sizes(run.state)
-    product = _product()
-    worst = 1.0
-    for sign in (1.0, -1.0):
-        moved = started(scene, state + sign * 1e-10 * size * np.array([1.0, -0.7, 0.4, 0.9, -1.0, 0.6]))
-        end = product.states(moved, [scene.duration])[0]
-        worst = max(worst, float((np.abs(end - run.state[-1]) / size).max() / 1e-10))
-    return worst
-
-
-def _sizes(states: Array) -> Array:
-    """Scale of each column: the largest position and the largest speed."""
-    place, speed = np.abs(states[:, ::2]).max(), np.abs(states[:, 1::2]).max()
-    return np.array([place or 1.0, speed or 1.0] * 3)
-
-
-def _relations(scene: Scene, run: Trajectory) -> list[Check]:
-    """Mirror and units, bit for bit."""
-    product = _product()
-    end = [scene.duration]
-    last = np.nan_to_num(run.state[-1])
-    image = np.nan_to_num(product.states(mirrored(scene), end)[0])
-    units = np.nan_to_num(product.states(scaled(scene, 4.0, 2.0, 0.5), [2.0 * scene.duration])[0])
-    found = [Check("mirror", float(np.abs(last + image[SWAPPED]).max()), 0.0)]
-    moving = np.abs(run.state[run.state != 0.0])
-    if not moving.min(initial=np.inf) < UNDERFLOW:
-        found.append(Check("units", float(np.abs(last * np.array([4.0, 2.0] * 3) - units).max()), 0.0))
-    return found
-
-
-def _divergence(run: Trajectory) -> float:
-    """What rounding at every event may come to before the scene amplifies it."""
-    return SPLIT * (1 + len(run.event_table))
-
-
-def _splitting(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
-    """Two horizons like one, as far as neither the start nor the middle is forgotten."""
-    half = round(scene.duration / 2.0, 9)
-    if not 1e-8 < half < 500.0:
-        return []
-    product = _product()
-    first, rest = (scene.changed({"time.duration_s": part, "time.control_period_s": part})
-                   for part in (half, round(scene.duration - half, 9)))
-    rest = started(rest, product.states(first, [half])[0])
-    again = product.run(rest, [rest.duration])
-    error = float((np.abs(again.state[-1] - run.state[-1]) / _sizes(run.state)).max())
-    return [Check("splitting", error, _divergence(run) * max(growth(), sensitivity(rest, again)))]
-
-
-def _backwards(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
-    """A motion without losses, run backwards, ends where it began."""
-    bodies, pairs = scene.system.closed_loop, scene.system.pairs
-    if bodies[:, DAMPING].any() or pairs[:, DISSIPATION].any():
-        return []
-    back = started(scene, run.state[-1] * FLIP)
-    way = _product().run(back, [back.duration])
-    error = float((np.abs(way.state[-1] * FLIP - scene.initial_state) / _sizes(run.state)).max())
-    return [Check("time reversal", error, _divergence(run) * max(growth(), sensitivity(back, way)))]
-
-
-def _reference(scene: Scene, run: Trajectory, growth: Callable[[], float]) -> list[Check]:
-    """The end by another method, in 25 digits."""
-    try:
-        with deadline(REFERENCE_SECONDS):
-            expected = reference(scene, [0.0, scene.duration])[-1]
-    except (Deadline, RuntimeError):
-        return []
-    error = float((np.abs(run.state[-1] - expected) / _sizes(run.state)).max())
-    return [Check("reference", error, _divergence(run) * growth())]
-
-
-def _balances(scene: Scene, run: Trajectory) -> list[Check]:
-    """Momentum and energy, where the quadrature between the events converges: that of fast swings does not."""
-    times = run.event_table[:, 0].tolist()
-    before: Array | None = None
-    for parts in (8, 32, FINEST):
-        if len(times) * parts > 10_000:
-            return []
-        product = _product()
-        book = balance(scene.system, scene.duration, times, partial(product.states, scene), parts)
-        now = np.array([np.abs(book.momentum).max(), np.abs(book.energy).max()])
-        agreed = before is not None and bool((np.abs(now - before) <= 0.1 * np.array(BALANCED)).all())
-        if (now <= BALANCED).all() or (parts == FINEST and agreed):
-            return [Check("momentum", float(now[0]), BALANCED[0]), Check("energy", float(now[1]), BALANCED[1])]
-        before = now
-    return []

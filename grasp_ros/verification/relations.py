@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -25,13 +26,18 @@ OTHER_SIDE = {LEFT: RIGHT, RIGHT: LEFT, OBJECT: OBJECT}
 
 def mirrored(scene: Scene) -> Scene:
     """The scene seen from the other side."""
-    values: dict[str, dict[str, float]] = {}
+    values: dict[str, dict[str, Any]] = {}
     for section, numbers in scene.values.items():
         side, _, rest = section.partition("_")
         values[f"{PAIRED[side]}_{rest}" if side in PAIRED else section] = {
-            key: -value if key in DIRECTED else value for key, value in numbers.items()
+            key: _times(value, -1.0) if key in DIRECTED else value for key, value in numbers.items()
         }
     return scenes.compose(scene.name, values)
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A number or a table of them, times a factor."""
+    return [factor * number for number in value] if isinstance(value, tuple) else factor * value
 
 
 def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
@@ -44,10 +50,12 @@ def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
         "dissipation_s_per_m": time / length, "duration_s": time, "control_period_s": time,
         "set_point_m": length, "feed_forward_N": force, "force_N": force, "coulomb_N": force,
         "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
-        "gravity_m_per_s2": length / time**2,
+        "gravity_m_per_s2": length / time**2, "time_s": time, "amplitude_N": force, "frequency_Hz": 1.0 / time,
+        "phase_rad": 1.0, "limit_N": force, "position_noise_m": length, "velocity_noise_m_per_s": length / time,
+        "position_step_m": length, "velocity_step_m_per_s": length / time,
     }
     return scenes.compose(scene.name, {
-        section: {key: value * factors[key] for key, value in numbers.items()}
+        section: {key: _times(value, factors[key]) if key in factors else value for key, value in numbers.items()}
         for section, numbers in scene.values.items()
     })
 

@@ -113,6 +113,8 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("study hard -o list", "list: cannot be read: Is a directory"),
         ("study fuzz --seconds nan", "--seconds nan is not allowed"),
         ("study fuzz --seed -1", "--seed -1 is not allowed"),
+        ("study fuzz --draws 0", "--draws 0 is not allowed"),
+        ("study fuzz --jobs 0", "--jobs 0 is not allowed"),
         ("study graph nothing", "nothing: no such scene"),
     ],
 )

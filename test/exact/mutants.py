@@ -1,9 +1,9 @@
 """Mutation check of the automaton: `python test/exact/mutants.py [part of a name]`, some minutes.
 
-Deletes or negates every branch of `grasp_ros.exact.modes` in turn, drops every operand of an `and` or `or`, one side of
-every loop over both sides, and every statement that calls or stores something. A test of test_modes.py must fail for
-each of these mutants, but for those that do what the original does; they are listed with the reason. Everything
-runs uncompiled, each mutant in a fork.
+Deletes or negates every branch of `grasp_ros.exact.modes` and `rest` in turn, drops every operand of an `and` or `or`,
+one side of every loop over both sides, and every statement that calls or stores something. A test of test_modes.py, or
+test_rest.py, must fail for each of these mutants, but for those that do what the original does; they are listed with
+the reason. Everything runs uncompiled, each mutant in a fork.
 """
 
 from __future__ import annotations
@@ -19,30 +19,28 @@ from pathlib import Path
 os.environ["NUMBA_DISABLE_JIT"] = "1"
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-TESTS = Path(__file__).parent / "test_modes.py"
-MODULE = "grasp_ros.exact.modes"
-EQUIVALENT = {
-    "close_resting_pair: drop y[U_L + side] == 0.0: "
-    "mode[side] == Pair.OPEN and y[U_L + side] == 0.0 and (approach(y, side) == 0.0)":
-        "an open pair has u <= 0, and `mode_of` calls u < 0 open; said because it is the rule",
+ROOM = "grasp_ros.exact"
+MODULES = ("modes", "rest")
+EQUIVALENT: dict[str, str] = {
+    "settle_resting: delete branch: if not (waits_l or waits_r):": "without a pair that waits nothing changes",
 }
 
 
 class Mutant:
-    """A changed tree, and what was changed."""
+    """A changed tree of a module, and what was changed."""
 
-    def __init__(self, name: str, tree: ast.Module) -> None:
-        self.name, self.tree = name, tree
+    def __init__(self, module: str, name: str, tree: ast.Module) -> None:
+        self.module, self.name, self.tree = module, name, tree
 
 
-def mutants(source: str) -> Iterator[Mutant]:
-    """All mutants of a source."""
+def mutants(module: str, source: str) -> Iterator[Mutant]:
+    """All mutants of a module's source."""
     tree = ast.parse(source)
     for function in (node for node in tree.body if isinstance(node, ast.FunctionDef)):
         for node in ast.walk(function):
             for change, replacement in changes(node):
                 name = f"{function.name}: {change}: {ast.unparse(node).splitlines()[0]}"
-                yield Mutant(name, replaced(tree, node, replacement))
+                yield Mutant(module, name, replaced(tree, node, replacement))
 
 
 def changes(node: ast.AST) -> Iterator[tuple[str, ast.AST]]:
@@ -97,13 +95,15 @@ def run_tests(mutant: Mutant) -> int:
     """Run the tests on a mutant; returns pytest's exit status."""
     import pytest
 
-    module = types.ModuleType(MODULE)
-    exec(compile(mutant.tree, MODULE, "exec"), module.__dict__)
-    sys.modules[MODULE] = module
+    name = f"{ROOM}.{mutant.module}"
+    module = types.ModuleType(name)
+    exec(compile(mutant.tree, name, "exec"), module.__dict__)
+    sys.modules[name] = module
+    tests = Path(__file__).parent / f"test_{mutant.module}.py"
     with open(os.devnull, "w") as nowhere:
         os.dup2(nowhere.fileno(), 1)
         os.dup2(nowhere.fileno(), 2)
-    return int(pytest.main(["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore", str(TESTS)]))
+    return int(pytest.main(["-x", "-q", "-m", "not slow", "-p", "no:cacheprovider", "-W", "ignore", str(tests)]))
 
 
 def main() -> int:
@@ -113,12 +113,15 @@ def main() -> int:
 
     from grasp_ros.exact import modes
 
-    source = Path(modes.__file__).read_text()
-    assert survives(Mutant("none", ast.parse(source))), "the tests fail without any mutation"
-    found = [mutant for mutant in mutants(source) if not sys.argv[1:] or sys.argv[1] in mutant.name]
-    alive = [mutant.name for mutant in found if survives(mutant)]
-    for name in alive:
-        print(f"survives: {name}\n    {EQUIVALENT.get(name, 'NOT EXPECTED')}")
+    found: list[Mutant] = []
+    for module in MODULES:
+        source = Path(modes.__file__).with_name(f"{module}.py").read_text()
+        assert survives(Mutant(module, "none", ast.parse(source))), f"the tests of {module} fail without any mutation"
+        found += [mutant for mutant in mutants(module, source) if not sys.argv[1:] or sys.argv[1] in mutant.name]
+    alive = []
+    for mutant in filter(survives, found):
+        alive.append(mutant.name)
+        print(f"survives: {mutant.name}\n    {EQUIVALENT.get(mutant.name, 'NOT EXPECTED')}", flush=True)
     for name in EQUIVALENT.keys() - set(alive):
         print(f"listed as equivalent, but killed or gone: {name}")
     print(f"{len(found)} mutants, {len(found) - len(alive)} killed, {len(alive)} survive, {len(EQUIVALENT)} equivalent")

@@ -6,28 +6,27 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
-from exact.bench import Bench, bench, bits
+from exact.bench import TOLERANCE, Bench, bench, bits
 
-from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.kinematics import is_closed, is_resting, other
 from grasp_ros.exact.modes import (
+    LEFT_OUT,
     begin_interval,
-    close_resting_pair,
-    end_ballistic,
     initial_modes,
     initial_slide,
-    is_ballistic,
-    leaning,
-    leave_corner,
+    leave_together,
     make_slide_transition,
     make_transition,
     make_transitions,
     mode_of,
+    settle_resting,
+    surface_side,
 )
 from grasp_ros.exact.records import Candidate, SlideCandidate
-from grasp_ros.exact.scales import scales, sliver
 from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, U_L, V_O, Body, Pair, Slide, Transition
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
@@ -69,12 +68,15 @@ def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float
 
 @SIDES
 @pytest.mark.parametrize("d", [0.0, -1e-9])
-def test_a_touch_that_rounding_invents_is_no_event(side: Body, d: float) -> None:
-    b = bench(side, 1e-17, d)
+def test_a_touch_whose_speed_is_lost_to_rounding_makes_a_pair_at_rest(side: Body, d: float) -> None:
+    b = bench(side, 1e-17, d, object_speed=0.3, push=1.0)
     make_transition(b.state, side, Transition.TOUCH, b.out)
     assert b.mode(side) is Pair.OPEN
-    assert b.state.y[U_L + side] == 0.0
+    assert is_resting(b.state.y, side)
+    assert abs(b.state.y[V_O]) == 0.3
     assert b.events == []
+    settle_resting(b.plant, b.state, b.out)
+    assert b.events == [(side, Transition.TOUCH)]
 
 
 def now(b: Bench, left: float, right: float, slide: float) -> Bench:
@@ -110,7 +112,7 @@ def test_events_within_a_few_roundings_happen_together_and_others_do_not() -> No
         (-5e-324, 0.4, 0.5, Pair.OPEN),
         (1e-3, 5.0, 0.5, Pair.CONTACT),
         (1e-3, -1.9, 0.5, Pair.CONTACT),
-        (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p exactly belongs to the contact, (10)
+        (1e-3, -2.0, 0.5, Pair.CONTACT),  # u' = -1/p for ever belongs to the contact, (10)
         (1e-3, -2.0000001, 0.5, Pair.CLAMPED),
         (1e-3, -1e9, 0.0, Pair.CONTACT),  # p = 0: there is no second surface
         (0.0, 0.4, 0.5, Pair.CONTACT),
@@ -121,7 +123,7 @@ def test_events_within_a_few_roundings_happen_together_and_others_do_not() -> No
 def test_the_mode_follows_from_the_state(side: Body, u: float, d: float, p: float, expected: Pair) -> None:
     for beside_mode in (Pair.OPEN, Pair.CONTACT):
         b = bench(side, u, d, p=p, beside_mode=beside_mode)
-        assert mode_of(b.plant, b.state, b.settings, side) is expected
+        assert mode_of(b.plant, b.state, side) is expected
 
 
 @SIDES
@@ -129,64 +131,111 @@ def test_a_pair_without_contact_is_absent(side: Body) -> None:
     for u in (-0.1, 0.0, 0.1):
         b = bench(side, u, 0.0, push=1.0, beside_mode=Pair.CONTACT)
         b.plant.pairs[side] = 0.0
-        assert mode_of(b.plant, b.state, b.settings, side) is Pair.ABSENT
+        assert mode_of(b.plant, b.state, side) is Pair.ABSENT
+
+
+PRESSING = {"beside": (0.01, 0.0), "beside_mode": Pair.CONTACT}  # 10 N towards the pair, by the other one
 
 
 @SIDES
 @pytest.mark.parametrize(
-    ("push", "object_push", "beside_contact", "expected"),
+    ("speed", "options", "expected"),
     [
-        (1.0, 0.0, False, Pair.BALLISTIC),  # pressed together
-        (1.0, 0.5, False, Pair.BALLISTIC),
-        (0.0, -1.0, False, Pair.BALLISTIC),
-        (-1.0, 0.0, False, Pair.OPEN),  # pulled apart
-        (-1.0, 0.0, True, Pair.OPEN),
-        (0.5, 1.0, True, Pair.OPEN),
-        (1.0, 1.0, False, Pair.OPEN),  # both alike: it follows the other pair
-        (1.0, 1.0, True, Pair.BALLISTIC),
-        (0.0, 0.0, False, Pair.OPEN),
-        (0.0, 0.0, True, Pair.BALLISTIC),
+        (-2.0, {"push": 1.0}, Pair.CONTACT),
+        (-2.0, {"push": -1.0}, Pair.CLAMPED),
+        (-2.0, {"push": 1.0, "object_push": 2.0}, Pair.CLAMPED),
+        (-2.0, {"push": -1.0, **PRESSING}, Pair.CONTACT),
+        (-2.0, {"push": -11.0, **PRESSING}, Pair.CLAMPED),
+        (math.nextafter(-2.0, 0.0), {"push": -1.0}, Pair.CLAMPED),  # within rounding the speed decides nothing
+        (math.nextafter(-2.0, -9.0), {"push": 1.0}, Pair.CONTACT),
+        (-2.0 + 1e-14, {"push": -1.0}, Pair.CONTACT),
+        (-2.0 - 1e-14, {"push": 1.0}, Pair.CLAMPED),
     ],
 )
-def test_at_rest_at_zero_the_first_derivative_that_differs_decides(
-    side: Body, push: float, object_push: float, beside_contact: bool, expected: Pair
+def test_on_the_surface_what_moves_u_rate_decides(
+    side: Body, speed: float, options: dict[str, Any], expected: Pair
 ) -> None:
-    beside_mode = Pair.CONTACT if beside_contact else Pair.CLAMPED
-    b = bench(side, 0.0, 0.0, push=push, object_push=object_push, beside_mode=beside_mode)
-    assert mode_of(b.plant, b.state, b.settings, side) is expected
+    b = bench(side, 0.01, speed, **options)
+    assert mode_of(b.plant, b.state, side) is expected
+    if math.isclose(speed, -2.0, rel_tol=1e-15):
+        assert (surface_side(b.plant, b.state, side) >= 0.0) == (expected is Pair.CONTACT)
+
+
+def test_the_rounding_on_the_surface_is_that_of_the_velocities() -> None:
+    """Both bodies at 1e6 m/s: u' = -2 m/s has an error of 1e-10."""
+    b = bench(LEFT, 0.01, -2.0 + 1e-10, push=-1.0, object_speed=1e6)
+    assert mode_of(b.plant, b.state, LEFT) is Pair.CLAMPED
 
 
 @SIDES
-def test_leaning_is_what_u_will_be_and_nothing_within_rounding(side: Body) -> None:
-    t = 1.0  # nothing sets a rate
-    assert leaning(*lean_arguments(bench(side, 0.0, 0.0, push=2.0, object_push=0.5), side)) == pytest.approx(0.75 * t)
-    assert leaning(*lean_arguments(bench(side, 0.0, 0.0, push=0.5, object_push=2.0), side)) == pytest.approx(-0.75 * t)
-    assert leaning(*lean_arguments(bench(side, 0.0, 0.0, push=1.0, object_push=1.0 + 4e-16), side)) == 0.0
-    assert leaning(*lean_arguments(bench(side, 0.0, 0.0, push=1.0, object_push=1.0 + 4e-15), side)) < 0.0
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ({"push": 1.0}, Pair.CONTACT),  # pressed together
+        ({"push": 1.0, "object_push": 0.5}, Pair.CONTACT),
+        ({"object_push": -1.0}, Pair.CONTACT),
+        ({"push": -1.0}, Pair.OPEN),  # pulled apart
+        ({"push": 0.5, "object_push": 1.0}, Pair.OPEN),
+        ({}, Pair.RESTING),  # nothing differs
+        ({"push": 1.0, "object_push": 1.0}, Pair.RESTING),
+        ({"object_speed": 0.3, "stiffness": 2.0}, Pair.OPEN),  # order 3: the spring brakes the arm
+        ({"object_speed": -0.3, "stiffness": 2.0}, Pair.CONTACT),
+        ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0}, Pair.OPEN),  # order 4
+        ({"push": -1.0, "object_push": -1.0, "stiffness": 2.0}, Pair.CONTACT),
+        ({**PRESSING}, Pair.CONTACT),  # the other pair presses with 10 N
+        ({"push": -9.0, **PRESSING}, Pair.CONTACT),
+        ({"push": -11.0, **PRESSING}, Pair.OPEN),
+        ({"push": -10.0, "p": 0.0, "beside": (0.01, 0.2), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # ever more
+        ({"push": -10.0, "p": 0.0, "beside": (0.01, -0.2), "beside_mode": Pair.CONTACT}, Pair.OPEN),
+        ({"beside": (0.01, -9.0), "beside_mode": Pair.CLAMPED}, Pair.RESTING),  # no force
+        ({"beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.CONTACT),  # it has just touched: order 3.5
+        ({"push": -1.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),  # order 2 comes before
+        ({"object_speed": 0.3, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT}, Pair.OPEN),
+        ({"push": 1.0, "object_push": 1.0, "stiffness": 2.0, "beside": (0.0, 0.3), "beside_mode": Pair.CONTACT},
+         Pair.CONTACT),  # order 4 comes after
+    ],
+)
+def test_at_rest_at_zero_the_first_derivative_that_differs_decides(
+    side: Body, options: dict[str, Any], expected: Pair
+) -> None:
+    b = bench(side, 0.0, 0.0, **options)
+    assert mode_of(b.plant, b.state, side) is expected
 
 
-def lean_arguments(b: Bench, side: Body) -> tuple[object, ...]:
-    """What `leaning` takes."""
-    return b.plant, b.state.y, b.settings, side
+@SIDES
+def test_a_pair_at_rest_on_a_stuck_object_feels_its_own_arm_alone(side: Body) -> None:
+    for push, expected in ((1.0, Pair.CONTACT), (-1.0, Pair.OPEN), (0.0, Pair.RESTING)):
+        b = bench(side, 0.0, 0.0, push=push, slide=Slide.STUCK, **PRESSING)
+        b.plant.bodies[OBJECT, MASS], b.plant.bodies[OBJECT, FORCE] = math.inf, 0.0
+        assert mode_of(b.plant, b.state, side) is expected
 
 
 @SIDES
 def test_initial_modes_of_a_chain(side: Body) -> None:
     """A pair at rest at u = 0 on which nothing acts follows the other one, whichever side is judged first."""
     for rate, beside, expected in (
-        (0.4, Pair.CONTACT, Pair.BALLISTIC), (-0.4, Pair.OPEN, Pair.OPEN), (0.0, Pair.OPEN, Pair.OPEN)
+        (0.4, Pair.CONTACT, Pair.CONTACT), (-0.4, Pair.OPEN, Pair.RESTING), (0.0, Pair.RESTING, Pair.RESTING)
     ):
         b = bench(side, 0.0, 0.0, beside=(0.0, rate))
-        b.state.y[V_O] = 0.0
-        initial_modes(b.plant, b.state, b.settings)
+        initial_modes(b.plant, b.state)
         assert (b.mode(side), b.mode(other(side))) == (expected, beside)
+
+
+@SIDES
+def test_initial_modes_of_a_pair_that_is_pressed_against_a_resting_one(side: Body) -> None:
+    b = bench(side, 0.0, 0.0, beside=(0.0, 0.0), push=1.0)
+    initial_modes(b.plant, b.state)
+    assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CONTACT)
+    b = bench(side, 0.0, 0.0, beside=(0.0, 0.0), push=-1.0)
+    initial_modes(b.plant, b.state)
+    assert (b.mode(side), b.mode(other(side))) == (Pair.OPEN, Pair.RESTING)
 
 
 @SIDES
 def test_initial_modes_leave_a_decided_pair_alone(side: Body) -> None:
     for u, d, expected in ((-0.1, 0.0, Pair.OPEN), (0.1, 0.0, Pair.CONTACT), (0.1, -9.0, Pair.CLAMPED)):
         b = bench(side, u, d, beside=(0.05, 0.2))
-        initial_modes(b.plant, b.state, b.settings)
+        initial_modes(b.plant, b.state)
         assert (b.mode(side), b.mode(other(side))) == (expected, Pair.CONTACT)
 
 
@@ -199,14 +248,15 @@ def test_initial_modes_leave_a_decided_pair_alone(side: Body) -> None:
     [
         (0.1, 0.0, Slide.RIGHTWARD), (0.1, -9.0, Slide.RIGHTWARD), (-0.1, 0.0, Slide.LEFTWARD),
         (0.0, 0.0, Slide.STUCK), (0.0, 5.0, Slide.STUCK), (0.0, -5.0, Slide.STUCK),
-        (0.0, 5.1, Slide.RIGHTWARD), (0.0, -5.1, Slide.LEFTWARD),
+        (0.0, 5.0 + 1e-14, Slide.STUCK), (0.0, -5.0 - 1e-14, Slide.STUCK),  # within rounding
+        (0.0, 5.0 + 1e-12, Slide.RIGHTWARD), (0.0, -5.0 - 1e-12, Slide.LEFTWARD),
     ],
 )
 def test_the_slide_follows_from_the_state(side: Body, speed: float, push: float, expected: Slide) -> None:
     b = bench(side, -1.0, 0.0, coulomb=5.0, object_speed=speed, object_push=push)
     initial_slide(b.plant, b.state)
     assert b.slide is toward(side, expected) if expected is not Slide.STUCK else b.slide is Slide.STUCK
-    sign = 1.0 if side == LEFT else -1.0
+    sign = 1.0 if side == LEFT else -1.0  # to the right
     friction = {Slide.RIGHTWARD: -5.0, Slide.LEFTWARD: 5.0}
     mass, force = (math.inf, 0.0) if expected is Slide.STUCK else (1.0, sign * (push + friction[expected]))
     assert (b.plant.bodies[OBJECT, MASS], b.plant.bodies[OBJECT, FORCE]) == (mass, force)
@@ -267,15 +317,16 @@ def test_an_object_that_turns_without_a_rest_is_no_event(side: Body) -> None:
 
 
 def begin(b: Bench) -> Bench:
-    """Begin an interval."""
+    """Begin an interval, as far as its first segment."""
     begin_interval(b.plant, b.state, b.settings, b.out)
+    settle_resting(b.plant, b.state, b.out)
     return b
 
 
 @SIDES
 def test_a_run_that_starts_gets_its_modes_without_events(side: Body) -> None:
     b = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside=(0.01, 0.0), beside_mode=Pair.UNKNOWN, push=1.0, coulomb=50.0))
-    assert (b.mode(side), b.mode(other(side)), b.slide) == (Pair.BALLISTIC, Pair.CONTACT, Slide.STUCK)
+    assert (b.mode(side), b.mode(other(side)), b.slide) == (Pair.CONTACT, Pair.CONTACT, Slide.STUCK)
     assert b.events == []
 
 
@@ -290,8 +341,16 @@ def test_a_pair_at_rest_starts_as_friction_lets_it(side: Body) -> None:
     options = {"push": 1.0, "object_push": 2.0}
     free = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, **options))
     held = begin(bench(side, 0.0, 0.0, Pair.UNKNOWN, beside_mode=Pair.UNKNOWN, coulomb=5.0, **options))
-    assert (free.mode(side), held.mode(side)) == (Pair.OPEN, Pair.BALLISTIC)
+    assert (free.mode(side), held.mode(side)) == (Pair.OPEN, Pair.CONTACT)
     assert free.events == held.events == []
+
+
+@SIDES
+def test_a_pair_on_the_surface_starts_as_friction_lets_it(side: Body) -> None:
+    """u' = -1/p: an object that slides with the pull of 2 N leaves the arm behind, against friction it does not."""
+    options = {"object_push": 2.0, "object_speed": 1.0, "beside_mode": Pair.UNKNOWN}
+    assert begin(bench(side, 0.01, -2.0, Pair.UNKNOWN, **options)).mode(side) is Pair.CLAMPED
+    assert begin(bench(side, 0.01, -2.0, Pair.UNKNOWN, coulomb=5.0, **options)).mode(side) is Pair.CONTACT
 
 
 @SIDES
@@ -302,11 +361,39 @@ def test_an_object_starts_to_slide_if_an_impact_pushes_it(side: Body) -> None:
 
 
 @SIDES
-def test_a_resting_pair_touches_when_an_input_begins_to_press(side: Body) -> None:
-    b = begin(bench(side, 0.0, 0.0, push=1.0))
-    assert b.mode(side) is Pair.BALLISTIC
+@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.RESTING])
+def test_a_resting_pair_touches_when_an_input_begins_to_press(side: Body, mode: Pair) -> None:
+    b = begin(bench(side, 0.0, 0.0, mode, push=1.0))
+    assert b.mode(side) is Pair.CONTACT
     assert b.events == [(side, Transition.TOUCH)]
-    assert begin(bench(side, 0.0, 0.0, push=-1.0)).events == []
+    for push, expected in ((0.0, Pair.RESTING), (-1.0, Pair.OPEN)):
+        b = begin(bench(side, 0.0, 0.0, mode, push=push))
+        assert (b.mode(side), b.events) == (expected, [])
+
+
+@SIDES
+def test_a_pair_that_has_begun_from_rest_is_released_when_an_input_pulls_it(side: Body) -> None:
+    for push, expected in ((-1.0, Pair.OPEN), (0.0, Pair.RESTING)):
+        b = begin(bench(side, 0.0, 0.0, Pair.CONTACT, push=push))
+        assert (b.mode(side), b.events) == (expected, [(side, Transition.RELEASE)])
+    b = begin(bench(side, 0.0, 0.0, Pair.CONTACT, push=1.0))
+    assert (b.mode(side), b.events) == (Pair.CONTACT, [])
+
+
+@SIDES
+@pytest.mark.parametrize(
+    ("u", "d", "mode"), [(0.0, -0.3, Pair.CONTACT), (0.0, 0.3, Pair.CONTACT), (1e-9, 0.0, Pair.CONTACT),
+                         (-1e-9, 0.3, Pair.OPEN), (1e-9, -9.0, Pair.CLAMPED), (1e-9, -0.3, Pair.CONTACT)]
+)
+def test_a_tick_leaves_all_other_pairs_alone(side: Body, u: float, d: float, mode: Pair) -> None:
+    b = begin(bench(side, u, d, mode, push=-1.0))
+    assert (b.mode(side), b.events) == (mode, [])
+
+
+@SIDES
+def test_pairs_that_leave_are_in_contact_again_when_inputs_may_change(side: Body) -> None:
+    b = begin(bench(side, 1e-9, -0.3, Pair.LEAVING, beside=(1e-9, -9.0), beside_mode=Pair.LEAVING))
+    assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.CONTACT, Pair.CLAMPED, [])
 
 
 @SIDES
@@ -325,10 +412,10 @@ def test_a_stuck_object_slips_when_an_input_exceeds_its_friction(side: Body) -> 
 
 @SIDES
 def test_an_interval_that_goes_on_keeps_its_modes(side: Body) -> None:
-    b = bench(side, 0.0, 0.0, push=1.0, coulomb=5.0, slide=Slide.STUCK, object_push=6.0, time=0.5)
+    b = bench(side, 1e-9, -0.3, Pair.LEAVING, push=1.0, coulomb=5.0, slide=Slide.STUCK, object_push=6.0, time=0.5)
     b.plant.bodies[:] = np.nan
     begin(b)
-    assert (b.mode(side), b.slide, b.events) == (Pair.OPEN, Slide.STUCK, [])
+    assert (b.mode(side), b.slide, b.events) == (Pair.LEAVING, Slide.STUCK, [])
     assert b.plant.bodies[OBJECT, MASS] == math.inf
     assert bits(b.plant.bodies[side]) == bits(b.plant.given[side])
 
@@ -340,132 +427,100 @@ def test_an_interval_that_goes_on_keeps_its_modes(side: Body) -> None:
 @pytest.mark.parametrize(
     ("u", "d", "mode", "touches"),
     [
-        (0.0, 0.0, Pair.OPEN, True), (-1e-9, 0.0, Pair.OPEN, False), (0.0, -1e-9, Pair.OPEN, False),
-        (0.0, 0.0, Pair.ABSENT, False), (0.0, 0.0, Pair.LEAVING, False),
+        (0.0, 0.0, Pair.OPEN, True), (0.0, 0.0, Pair.RESTING, True),
+        (-1e-9, 0.0, Pair.OPEN, False), (0.0, -1e-9, Pair.OPEN, False),
+        (0.0, 0.0, Pair.ABSENT, False), (0.0, 0.0, Pair.LEAVING, False), (0.0, 0.0, Pair.CONTACT, False),
     ],
 )
-def test_only_a_pair_at_rest_at_zero_is_closed(side: Body, u: float, d: float, mode: Pair, touches: bool) -> None:
+def test_only_a_pair_at_rest_without_force_settles(side: Body, u: float, d: float, mode: Pair, touches: bool) -> None:
     b = bench(side, u, d, mode, push=1.0)
-    close_resting_pair(b.plant, b.state, b.settings, side, b.out)
-    assert b.mode(side) is (Pair.BALLISTIC if touches else mode)
+    settle_resting(b.plant, b.state, b.out)
+    assert b.mode(side) is (Pair.CONTACT if touches else mode)
     assert b.events == ([(side, Transition.TOUCH)] if touches else [])
+    assert b.recorded_motion == ([(0.0, 0.0)] if touches else [])
 
 
 @SIDES
-def test_a_resting_pair_closes_when_the_other_one_begins_to_push(side: Body) -> None:
-    for beside_mode, beside, closes in (
-        (Pair.CONTACT, (0.01, 0.1), True), (Pair.CLAMPED, (0.01, -9.0), False), (Pair.OPEN, (-0.1, 0.1), False),
+@pytest.mark.parametrize(("u", "d", "rests"), [(0.0, 0.0, True), (0.0, 1e-300, False), (-1e-300, 0.0, False)])
+def test_a_pair_at_rest_is_one_at_zero_without_speed(side: Body, u: float, d: float, rests: bool) -> None:
+    assert is_resting(bench(side, u, d).state.y, side) == rests
+
+
+def test_a_closed_pair_is_between_its_touch_and_its_release() -> None:
+    assert {mode for mode in Pair if is_closed(mode)} == {Pair.CONTACT, Pair.CLAMPED, Pair.LEAVING}
+
+
+@SIDES
+@pytest.mark.parametrize("mode", [Pair.OPEN, Pair.RESTING])
+def test_a_resting_pair_touches_when_the_other_one_begins_to_push(side: Body, mode: Pair) -> None:
+    for beside_mode, beside, expected in (
+        (Pair.CONTACT, (0.01, 0.1), Pair.CONTACT), (Pair.CONTACT, (0.0, 0.1), Pair.CONTACT),
+        (Pair.CLAMPED, (0.01, -9.0), Pair.RESTING), (Pair.OPEN, (-0.1, 0.1), Pair.RESTING),
     ):
-        b = bench(side, 0.0, 0.0, beside=beside, beside_mode=beside_mode)
-        b.state.y[V_O] = 0.0
-        leave_corner(b.plant, b.state, b.settings, b.out)
-        assert b.mode(side) is (Pair.BALLISTIC if closes else Pair.OPEN)
-        assert b.events == ([(side, Transition.TOUCH)] if closes else [])
+        b = bench(side, 0.0, 0.0, mode, beside=beside, beside_mode=beside_mode)
+        settle_resting(b.plant, b.state, b.out)
+        assert b.mode(side) is expected
+        assert b.events == ([(side, Transition.TOUCH)] if expected is Pair.CONTACT else [])
 
 
 @SIDES
-def test_a_pair_that_is_pressed_by_its_own_inputs_waits_for_them(side: Body) -> None:
-    b = bench(side, 0.0, 0.0, push=1.0, beside=(-0.1, 0.1))
-    leave_corner(b.plant, b.state, b.settings, b.out)
-    assert (b.mode(side), b.events) == (Pair.OPEN, [])
+def test_a_resting_pair_is_pressed_by_a_resting_one(side: Body) -> None:
+    """The first presses the second, whichever is judged first."""
+    b = bench(side, 0.0, 0.0, Pair.RESTING, beside=(0.0, 0.0), beside_mode=Pair.RESTING, push=1.0)
+    settle_resting(b.plant, b.state, b.out)
+    assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CONTACT)
+    assert sorted(b.events) == [(LEFT, Transition.TOUCH), (RIGHT, Transition.TOUCH)]
 
 
-def depth(b: Bench, side: Body) -> float:
-    """The sliver of an impact's depth, m."""
-    w, _ = scales(b.plant, b.state, b.settings, side)
-    return float(sliver(b.settings.tolerance) * w * w)
+def depth(d: float) -> float:
+    """u of the pair on the bench at which the impulse that is left is what `leave_together` may leave out, m."""
+    return float((LEFT_OUT * TOLERANCE * 0.5 * d * d / (1e4 * (1.0 + 0.5 * d))) ** 0.4)
 
 
-def corner(side: Body, u: float, d: float, beside: tuple[float, float], **options: float) -> tuple[Pair, Pair]:
-    """Both pairs in contact, `u` in slivers: their modes behind `leave_corner`."""
-    def both(first: float, second: float) -> Bench:
-        return bench(side, first, d, Pair.CONTACT, beside=(second, beside[1]), beside_mode=Pair.CONTACT, **options)
+STAY, LEAVING = ((mode, mode) for mode in (Pair.CONTACT, Pair.LEAVING))
 
-    unit = both(0.0, 0.0)
-    b = both(u * depth(unit, side), beside[0] * depth(unit, other(side)))
-    leave_corner(b.plant, b.state, b.settings, b.out)
+
+def together(side: Body, u: float, d: float, beside: tuple[float, float], **options: Any) -> tuple[Pair, Pair]:
+    """Both pairs in contact, u in units of `depth`: their modes behind `leave_together`."""
+    far = (beside[0] * depth(abs(beside[1])), beside[1])
+    b = bench(side, u * depth(abs(d)), d, Pair.CONTACT, beside=far, beside_mode=Pair.CONTACT, **options)
+    leave_together(b.plant, b.state, b.settings)
     assert b.events == []
     return b.mode(side), b.mode(other(side))
-
-
-BALLISTIC, LEAVING, STAY = ((mode, mode) for mode in (Pair.BALLISTIC, Pair.LEAVING, Pair.CONTACT))
 
 
 @SIDES
 @pytest.mark.parametrize(
     ("u", "d", "beside", "expected"),
     [
-        (0.0, 0.3, (0.0, 0.3), BALLISTIC),  # both touch at once
-        (0.0, 0.3, (0.2, 0.3), BALLISTIC),  # nearly so
-        (0.0, 0.3, (0.5, 0.3), STAY),
-        (0.0, 0.3, (9.0, 0.3), STAY),
-        (0.5, 0.3, (0.5, 0.3), STAY),
-        (0.1, -0.3, (0.1, -0.3), LEAVING),  # both release at once
+        (0.1, -0.3, (0.1, -0.3), LEAVING),
         (0.9, -0.3, (0.1, -0.3), LEAVING),
+        (0.9, -0.3, (0.9, -1.3), LEAVING),
+        (0.0, -0.3, (0.1, -0.3), LEAVING),
         (1.1, -0.3, (0.1, -0.3), STAY),
-        (0.0, 0.3, (0.0, -0.3), STAY),  # one comes, one goes
-        (0.0, -0.3, (0.0, 0.3), STAY),
+        (0.1, -0.3, (0.1, 0.3), STAY),  # one goes, one comes
+        (0.0, 0.3, (0.0, 0.3), STAY),  # both touch at once
+        (0.0, 0.0, (0.1, -0.3), STAY),
+        (0.0, 0.0, (0.0, 0.0), STAY),
     ],
 )
-def test_both_sides_at_the_corner(
+def test_both_pairs_leave_together(
     side: Body, u: float, d: float, beside: tuple[float, float], expected: tuple[Pair, Pair]
 ) -> None:
-    assert corner(side, u, d, beside) == expected
+    assert together(side, u, d, beside) == expected
 
 
 @SIDES
 def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
-    """20 u |u''| beside u'^2: a push that turns it within the sliver keeps it in contact."""
-    assert corner(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
-    assert corner(side, 0.5, -1e-4, (0.5, -1e-4), push=1e9) == STAY
-    assert corner(side, 0.5, -1e-4, (0.5, -1e-4), push=-1e9) == STAY
+    """20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact."""
+    assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
+    assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=1e9) == STAY
+    assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=-1e9) == STAY
 
 
 @SIDES
-@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.BALLISTIC, Pair.ABSENT])
-def test_one_side_alone_has_no_corner(side: Body, beside_mode: Pair) -> None:
-    b = bench(side, 0.0, 0.3, Pair.CONTACT, beside=(0.0, 0.3), beside_mode=beside_mode)
-    leave_corner(b.plant, b.state, b.settings, b.out)
+@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.CLAMPED, Pair.ABSENT])
+def test_one_pair_alone_does_not_leave_without_its_force(side: Body, beside_mode: Pair) -> None:
+    b = bench(side, 0.1 * depth(0.3), -0.3, Pair.CONTACT, beside=(0.1 * depth(0.3), -0.3), beside_mode=beside_mode)
+    leave_together(b.plant, b.state, b.settings)
     assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, beside_mode)
-
-
-@SIDES
-@pytest.mark.parametrize(
-    ("u", "d", "expected", "recorded"),
-    [
-        (0.5, 0.3, Pair.CONTACT, False),  # deep enough to push
-        (0.5e-3, 0.3, Pair.BALLISTIC, False),  # still below rounding
-        (0.5, -0.3, Pair.CONTACT, False),  # turned in the contact
-        (0.5e-3, -0.3, Pair.CONTACT, False),
-        (-0.5, -0.3, Pair.OPEN, True),  # parted before it pushed
-        (-0.5, 0.3, Pair.OPEN, True),
-        (0.0, -0.3, Pair.OPEN, True),
-        (0.0, 0.3, Pair.BALLISTIC, False),
-    ],
-)
-def test_the_end_of_a_ballistic_start(side: Body, u: float, d: float, expected: Pair, recorded: bool) -> None:
-    unit = bench(side, 0.0, abs(d), Pair.BALLISTIC)
-    b = bench(side, u * depth(unit, side), d, Pair.BALLISTIC, beside=(0.2, 0.1), beside_mode=Pair.CONTACT)
-    b.state.mode[other(side)] = Pair.OPEN  # its force would enter the scales
-    assert is_ballistic(b.state.mode)
-    end_ballistic(b.plant, b.state, b.settings, b.out)
-    assert b.mode(side) is expected
-    assert b.events == ([(side, Transition.RELEASE)] if recorded else [])
-    if recorded:
-        assert b.recorded_motion == [(b.state.y[U_L + side], d)]
-
-
-@SIDES
-def test_a_ballistic_pair_at_rest_goes_on_with_the_pair_that_pushes(side: Body) -> None:
-    for beside_mode, expected in ((Pair.CONTACT, Pair.BALLISTIC), (Pair.OPEN, Pair.OPEN)):
-        b = bench(side, 0.0, 0.0, Pair.BALLISTIC, beside=(0.2, 0.0), beside_mode=beside_mode)
-        assert is_ballistic(b.state.mode)
-        end_ballistic(b.plant, b.state, b.settings, b.out)
-        assert b.mode(side) is expected
-
-
-def test_where_nothing_is_ballistic_nothing_ends() -> None:
-    b = bench(LEFT, 0.0, -0.3, Pair.CONTACT, beside=(0.1, -0.2), beside_mode=Pair.CLAMPED)
-    assert not is_ballistic(b.state.mode)
-    end_ballistic(b.plant, b.state, b.settings, b.out)
-    assert (b.mode(LEFT), b.mode(RIGHT), b.events) == (Pair.CONTACT, Pair.CLAMPED, [])

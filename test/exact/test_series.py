@@ -10,9 +10,11 @@ import pytest
 from mpmath import mpf
 
 from grasp_ros.exact.polynomial import curvatures, invert_time, lane_range, values
-from grasp_ros.exact.records import Step, Tables
-from grasp_ros.exact.scales import impact_scales
-from grasp_ros.exact.series import expand_both, expand_one, new_tables, series_order, step_size
+from grasp_ros.exact.records import Plant, Settings, Start, State, Step, Tables
+from grasp_ros.exact.scales import impact_scales, new_step, rate_bound
+from grasp_ros.exact.series import expand_both, expand_one, new_tables, series_order
+from grasp_ros.exact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length
+from grasp_ros.exact.taylor_step import expand as expand_step
 from grasp_ros.physics.layout import (
     CHECK,
     DISSIPATION,
@@ -29,11 +31,15 @@ from grasp_ros.physics.layout import (
     X_O,
     Z_L,
     Z_R,
+    Pair,
+    Slide,
+    Work,
 )
 from grasp_ros.physics.model import Array
 
 BODIES = np.array([[1.0, 15.0, 0.7, 0.4], [2.0, 12.0, 1.1, -0.3], [5.0, 3.0, 0.9, 0.2]])
 PAIRS = np.array([[1e2, 0.3], [3e2, 0.7]])
+LANES_OF_MOTION = [TIME, V_L, X_O, V_O, V_R, Z_L, Z_R]
 # x_o, v_l, v_o, v_r, u_l, u_r
 START = {
     "left": (0.02, 0.9, -0.1, 0.2, 0.01, -0.3),
@@ -79,7 +85,8 @@ def at(table: Array, s: float) -> Array:
 def tables_of(table: Array, value: Array | None = None, size: Array | None = None) -> Tables:
     """A workspace with a finished table, and what was computed from it."""
     empty = np.zeros(LANES)
-    return Tables(table.ravel(), empty, empty if value is None else value, empty if size is None else size, empty)
+    value, size = (empty if given is None else given for given in (value, size))
+    return Tables(table.ravel(), empty, value, size, empty, Start(empty, empty))
 
 
 def sides(name: str) -> tuple[bool, bool]:
@@ -216,27 +223,79 @@ def test_order_by_slope(name: str, n: int) -> None:
     assert n + 0.2 < slope < n + 6.5
 
 
+def motion(name: str) -> tuple[Plant, State]:
+    """The plant of a start, and where it stands."""
+    x_o, v_l, v_o, v_r, u_l, u_r = START[name]
+    y = np.array([x_o + u_l, v_l, x_o, v_o, x_o - u_r, v_r, u_l, u_r])
+    mode = [Pair.CONTACT if touching else Pair.OPEN for touching in sides(name)]
+    return Plant(BODIES, BODIES.copy(), PAIRS, 0.0), State(y, np.array([*mode, Slide.FREE]), np.zeros(2))
+
+
+def settings_of(tolerance: float) -> Settings:
+    """What follows from a tolerance."""
+    n = series_order(tolerance)
+    return Settings(tolerance, n, tolerance ** (1.0 / (n + 1)), rate_bound(BODIES))
+
+
+def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[Tables, Step, float]:
+    """A workspace with the series of a start, what they stand for, and how far they go."""
+    plant, state = motion(name)
+    step = new_step(plant, state, settings)
+    if unit is not None:
+        step = step._replace(unit=unit)
+    tables = new_tables(settings.order)
+    tables.f[:] = np.nan
+    begin_series(tables, state)
+    expand_step(tables, plant, step)
+    h = length(tables, plant, state.y, step, settings, 1.0)
+    if not BELOW < h < ABOVE:
+        h = length(tables, plant, state.y, step, settings, h)
+    return tables, step, h
+
+
 @pytest.mark.parametrize("name", START)
-def test_step_size_keeps_its_promise(name: str) -> None:
-    left, right = sides(name)
-    y = START[name]
-    d_l, d_r = y[1] - y[2], y[2] - y[3]
-    none = (1.0, 0.0)
-    scale_l = impact_scales(PAIRS[0, 0], 5.0 / 6.0, y[4], d_l, 0.0) if left else none
-    scale_r = impact_scales(PAIRS[1, 0], 10.0 / 7.0, y[5], d_r, 0.0) if right else none
-    speed = max(scale_l[1], scale_r[1])
-    best = expand(name, 60)
+def test_a_step_neglects_little_of_what_moves_in_each_lane(name: str) -> None:
+    """Time included; the lane CHECK has a test of its own, see `accepted_length`."""
     for tolerance in (1e-4, 1e-8, 1e-12):
-        n = series_order(tolerance)
-        table = expand(name, n)
-        c = table.ravel()
-        h = step_size(c, left, right, scale_l[0], scale_r[0], speed, n, tolerance)
-        squared = step_size(c, left, right, scale_l[0], scale_r[0], speed, n, tolerance**2)
-        assert squared / h == pytest.approx(tolerance ** (1.0 / (n + 1)), rel=1e-12)
-        assert at(best, h)[TIME] > 0.0
-        error, beyond = (np.abs(at(table, s) - at(best, s))[[V_L, V_O, V_R]].max() / speed for s in (h, 3.0 * h))
-        assert error <= 30.0 * tolerance
-        assert beyond > error  # a step that is far too short would not notice
+        settings = settings_of(tolerance)
+        tables, step, h = expanded(name, settings)
+        table = tables.c[: LANES * (settings.order + 1)].reshape(-1, LANES)
+        best = expand(name, 60, unit=step.unit)
+        moved = np.abs(best[1:6] * h ** np.arange(1, 6)[:, None]).max(axis=0)
+        moved[X_O] = max(moved[X_O], moved[TIME] * moved[V_O])
+        error, beyond = (np.abs(at(table, s) - at(best, s))[LANES_OF_MOTION] / moved[LANES_OF_MOTION]
+                         for s in (h, 2.0 * h))
+        assert error.max() <= 30.0 * tolerance
+        assert beyond.max() > 10.0 * error.max()  # a step that is far too short would not notice
+        assert beyond.max() > tolerance
+
+
+@pytest.mark.parametrize("name", START)
+@pytest.mark.parametrize("orders", [-60, -12, 12, 24])
+def test_a_unit_that_does_not_fit_is_replaced(name: str, orders: int) -> None:
+    settings = settings_of(1e-16)
+    plant, state = motion(name)
+    _, fit, good = expanded(name, settings)
+    tables, step, h = expanded(name, settings, math.ldexp(fit.unit, orders))
+    step, h = fitted_step(tables, plant, state, settings, step, 1.0)
+    h = accepted_length(tables, step, h, settings, np.zeros(len(Work), dtype=np.int64))
+    assert (step.order, step.left, step.right) == (fit.order, fit.left, fit.right)
+    assert 2.0**-10 < h < 2.0**10
+    assert step.unit * h == pytest.approx(fit.unit * good, rel=0.5)
+
+
+@pytest.mark.parametrize("name", START)
+def test_a_step_that_is_too_long_is_shortened_without_another_expansion(name: str) -> None:
+    settings, work = settings_of(1e-16), np.zeros(len(Work), dtype=np.int64)
+    tables, step, h = expanded(name, settings)
+    coefficients = tables.c.copy()
+    assert accepted_length(tables, step, h, settings, work) == h
+    assert work[Work.REJECTED_STEPS] == 0
+    shorter = accepted_length(tables, step, 4.0 * h, settings, work)
+    assert 0.5 * h < shorter < 4.0 * h
+    assert work[Work.REJECTED_STEPS] > 0
+    assert (tables.c == coefficients).all()
+    assert tables.at.tolist() == at(coefficients[: LANES * (settings.order + 1)].reshape(-1, LANES), shorter).tolist()
 
 
 def test_order_grows_with_the_accuracy() -> None:
@@ -249,12 +308,10 @@ def test_order_grows_with_the_accuracy() -> None:
 def test_scales_are_those_of_a_hertz_impact() -> None:
     depth, speed = (5 * 0.75 * 2.0**2 / (4 * 100.0)) ** 0.4, 2.0  # O1
     for state in ((0.0, speed), (depth, 0.0)):
-        w, v = impact_scales(100.0, 0.75, *state, 0.0)
+        w, v = impact_scales(100.0, 0.75, *state)
         assert math.sqrt(depth) <= w <= 2.0 * math.sqrt(depth)
         assert speed <= v <= 2.0 * speed
         assert math.frexp(w)[0] == math.frexp(v)[0] == 0.5  # powers of two: scaling a scene costs no rounding
-    pressed = (0.75 * 8.0 / 100.0) ** (2.0 / 3.0)  # m a = H u^(3/2)
-    assert 0.5 < impact_scales(100.0, 0.75, 0.0, 0.0, 8.0)[0] ** 2 / pressed < 8.0
 
 
 @pytest.mark.parametrize("name", START)
@@ -284,27 +341,21 @@ def test_ranges_hold_and_are_not_idle(seed: int) -> None:
         assert high - low == pytest.approx(size[lane], rel=1e-10)
 
 
-# In s itself the coefficients of a weak impact leave the range of numbers.
 @pytest.mark.parametrize("speed", [1.0, 1e-6, 1e-9, 1e-12, 1e-15, 1e-20])
-@pytest.mark.parametrize("name", ["left at its touch", "both"])
-def test_the_step_of_an_impact_scales_with_its_speed(name: str, speed: float) -> None:
-    n = 30
-    bodies = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]])
-    pairs = np.array([[1e4, 0.0], [1e4, 0.0]])
+@pytest.mark.parametrize("both", [False, True])
+def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -> None:
+    """In s itself the coefficients of a weak impact leave the range of numbers."""
+    bodies, pairs = np.array([[1.0, 0.0, 0.0, 0.0]] * 3), np.array([[1e4, 0.0]] * 2)
     depth = (5 * 0.5 * speed**2 / (4 * 1e4)) ** 0.4
-    u = 0.1 * depth if name == "both" else 0.0
-    w, v = impact_scales(1e4, 0.5, u, speed, 0.0)
-    tables = new_tables(n)
-    c = tables.c
-    c[[X_O, V_L, V_O, V_R]] = (0.0, speed, 0.0, -speed)
-    c[Z_L] = math.sqrt(u)
-    if name == "both":
-        c[Z_R] = math.sqrt(u)
-        expand_both(c, tables.f, bodies, pairs, 1.0 / v, n)
-        h = step_size(c, True, True, w, w, v, n, 1e-14)
-    else:
-        c[Z_R] = -1.0
-        expand_one(c, tables.f, bodies, pairs, LEFT, w / v, n)
-        h = step_size(c, True, False, w, 1.0, v, n, 1e-14)
+    u = 0.1 * depth if both else 0.0
+    y = np.array([u, speed, 0.0, 0.0, -u if both else 1.0, -speed, u, u if both else -1.0])
+    state = State(y, np.array([Pair.CONTACT, Pair.CONTACT if both else Pair.OPEN, Slide.FREE]), np.zeros(2))
+    plant, settings = Plant(bodies, bodies, pairs, 0.0), settings_of(1e-14)._replace(rate=0.0)
+    step, tables = new_step(plant, state, settings), new_tables(settings.order)
+    begin_series(tables, state)
+    expand_step(tables, plant, step)
+    h = length(tables, plant, y, step, settings, 1.0)
+    assert 0.25 < h < 4.0
     duration = 2.9432751843247047 * depth / speed
-    assert 0.01 * duration < at(c[: LANES * (n + 1)].reshape(-1, LANES), h)[TIME] < duration
+    table = tables.c[: LANES * (settings.order + 1)].reshape(-1, LANES)
+    assert 0.01 * duration < at(table, h)[TIME] < duration

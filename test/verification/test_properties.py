@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections import Counter
 from functools import partial
 from pathlib import Path
 
@@ -15,12 +15,14 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import DAMPING
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.verification import fuzz, properties
-from grasp_ros.verification.cases.case import Product, Unfinished
+from grasp_ros.verification.cases.case import Product
 from grasp_ros.verification.cases.impacts import impact_error
 from grasp_ros.verification.cases.scenes import ELASTIC, distance, grasp, reference
-from grasp_ros.verification.draw import NUMBERS, draw_scene
-from grasp_ros.verification.properties import Check, checks
+from grasp_ros.verification.draw import NUMBERS, Draw, draw_ordinary
+from grasp_ros.verification.habits import HABITS, draw_degenerate
+from grasp_ros.verification.properties import Check, examine
 from grasp_ros.verification.relations import reversal
+from grasp_ros.verification.starts import STARTS
 
 FIXED = settings(
     derandomize=True, database=None, deadline=None, max_examples=100, phases=(Phase.explicit, Phase.generate),
@@ -32,14 +34,19 @@ NUMBERS_OF_A_SCENE = st.lists(PART, min_size=NUMBERS, max_size=NUMBERS)
 
 @FIXED
 @given(NUMBERS_OF_A_SCENE)
-def test_every_scene_keeps_all_properties_or_ends_with_a_status(numbers: list[float]) -> None:
-    with suppress(Unfinished):
-        assert [check for check in checks(draw_scene(numbers)) if not check.holds] == []
+def test_every_ordinary_scene_keeps_all_properties_or_ends_with_a_status(numbers: list[float]) -> None:
+    assert examine(draw_ordinary(Draw(numbers))).broken == []
 
 
-def test_random_scenes_cover_what_they_should() -> None:
+@FIXED
+@given(NUMBERS_OF_A_SCENE)
+def test_every_degenerate_scene_keeps_all_properties_or_ends_with_a_status(numbers: list[float]) -> None:
+    assert examine(draw_degenerate(Draw(numbers))).broken == []
+
+
+def test_ordinary_scenes_cover_what_they_should() -> None:
     rng = np.random.default_rng(0)
-    drawn = [draw_scene(rng.random(NUMBERS)) for _ in range(300)]
+    drawn = [draw_ordinary(Draw(rng.random(NUMBERS).tolist())) for _ in range(300)]
     assert 50 < sum(scene.sampled for scene in drawn) < 150
     masses = [scene.values["object"]["mass_kg"] for scene in drawn]
     assert max(masses) / min(masses) > 1e9
@@ -52,17 +59,24 @@ def test_random_scenes_cover_what_they_should() -> None:
     assert effects <= {section for scene in drawn for section in scene.values}
 
 
+def test_degenerate_scenes_cover_all_habits() -> None:
+    rng = np.random.default_rng(0)
+    drawn = [draw_degenerate(Draw(rng.random(NUMBERS).tolist())) for _ in range(1000)]
+    habits = Counter(habit for scene in drawn for habit in scene.title.split(", "))
+    assert min(habits[name] for name, _ in STARTS) > 50
+    assert min(habits[name] for name, _, _ in HABITS) > 20
+    assert {"loop", "pulse", "table", "sine", "absent", "no contact", "any horizon"} <= habits.keys()
+    assert max(len(scene.title.split(", ")) for scene in drawn) > 5
+
+
 def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes of the same kind at the coarsest accuracy."""
     rng = np.random.default_rng(1)
     monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
     found: list[Check] = []
     for _ in range(60):
-        try:
-            found += checks(draw_scene(rng.random(NUMBERS)))
-        except Unfinished:
-            continue
-    assert {check.name for check in found if not check.holds} >= {"energy"}
+        found += examine(draw_ordinary(Draw(rng.random(NUMBERS).tolist()))).broken
+    assert {check.name for check in found} >= {"energy", "momentum, left", "position", "splitting"}
 
 
 @settings(FIXED, max_examples=40)
@@ -97,10 +111,10 @@ def test_fuzzing_counts_failures_and_writes_their_scenes(
     """The same scene over and over, first as it is, then at the coarsest accuracy."""
     scene = scenes.load("case_03", ["time.duration_s=5", "time.control_period_s=5"])
     monkeypatch.setattr(fuzz, "draw_scene", lambda numbers: scene)
-    assert fuzz.run(0.5, 0, tmp_path) == 0
+    assert fuzz.run(0, tmp_path, draws=3) == 0
     monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
-    failures = fuzz.run(0.5, 0, tmp_path)
-    assert failures > 0
+    failures = fuzz.run(0, tmp_path, draws=3)
+    assert failures == 3
     assert capsys.readouterr().out.endswith(f"failures: {failures}\n")
     files = list(tmp_path.glob("*.yaml"))
     assert len(files) == failures

@@ -1,0 +1,170 @@
+"""One implicit step: how long it may be, its error, and the polynomials in t that stand for it.
+
+The last Legendre coefficients of the polynomials tell their error. A relaxation that is not over spoils them at any
+length; then the slower pair, if it is the one, is resolved, or some Taylor steps come first.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from grasp_ros.exact.collocation import E_NODES, SUMS, V_NODES, Approach, Begin, collocate, motion_of
+from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.kinematics import approach, reduced_mass
+from grasp_ros.exact.radau import DERIVATIVE, FIRST, STAGES, TO_LEGENDRE, TO_POWERS, times
+from grasp_ros.exact.records import Output, Plant, Settings, State, Tables
+from grasp_ros.exact.scales import STIFF, relaxation
+from grasp_ros.physics.layout import (
+    CHECK,
+    DISSIPATION,
+    EPS,
+    HERTZIAN,
+    LANES,
+    LEFT,
+    RIGHT,
+    TIME,
+    U_L,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
+    Body,
+    Filled,
+    Pair,
+    Work,
+)
+
+LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
+FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
+
+
+@kernel
+def creep_rate(plant: Plant, state: State, side: Body) -> float:
+    """Rate in 1/s that an implicit step has to resolve of a pair: its slow one where it relaxes, its own otherwise."""
+    u, d, pair = state.y[U_L + side], approach(state.y, side), plant.pairs[side]
+    if state.mode[side] != Pair.CONTACT:
+        return 0.0
+    fast = relaxation(plant, state, side)
+    stiffness = 1.5 * pair[HERTZIAN] * math.sqrt(u) / reduced_mass(plant.bodies, side)
+    slow = 1.5 / (pair[DISSIPATION] * u) if fast * fast > stiffness else fast + math.sqrt(stiffness)
+    return slow + 5.0 * abs(d) / u
+
+
+@kernel
+def expand_row(tables: Tables) -> tuple[float, float]:
+    """Replace values at the nodes, in `tables.row`, by coefficients of powers.
+
+    What is below rounding is left out: powers would amplify it. Returns the size of the last two Legendre coefficients,
+    and the sum of the sizes of all but the first.
+    """
+    f, row, n, size = tables.f, tables.row, STAGES, 0.0
+    for k in range(STAGES):
+        f[SUMS + k] = times(TO_LEGENDRE, k, row, FIRST, 0.0)
+        size += abs(f[SUMS + k])
+    last, first = max(abs(f[SUMS + STAGES - 1]), abs(f[SUMS + STAGES - 2])), abs(f[SUMS])
+    while n > 1 and abs(f[SUMS + n - 1]) <= 2.0 * EPS * size:
+        n -= 1
+        f[SUMS + n] = 0.0
+    for k in range(STAGES):
+        row[k] = times(TO_POWERS, k, f, SUMS, 0.0)
+    return last, size - first
+
+
+@kernel
+def write_lane(tables: Tables, lane: int, begin: float, h: float) -> float:
+    """Write the polynomial of a lane from its derivatives at the nodes, in `tables.row`; returns their error."""
+    c = tables.c
+    last, _ = expand_row(tables)
+    c[lane] = begin
+    for k in range(STAGES):
+        c[LANES * (k + 1) + lane] = h / (k + 1) * tables.row[k]
+    return last
+
+
+@kernel
+def write_side(tables: Tables, state: State, side: Body, pair: Approach, start: Begin) -> float:
+    """Write the lanes of an arm from the nodes; returns the error of u', relative to what is allowed of 1."""
+    f, row, h = tables.f, tables.row, start.h
+    nodes, largest = E_NODES + side * STAGES, 0.0
+    v = V_L if side == LEFT else V_R
+    for j in range(STAGES):
+        row[j] = times(DERIVATIVE, j, f, V_NODES, 0.0) / h + pair.sign * (
+            pair.rate * times(DERIVATIVE, j, f, nodes, pair.e) / h)
+    write_lane(tables, v, state.y[v], h)
+    for j in range(STAGES):
+        row[j] = pair.rate * (f[nodes + j] - pair.offset)
+        largest = max(largest, abs(f[nodes + j]))
+    if pair.stiff and not f[nodes] > 0.0:  # it clamps before the first node
+        return math.inf
+    last = write_lane(tables, U_L + side, pair.u, h)
+    if pair.hertzian == 0.0 or not pair.u > 0.0:
+        return last / start.scale
+    moving = max(abs(state.y[V_L]), abs(state.y[V_R]), abs(state.y[V_O]))
+    relative = max(moving, 1024.0 * pair.rate * largest) if pair.stiff else moving
+    return last / max(min(relative, pair.u / h), 0.25 * moving)
+
+
+@kernel
+def write_lanes(tables: Tables, state: State, left: Approach, right: Approach, start: Begin) -> float:
+    """Write the polynomials of a step, in t / h, from its nodes; returns their largest error, relative."""
+    c, f, row, h = tables.c, tables.f, tables.row, start.h
+    for k in range(STAGES + 1):
+        c[LANES * k + TIME] = c[LANES * k + CHECK] = 0.0
+    for j in range(STAGES):
+        row[j] = times(DERIVATIVE, j, f, V_NODES, 0.0) / h
+    write_lane(tables, np.int64(V_O), start.v, h)
+    for j in range(STAGES):
+        row[j] = start.v + f[V_NODES + j]
+    error = write_lane(tables, np.int64(X_O), start.x, h) / start.scale
+    return max(error, write_side(tables, state, LEFT, left, start), write_side(tables, state, RIGHT, right, start))
+
+
+@kernel
+def velocity_scale(plant: Plant, state: State, settings: Settings) -> float:
+    """What errors of velocities are relative to, m/s."""
+    y, scale = state.y, math.inf
+    for side in (LEFT, RIGHT):
+        if state.mode[side] == Pair.CONTACT and plant.pairs[side, DISSIPATION] > 0.0:
+            scale = min(scale, 1.0 / plant.pairs[side, DISSIPATION])
+    reach = max(abs(y[X_L]), abs(y[X_O]), abs(y[X_R]))
+    return max(scale, abs(y[V_L]), abs(y[V_O]), abs(y[V_R]), settings.rate * reach)
+
+
+@kernel
+def wait(out: Output, steps: float) -> None:
+    """After a trial that failed, leave some contact steps to the Taylor series, and twice as many after the next."""
+    out.filled[Filled.PENALTY] = min(max(2 * out.filled[Filled.PENALTY], int(steps), 4), 1 << 20)
+    out.filled[Filled.WAIT] = out.filled[Filled.PENALTY]
+
+
+@kernel
+def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
+    """Length in s of an implicit step, whose polynomials it writes; 0 where Taylor steps are cheaper."""
+    fastest = max(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT))
+    slower = min(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT))
+    creeping = creep_rate(plant, state, LEFT) + creep_rate(plant, state, RIGHT)
+    h, scale = min(span, LENGTH / (settings.rate + creeping)), velocity_scale(plant, state, settings)
+    allowed = FINEST + 100.0 * settings.tolerance
+    longest = h
+    error = before = math.inf
+    while fastest * h > STIFF:
+        start = Begin(h, state.y[X_O], state.y[V_O], scale)
+        left, right = motion_of(plant, state, LEFT, h), motion_of(plant, state, RIGHT, h)
+        error = math.inf
+        if collocate(tables.f, plant.bodies, left, right, start):
+            error = write_lanes(tables, state, left, right, start) / allowed
+        if error <= 1.0:
+            return h
+        out.work[Work.REJECTED_STEPS] += 1
+        shorter = h * min(max(0.7 * error ** (-1.0 / (STAGES - 1)), 0.1), 0.7)
+        if error > 0.03 * before or (error == math.inf and h < longest):
+            if not slower * shorter > LENGTH:  # not the length of the step, but a relaxation that is not over
+                break
+            shorter = LENGTH / slower
+        before, h = min(before, error), shorter
+    wait(out, 0.5 * math.log(min(max(error, 1.0), 1e20)))
+    return 0.0

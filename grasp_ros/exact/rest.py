@@ -1,0 +1,164 @@
+"""A pair at u = u' = 0: which way it goes, how long that is certain, and what is left of a contact near u = 0.
+
+Each body obeys m x'' + c x' + k x = f, so its derivatives follow from each other, and the first one in which arm and
+object differ decides. Their motion relative to each other obeys an equation of order five: no difference up to order
+six means that they move together for ever.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.impact import damping_factor, elastic_force
+from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.kinematics import approach, arm_of, bound, derivatives, other, reduced_mass, relative_motion
+from grasp_ros.exact.records import Array, Leaning, Plant, State
+from grasp_ros.physics.layout import (
+    DAMPING,
+    DISSIPATION,
+    EPS,
+    HERTZIAN,
+    MASS,
+    OBJECT,
+    STIFFNESS,
+    U_L,
+    V_O,
+    X_O,
+    Body,
+    Pair,
+)
+
+HIGHEST = 6  # derivative
+DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
+SHORT = 0.2  # of the time constants, see `flight.is_short`
+UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
+
+
+@kernel
+def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]:
+    """Acceleration in m/s^2, and its rate, that the force of the other pair gives the object towards `side`."""
+    beside = other(side)
+    u = state.y[U_L + beside]
+    if state.mode[beside] != Pair.CONTACT or u <= 0.0:
+        return 0.0, 0.0
+    hertzian, loss, mass = plant.pairs[beside, HERTZIAN], plant.pairs[beside, DISSIPATION], plant.bodies[OBJECT, MASS]
+    d, a = relative_motion(plant, state.y, beside)
+    elastic, factor = elastic_force(hertzian, u), damping_factor(loss, d)
+    a -= elastic * factor / reduced_mass(plant.bodies, beside)
+    pace = 1.5 * hertzian * math.sqrt(u) * d * factor + elastic * loss * a
+    return elastic * factor / mass, pace / mass
+
+
+@kernel
+def leaning(plant: Plant, state: State, side: Body) -> Leaning:
+    """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
+
+    The force of the other pair takes part with its value and its rate. Where that pair begins at u = 0 with t^n, its
+    force grows with t^(3n/2), which moves the object with t^(2 + 3n/2).
+    """
+    y, beside = state.y, other(side)
+    if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf:
+        return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
+    if y[U_L + beside] > 0.0:
+        push, pace = impact_beside(plant, state, side)
+        found = first_difference(plant, y, side, push, pace, 3)
+        return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
+    begins = 1.0
+    if approach(y, beside) == 0.0:
+        begins = first_difference(plant, y, beside, 0.0, 0.0, HIGHEST).order
+    found = first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
+    return found if found.order < 2.0 + 1.5 * begins else Leaning(2.0 + 1.5 * begins, math.inf)
+
+
+@kernel
+def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, highest: int) -> Leaning:
+    """The first derivative of u beyond its rounding, with an acceleration of the object and its rate added; NEVER."""
+    drag = plant.bodies[OBJECT, DAMPING] / plant.bodies[OBJECT, MASS]
+    for order in range(2, highest + 1):
+        value, size = difference(plant, y, side, order)
+        added = push if order == 2 else (pace - drag * push if order == 3 else 0.0)
+        value += added
+        if abs(value) > DOUBT * (size + abs(added)):
+            return Leaning(float(order), value)
+    return Leaning(NEVER, 0.0)
+
+
+@kernel
+def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, float]:
+    """A derivative of u without impact forces, and the sum of the sizes of its terms."""
+    x, v, sign = arm_of(y, side)
+    value, _, size = derivatives(plant.bodies[side], x, v, order)
+    value_o, _, size_o = derivatives(plant.bodies[OBJECT], y[X_O], y[V_O], order)
+    return sign * (value - value_o), size + size_o
+
+
+@kernel
+def certain_time(plant: Plant, y: Array, side: Body, order: int, value: float, span: float) -> float:
+    """How long, in s, u of a flight from u = 0 has the sign of its first derivative, for certain.
+
+    Derivatives of the same sign only help, so each of them may be the one that a bound on the next is held against;
+    half of what that proves leaves room for rounding.
+    """
+    x, v, _ = arm_of(y, side)
+    arm, body = plant.bodies[side], plant.bodies[OBJECT]
+    longest = 0.0
+    for n in range(order, HIGHEST + 1):
+        here, size = (value, 0.0) if n == order else difference(plant, y, side, n)
+        if abs(here) <= DOUBT * size:
+            continue
+        if (here > 0.0) != (value > 0.0):
+            break
+        q, q_rate, _ = derivatives(arm, x, v, n + 1)
+        q_o, q_o_rate, _ = derivatives(body, y[X_O], y[V_O], n + 1)
+        largest = bound(arm, q, q_rate, span) + bound(body, q_o, q_o_rate, span)
+        longest = max(longest, 0.5 * (n + 1) * abs(here) / largest if largest > 0.0 else math.inf)
+    return longest
+
+
+@kernel
+def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> bool:
+    """Whether the impulse of a pair between u = 0 and u is below a part of that of its motion u'.
+
+    What decides about an object that sticks is the force.
+    """
+    pair, d = plant.pairs[side], abs(d)
+    if u <= 0.0 or d == 0.0:
+        return u <= 0.0
+    force = elastic_force(pair[HERTZIAN], u) * damping_factor(pair[DISSIPATION], d)
+    if plant.bodies[OBJECT, MASS] == math.inf and force > DOUBT * plant.coulomb:
+        return False
+    return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
+
+
+@kernel
+def exponent(x: float) -> int:
+    """e of the power of two 2^e <= x < 2^(e + 1)."""
+    return math.frexp(x)[1] - 1
+
+
+@kernel
+def time_of_impulse(per_hertz: float, loss: float, order: int, a: float) -> float:
+    """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
+
+    H u^(5/2) (1 + p u') = mu u'^2, without the numbers; per_hertz is mu / H. It compares exponents, and integers of
+    them: other units give the same time.
+    """
+    n, above = float(order), exponent(a) + 1  # 2^above >= a
+    e = (4 * exponent(per_hertz * n * n) - 2 * above) // (2 * order + 8)
+    if loss > 0.0:
+        e = min(e, (2 * exponent(per_hertz * n / loss) - 3 * above) // (3 * order + 2))
+    return math.ldexp(1.0, e)
+
+
+@kernel
+def parting_time(plant: Plant, state: State, side: Body, span: float) -> float:
+    """How long, in s, a pair that parts from rest in a flight does not come back for certain; it is a short flight."""
+    order, value = leaning(plant, state, side)
+    if value == 0.0:
+        return math.inf
+    rate = 0.0
+    for body in (side, OBJECT):
+        row = plant.bodies[body]
+        rate = max(rate, abs(row[DAMPING]) / row[MASS] + math.sqrt(row[STIFFNESS] / row[MASS]))
+    certain = certain_time(plant, state.y, side, int(order), value, span)
+    return min(certain, SHORT / rate) if rate > 0.0 else certain

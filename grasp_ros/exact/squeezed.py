@@ -1,0 +1,210 @@
+"""A segment with a squeezed contact of large dissipation: one implicit step in place of very many Taylor steps.
+
+Where p H u^1.5 / mu is a fast rate and the pair only creeps, a Taylor series goes on resolving a relaxation that is
+long over. The collocation of `collocation` is L-stable, and its solution is a polynomial in t: the same tables hold it,
+and the same searches find its events. The surface of condition (10) is e = 1 + p u' = 0, an unknown of its own with all
+its digits, where p times a difference of velocities would have none.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.clock import tick, until
+from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, motion_of
+from grasp_ros.exact.contact import place_free
+from grasp_ros.exact.energy_check import check_segment, energy_level
+from grasp_ros.exact.flight import flights_of
+from grasp_ros.exact.friction import slide_in_contact, slip_candidate
+from grasp_ros.exact.impact import elastic_force
+from grasp_ros.exact.implicit import expand_row, implicit_step, wait
+from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.kinematics import is_clamped, keep_resting
+from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.polynomial import values
+from grasp_ros.exact.radau import FIRST, INTEGRAL, STAGES, times
+from grasp_ros.exact.records import (
+    Array,
+    Candidate,
+    Flights,
+    Integers,
+    Output,
+    Plant,
+    SlideCandidate,
+    Start,
+    State,
+    Step,
+    Tables,
+)
+from grasp_ros.exact.roots import first_rise
+from grasp_ros.exact.scales import new_settings
+from grasp_ros.physics.layout import (
+    DISSIPATION,
+    EPS,
+    LANES,
+    LEFT,
+    OBJECT,
+    RIGHT,
+    U_L,
+    U_R,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
+    Body,
+    Filled,
+    Outcome,
+    Pair,
+    Slide,
+    Transition,
+    Work,
+)
+
+LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
+SOON = 1e-3  # of a step: an event so early may hang on a relaxation that the step does not resolve
+NOISY = 1e-3  # part of e at which what is left of a relaxation hides the course of e between the nodes
+
+
+@kernel
+def first_crossing(tables: Tables, side: Body, pair: Approach, loss: float, turn: float, work: Integers) -> float:
+    """First part of a step at which turn (1 + p u') rises through zero; inf if there is none."""
+    f, row, at, highest = tables.f, tables.row, E_NODES + side * STAGES, -math.inf
+    for j in range(STAGES):
+        row[j] = turn * (f[at + j] if pair.stiff else 1.0 + loss * f[at + j])
+        highest = max(highest, row[j])
+    last, rest = expand_row(tables)
+    if abs(f[SUMS]) > 2.0 * rest or (highest < 0.0 and last > -NOISY * highest):
+        return math.inf
+    return first_rise(row, STAGES - 1, 1.0, 0.0, work)
+
+
+@kernel
+def squeezed_candidate(tables: Tables, plant: Plant, state: State, side: Body, h: float, work: Integers) -> Candidate:
+    """First event of one pair within an implicit step of h s, in units of it."""
+    mode, loss, row = state.mode[side], plant.pairs[side, DISSIPATION], tables.row
+    if mode in (Pair.RESTING, Pair.ABSENT):
+        return Candidate(math.inf, Transition.TOUCH)
+    crossed, turn = math.inf, -1.0 if mode == Pair.CONTACT else 1.0
+    if loss > 0.0 and mode in (Pair.CONTACT, Pair.CLAMPED):
+        crossed = first_crossing(tables, side, motion_of(plant, state, side, h), loss, turn, work)
+    for k in range(STAGES + 1):
+        row[k] = (1.0 if mode == Pair.OPEN else -1.0) * tables.c[LANES * k + U_L + side]
+    depth = first_rise(row, STAGES, 1.0, EPS * abs(row[FIRST]), work)
+    if crossed < depth or math.isnan(crossed):
+        return Candidate(crossed, Transition.CLAMP if mode == Pair.CONTACT else Transition.REENTRY)
+    return Candidate(depth, Transition.TOUCH if mode == Pair.OPEN else Transition.RELEASE)
+
+
+@inlined
+def deliver(tables: Tables, step: Step, t: float, free: Flights, state: State, out: Output) -> None:
+    """Write the states at the output times before the end t of a segment, from the polynomials in t / h."""
+    row = out.filled[Filled.OUTPUTS]
+    while row < out.grid.shape[0]:
+        tau = until(state.clock, out.grid[row])
+        if not tau < t:
+            break
+        values(tables.c, STAGES, tau / step.unit, tables.at)
+        write_state(tables.at, out.rows[row])
+        place_free(step, free.left, free.right, tau, out.rows[row])
+        row += 1
+    out.filled[Filled.OUTPUTS] = row
+
+
+@inlined
+def write_state(at: Array, y: Array) -> None:
+    """Positions and velocities from the values of the lanes."""
+    y[X_L], y[V_L], y[X_O], y[V_O] = at[X_O] + at[U_L], at[V_L], at[X_O], at[V_O]
+    y[X_R], y[V_R] = at[X_O] - at[U_R], at[V_R]
+
+
+@kernel
+def impact_at(f: Array, side: Body, pair: Approach, h: float, j: int) -> float:
+    """Impact force of a pair at a node, N."""
+    at = E_NODES + side * STAGES
+    u = max(pair.u + h * pair.rate * times(INTEGRAL, j, f, at, pair.offset), 0.0)
+    return elastic_force(pair.hertzian, u) * (pair.rest + pair.share * f[at + j])
+
+
+@kernel
+def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: Integers) -> SlideCandidate:
+    """First event of the object within an implicit step of h s, in units of it."""
+    if state.mode[OBJECT] != Slide.STUCK:
+        return slide_in_contact(tables, plant, state.mode, STAGES, 1.0, work)
+    f, row = tables.f, tables.row
+    for j in range(STAGES):
+        row[j] = impact_at(f, LEFT, motion_of(plant, state, LEFT, h), h, j) - impact_at(
+            f, RIGHT, motion_of(plant, state, RIGHT, h), h, j)
+    expand_row(tables)
+    return slip_candidate(tables, plant, STAGES - 1, 1.0, work)
+
+
+@kernel
+def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: Output) -> float:
+    """The implicit step of h s to its first event, whose transitions it makes, or to its end.
+
+    Returns its time in s; 0 if the search for the first event does not end.
+    """
+    out.work[Work.CONTACT_STEPS] += 1
+    c, at, y = tables.c, tables.at, state.y
+    left = squeezed_candidate(tables, plant, state, LEFT, h, out.work)
+    right = squeezed_candidate(tables, plant, state, RIGHT, h, out.work)
+    slide = SlideCandidate(math.inf, Slide.FREE)
+    if state.mode[OBJECT] != Slide.FREE:
+        slide = squeezed_slide(tables, plant, state, h, out.work)
+    if math.isnan(left.when) or math.isnan(right.when) or math.isnan(slide.when):
+        wait(out, 4.0)
+        return 0.0
+    s = min(1.0, left.when, right.when, slide.when)
+    if s < SOON:
+        wait(out, 4.0)
+    else:
+        out.filled[Filled.PENALTY] = 0
+    t = s * h
+    step = Step(int(STAGES), h, state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT)
+    free = flights_of(plant, y)
+    deliver(tables, step, t, free, state, out)
+    values(c, STAGES, s, at)
+    write_state(at, y)
+    place_free(step, free.left, free.right, t, y)
+    y[U_L], y[U_R] = at[U_L], at[U_R]
+    keep_resting(state)
+    tick(state.clock, t)
+    make_transitions(plant, state, left, right, slide, s, out)
+    return t
+
+
+@kernel
+def creep(
+    c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
+    given: Array, bodies: Array, pairs: Array, coulomb: float,
+    y: Array, mode: Integers, clock: Array,
+    end: float, tolerance: float, max_work: int,
+    grid: Array, rows: Array, events: Array, filled: Integers, work: Integers,
+) -> int:
+    """Make one implicit step, if it is worth its price: a door with the arguments of `hybrid.advance`.
+
+    It is a door of its own, so that only who squeezes a contact waits for its compilation.
+
+    Returns
+    -------
+    int
+        A `layout.Outcome`: GO_ON, or why the step cannot be believed; `rows` holds nothing of it then.
+    """
+    tables = Tables(c, f, at, size, size, Start(start_c, start_f))  # this row is long enough at any accuracy
+    plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, clock)
+    settings = new_settings(tolerance, row.shape[0] - 1, given)
+    out = Output(grid, rows, events, filled, work)
+    reached = out.filled[Filled.OUTPUTS]
+    before, clamped = energy_level(plant, state, 0.0), is_clamped(mode)
+    h = implicit_step(tables, plant, state, settings, until(state.clock, end), out)
+    if h == 0.0:
+        return Outcome.GO_ON
+    t = squeezed_segment(tables, plant, state, h, out)
+    if t == 0.0:
+        return Outcome.GO_ON
+    outcome = check_segment(plant, state, settings, before, energy_level(plant, state, t), t, 0, clamped)
+    if outcome != Outcome.GO_ON:
+        out.filled[Filled.OUTPUTS] = reached
+    return outcome

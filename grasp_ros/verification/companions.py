@@ -1,0 +1,109 @@
+"""Other scenes whose runs must be related to the first: the mirror image, other units, short control periods."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import EPS, LEFT, MASS, OBJECT, RIGHT, Work
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.simulation import Trajectory
+from grasp_ros.verification.cases.case import Product
+from grasp_ros.verification.relations import SWAPPED, mirrored, scaled
+from grasp_ros.verification.roundings import TINY
+
+UNDERFLOW = 1e-100  # motions below lose digits in squares and powers 5/2, in other units others
+UNITS = 4.0, 2.0, 0.5  # of length, time and mass
+PERIODS = 16, 64, 256  # control periods in runs that tend to continuous feedback
+LONGEST = 1e4  # s, of such runs: a control period has its limit
+NOISE, FAR = 1e-10, 0.2  # distances from it, relative, that say nothing
+FEW, SOME = 10, 100  # events and contact steps, beyond which a distance may grow by itself
+
+
+def mirror(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
+    """States and events seen from the other side, to the bit; noise and sines have no mirror image."""
+    scene = run.scene
+    if any(section.endswith(("_sensor", "_sine")) for section in scene.values):
+        return
+    image = product.run(mirrored(scene), run.t[[0, -1]])
+    own, other = run.event_table, image.event_table.copy()
+    other[:, 1] = np.array([RIGHT, LEFT, OBJECT], dtype=float)[other[:, 1].astype(int)]
+    same = _sorted(own) == _sorted(other) and _equal(run.state[-1], -image.state[-1][SWAPPED])
+    yield "mirror", float(not same)
+
+
+def units(run: Trajectory, product: Product, smallest: float) -> Iterator[tuple[str, float]]:
+    """States and events in other units, O7, to the bit."""
+    if smallest < UNDERFLOW:
+        return
+    length, time, mass = UNITS
+    try:
+        image = scaled(run.scene, length, time, mass)
+    except Refused:  # a number leaves its range
+        return
+    other = product.run(image, time * run.t[[0, -1]])
+    own = run.event_table * np.array([time, 1.0, 1.0, length, length / time])
+    state = run.state[-1] * np.array([length, length / time] * 3)
+    yield "scaling", float(not (_sorted(own) == _sorted(other.event_table) and _equal(state, other.state[-1])))
+
+
+def _sorted(table: Array) -> list[list[float]]:
+    """Rows of events in an order that does not depend on which side is looked at first."""
+    return sorted(row.tolist() for row in table)
+
+
+def _equal(one: Array, other: Array) -> bool:
+    return bool(np.array_equal(np.nan_to_num(one), np.nan_to_num(other)))
+
+
+def short_periods(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
+    """Commands held ever shorter tend to continuous feedback: the distance falls with the period.
+
+    Over a time constant of the feedback at most, within which the longest period is short. The error is the distance at
+    the shortest period by that at the longest, where both are neither rounding nor large: 1/16 in theory.
+    """
+    scene = run.scene
+    system = scene.system
+    if scene.sampled or system.external or not system.laws:
+        return
+    constants = [_time_constant(law, system.bodies[side, MASS]) for side, law in system.laws.items()]
+    span = min(LONGEST, scene.duration, *constants)
+    base = int(span * NANOSECONDS / PERIODS[-1])
+    if base < 1:
+        return
+    seconds = base * PERIODS[-1] / NANOSECONDS
+    def part(periods: int, sampled: bool) -> Trajectory:
+        numbers = {"time.duration_s": seconds, "time.control_period_s": round(seconds / periods, 9)}
+        return product.run(scene.changed(numbers), [0.0, seconds], sampled=sampled)
+
+    continuous = part(PERIODS[-1], False)
+    if len(continuous.event_table) > FEW or continuous.work[Work.CONTACT_STEPS] > SOME:
+        return
+    size = np.tile(np.abs(np.nan_to_num(continuous.state).reshape(-1, 3, 2)).max(axis=(0, 1)) + TINY, 3)
+    first, *_, last = (
+        float(np.nanmax(np.abs(part(periods, True).state[-1] - continuous.state[-1]) / size)) for periods in PERIODS
+    )
+    if last > NOISE + _cancelled(continuous) / size[1] and first < FAR:
+        yield "short periods", last / first
+
+
+def _cancelled(run: Trajectory) -> float:
+    """Speed in m/s that roundings of a feedback around its set-point bring."""
+    system, speed = run.scene.system, 0.0
+    for side, law in system.laws.items():
+        place = np.abs(run.state[:, COLUMN[side]]).max() + abs(law.set_point)
+        force = abs(law.position_gain) * place + abs(law.feed_forward)
+        speed = max(speed, 16.0 * EPS * force * run.scene.duration / system.bodies[side, MASS])
+    return speed
+
+
+def _time_constant(law: ControlLaw, mass: float) -> float:
+    """1 / the fastest rate of a feedback, in s."""
+    rate = max(math.sqrt(abs(law.position_gain) / mass), abs(law.velocity_gain) / mass)
+    return 1.0 / rate if rate > 0.0 else math.inf

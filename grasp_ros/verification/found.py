@@ -1,0 +1,179 @@
+"""Scenes with corners: what is right by the reference, and how far the product is from it.
+
+A directory holds scenes and the answers to them. `python -m grasp_ros.verification.found DIRECTORY [NAME ...]` writes
+the answers, all of them or some.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from gmpy2 import mpfr
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.layout import EPS
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import simulate
+from grasp_ros.verification.reference import integrate_scene
+
+ANSWERS = "answers.json"
+DIGITS = 25
+STEPS = 2_500  # of the reference; where it needs more the answer ends earlier
+HALVINGS, PARTS = 16, 16  # of the horizon, where it may end
+FORGOTTEN = 1e6  # amplification beyond which a comparison tells little
+LARGE = 1e300  # m, m/s: beyond, the motion outgrows doubles
+DRAWS, DRAWN_DIGITS = 2, 20  # of the amplification
+PLACES = [0, 0, 2, 2, 4, 4]  # the position of each number of a state
+LIMIT = 100.0  # roundings that are right
+TIMES = {"start_s", "length_s", "time_s"}  # must stay whole control periods
+EXACT = ("time", "left_sensor", "right_sensor")  # sections whose numbers stay
+
+
+class Answer(NamedTuple):
+    """What is right, at ascending times."""
+
+    t: list[float]  # s
+    state: list[list[str]]  # x_l, v_l, x_o, v_o, x_r, v_r in m and m/s with DIGITS digits; 0 of what is not there
+    amplification: list[float]  # what one rounding of each number of the scene has become, in roundings of the state
+    events: int
+    status: str = Status.DONE.name  # NOT_FINITE: the motion outgrows doubles, and the times end before
+
+
+class Verdict(NamedTuple):
+    """How the product ended: its status, and its error in roundings, see `verdict`; inf of a run that stopped."""
+
+    status: str
+    error: float
+
+
+def read(directory: Path) -> dict[str, Scene]:
+    """All scenes of a directory by name."""
+    return {path.stem: scenes.load(str(path)) for path in sorted(directory.glob("*.yaml"))}
+
+
+def answers(directory: Path) -> dict[str, Answer]:
+    """All answers of a directory by name."""
+    path = directory / ANSWERS
+    found = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return {name: Answer(**fields) for name, fields in found.items()}
+
+
+def answer(scene: Scene) -> Answer:
+    """Integrate a scene with DIGITS digits.
+
+    Returns
+    -------
+    Answer
+        At the end of the horizon, or of the part of it that STEPS allow and whose start is not forgotten, and not after
+        half of that.
+    """
+    halves = {scene.duration / 2**k for k in range(HALVINGS + 1)}
+    times = sorted(halves | {scene.duration * k / PARTS for k in range(1, PARTS)})
+    right = integrate_scene(scene, times, DIGITS, budget=STEPS)
+    small = [row for row in right.state if max(map(abs, row)) < LARGE]
+    drawn = [integrate_scene(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in _moved(scene)]
+    start, amplification = scene.initial_state.tolist(), []
+    for row, *changed in zip(small, *drawn, strict=False):
+        places = np.array([start, [float(a) for a in row]])
+        size = np.maximum(_size(places), _creep(scene) * np.abs(places).max(axis=0)[PLACES])
+        changes = np.array([[float(a - b) for a, b in zip(draw, row, strict=True)] for draw in changed])
+        amplification.append(float(_relative(changes, size).max() / EPS))
+    last = max((k for k, value in enumerate(amplification) if value <= FORGOTTEN), default=0)
+    middle = max((k for k in range(last) if times[k] <= times[last] / 2), default=last)
+    kept = sorted({middle, last})
+    status = Status.DONE if len(small) == len(right.state) else Status.NOT_FINITE
+    rows = [[_text(a) for a in small[k]] for k in kept]
+    return Answer([times[k] for k in kept], rows, [amplification[k] for k in kept], len(right.events), status.name)
+
+
+def _text(value: Any) -> str:
+    return f"{value:.{DIGITS - 1}e}"
+
+
+def _size(states: Array) -> Array:
+    """The largest position and the largest speed, for each column (6,)."""
+    return np.array([np.nanmax(np.abs(states[:, ::2])), np.nanmax(np.abs(states[:, 1::2]))] * 3)
+
+
+def _relative(changes: Array, size: Array) -> Array:
+    """Changes relative to the size; what has no size must not change."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(changes == 0.0, 0.0, np.abs(changes) / size)
+
+
+def _moved(scene: Scene) -> Iterator[Scene]:
+    """The scene with some of its numbers smaller by one rounding."""
+    for seed in range(DRAWS):
+        draw = np.random.default_rng(seed)
+        changes: dict[str, Any] = {}
+        for section, numbers in scene.values.items():
+            for key, value in numbers.items():
+                if section in EXACT or key in TIMES or isinstance(value, int):
+                    continue
+                factors = 1.0 - EPS * draw.integers(0, 2, np.size(value))
+                moved = (np.atleast_1d(value) * factors).tolist()
+                changes[f"{section}.{key}"] = tuple(moved) if isinstance(value, tuple) else moved[0]
+        yield scene.changed(changes)
+
+
+def _creep(scene: Scene) -> Array:
+    """Speeds (6,) of the bodies over the displacement from rest that causes them, 1/s; 0 in place of positions."""
+    creep = np.zeros(6)
+    for body, (mass, stiffness, damping, _) in enumerate(scene.system.closed_loop):
+        if mass > 0.0 and stiffness > 0.0:
+            rate = np.sqrt(stiffness / mass)
+            creep[COLUMN[body] + 1] = rate if damping <= 2.0 * rate * mass else stiffness / damping
+    return creep
+
+
+def verdict(scene: Scene, right: Answer) -> Verdict:
+    """Run a scene and compare it with its answer.
+
+    The error is relative to what one rounding explains: one of the state, and one of each number of the scene,
+    amplified by the motion. So it is |x - right| / (EPS size (1 + amplification)), the largest over bodies, positions
+    and velocities, and times, where the size is the largest position, or speed, of the start and of that time. A
+    rounding of its position also drives a body on a spring, which gives it a speed of `_creep` times that.
+
+    Returns
+    -------
+    Verdict
+    """
+    try:
+        run = simulate(scene, grid=np.array([*right.t, scene.duration]), sampled=scene.sampled)
+    except ArithmeticError as error:
+        return Verdict(type(error).__name__, np.inf)
+    if run.status.name != right.status:
+        return Verdict(run.status.name, np.inf)
+    there = [COLUMN[body] + k for body in scene.system.present for k in (0, 1)]
+    start, worst = scene.initial_state, 0.0
+    for state, row, amplification in zip(run.state, right.state, right.amplification, strict=False):
+        places = np.array([start, [float(a) for a in row]])
+        size = np.maximum(_size(places), _creep(scene) * np.abs(places).max(axis=0)[PLACES])
+        errors = np.array([float(mpfr(row[i], 120) - float(state[i])) for i in there])
+        worst = max(worst, float(_relative(errors, size[there]).max() / (EPS * (1.0 + amplification))))
+    return Verdict(run.status.name, worst if np.isfinite(worst) else np.inf)
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Write the answers to the scenes of a directory, or to some of them; the others stay."""
+    directory = Path(arguments[0])
+    every = read(directory)
+    for name in arguments[1:] or every:
+        right = answer(every[name])
+        found = {**answers(directory), name: right}
+        text = {known: found[known]._asdict() for known in sorted(found)}
+        (directory / ANSWERS).write_text(json.dumps(text, indent=1) + "\n", encoding="utf-8")
+        sys.stderr.write(f"{name}: until {right.t[-1]:g} s\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,116 @@
+"""What roundings in a run are relative to: sizes of its positions, velocities and impacts, and how far steps wander."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.impact_law import stored_energy
+from grasp_ros.physics.layout import EPS, LEFT, MASS, OBJECT, Work
+from grasp_ros.physics.model import Array, Contact, impact_force
+from grasp_ros.simulation import Trajectory
+from grasp_ros.verification.segments import FIRST, Detail
+
+TINY = 1e-280  # against 0 / 0, and for what underflows
+DIED_OUT = 1e-150  # m or m/s: nothing is said about the digits of such motions
+
+
+class Sizes(NamedTuple):
+    """What roundings are relative to, (k, 1, 3) by body."""
+
+    x: Array  # m, in the segment; in a contact also x_o, because x_o and u are carried and x of the arms follows
+    v: Array  # m/s, in the piece
+
+
+class Impacts(NamedTuple):
+    """One pair in all pieces, at their ends and nodes."""
+
+    side: int
+    u: Array  # (k, n + 2) m
+    d: Array  # u', m/s
+    force: Array  # N
+    by_u: Array  # size of dF/du, N/m
+    by_d: Array  # size of dF/du', N s/m
+    loss: Array  # W
+    noise: Array  # of u by rounding of the positions, m
+    noise_d: Array  # of u', m/s
+    bounce: Array  # (k, 1): mu times the speed of an impact of the segment's energy, kg m/s
+
+
+def walk(run: Trajectory, parts: int) -> float:
+    """How far the roundings of the steps in one of equal parts of a run wander, in roundings of one step."""
+    return math.sqrt(1.0 + float(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS]) / parts)
+
+
+def largest_in_segment(detail: Detail, values: Array) -> Array:
+    """The largest of values (k, ...) of all pieces of the same segment."""
+    segment = detail.pieces.segment
+    largest = np.zeros((int(segment.max(initial=0)) + 1, *values.shape[1:]))
+    np.maximum.at(largest, segment, values)
+    found: Array = largest[segment]
+    return found
+
+
+def rates(bodies: Array) -> Array:
+    """How fast bodies (..., 4) swing or creep by themselves, (...) in 1/s."""
+    mass, stiffness, damping, _ = np.moveaxis(bodies, -1, 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        swing = np.sqrt(np.abs(stiffness) / np.where(mass > 0.0, mass, 1.0))
+        return np.asarray(np.fmin(swing, np.abs(stiffness / damping)))  # an over-damped body creeps
+
+
+def sizes(detail: Detail) -> Sizes:
+    """Sizes of positions and velocities; v of a swing has the digits of its amplitude."""
+    mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
+    own = largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = np.where(stiffness != 0.0, np.abs(force / stiffness), 0.0)
+    swing = rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own)
+    gained = (np.abs(stiffness) * own + np.abs(force)) / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
+    touching = np.zeros(len(own), dtype=bool)
+    for side in detail.run.scene.system.contacts:
+        u = (1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])
+        touching |= (u >= 0.0).any(axis=1)
+    near = np.where(touching, np.abs(detail.x[..., OBJECT]).max(axis=1), 0.0)[:, None, None]
+    v = np.abs(detail.v).max(axis=1, keepdims=True)
+    v = v + np.minimum(swing, gained) + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
+    return Sizes(np.maximum(own, near) + DIED_OUT / EPS, v + DIED_OUT / EPS)
+
+
+def elapsed(detail: Detail) -> Array:
+    """From the begin of the segment to the end of the piece, (k, 1, 1) in s."""
+    segment = detail.pieces.segment
+    start = np.full(int(segment.max(initial=0)) + 1, np.inf)
+    np.minimum.at(start, segment, detail.pieces.begin)
+    found: Array = (detail.pieces.end - start[segment])[:, None, None]
+    return found
+
+
+def impacts(detail: Detail, size: Sizes) -> list[Impacts]:
+    """All pairs that can push; the force is that of `physics.model`, whatever mode was recorded."""
+    return [_impact(detail, size, side) for side in detail.run.scene.system.contacts]
+
+
+def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
+    sign = 1.0 if side == LEFT else -1.0
+    contact = Contact(*detail.run.scene.system.pairs[side])
+    u = sign * (detail.x[..., side] - detail.x[..., OBJECT])
+    d = sign * (detail.v[..., side] - detail.v[..., OBJECT])
+    force = impact_force(contact, u, d)
+    noise = EPS * (size.x[..., side] + size.x[..., OBJECT])
+    noise_d = EPS * (size.v[..., side] + size.v[..., OBJECT])
+    deep, damped = np.maximum(u, 0.0), 1.0 + contact.dissipation * d
+    near = np.maximum(u + noise, 0.0)
+    by_u = 1.5 * contact.hertzian * np.sqrt(near) * (np.maximum(damped, 0.0) + contact.dissipation * noise_d)
+    by_d = np.where(damped >= -contact.dissipation * noise_d, contact.dissipation * contact.hertzian * near**1.5, 0.0)
+    released = contact.hertzian * deep**1.5 * -d
+    loss = np.where(damped >= 0.0, contact.dissipation * contact.hertzian * deep**1.5 * d * d, released)
+    masses = detail.bodies[:, side, MASS], detail.bodies[:, OBJECT, MASS]
+    mu = masses[0] * masses[1] / (masses[0] + masses[1])
+    speed2 = (d * d + 2.0 * stored_energy(contact.hertzian, deep) / mu[:, None]).max(axis=1) * (u > 0.0).any(axis=1)
+    bounce = mu[:, None] * np.sqrt(largest_in_segment(detail, speed2))[:, None]
+    after = (detail.pieces.kind[1:] & FIRST > 0)[:, None]  # the state at an event has the roundings of the way to it
+    bounce[1:] = np.where(after, np.maximum(bounce[1:], bounce[:-1]), bounce[1:])
+    return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce)

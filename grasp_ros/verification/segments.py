@@ -1,0 +1,140 @@
+"""A run seen closely: states at the nodes of a quadrature in every segment between its events and input changes."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.physics.layout import EPS, FORCE, LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.simulation import Trajectory
+from grasp_ros.simulation.trajectory import tick_of, tick_times
+
+NODES = 15  # of Gauss and Legendre in each part of a piece
+MOST_SEGMENTS = 30  # beyond: those at both ends of the run, and every n-th between them
+PIECES = 150  # of all segments together, about
+LEVELS = 1, 8  # of ever shorter pieces at both ends of a segment
+MIDDLE = 3, 12  # equal pieces between them
+GRADING = 0.2  # length of one level by that of the next
+SHORTEST = 64.0 * EPS  # of a piece, relative to its time: nodes must differ
+INNER, FIRST, LAST, WHOLE = range(4)  # which ends of a piece are ends of its segment
+PLACES = [COLUMN[body] for body in (LEFT, RIGHT, OBJECT)]
+
+
+class Rule(NamedTuple):
+    """A quadrature over [0, 1] by the place of a piece in its segment; u^(3/2) is analytic in s at the ends."""
+
+    nodes: Array  # (4, n)
+    weights: Array  # (4, n)
+    coarse: Array  # (4, n): of a rule of half the order on half the nodes
+
+
+class Pieces(NamedTuple):
+    """Parts of segments between events."""
+
+    begin: Array  # (k,) s
+    end: Array  # (k,) s
+    kind: NDArray[np.int64]  # (k,) INNER, FIRST, LAST or WHOLE
+    segment: NDArray[np.int64]  # (k,) number of the segment
+
+
+class Detail(NamedTuple):
+    """A run with its states in pieces; bodies are LEFT, RIGHT, OBJECT, each place 0 and -1 of x and v an end."""
+
+    run: Trajectory
+    pieces: Pieces
+    rule: Rule
+    t: Array  # (k, n + 2) s
+    x: Array  # (k, n + 2, 3) m
+    v: Array  # (k, n + 2, 3) m/s
+    bodies: Array  # (k, 3, 4): m, K, C, f as they act in a piece, see `layout`
+
+    def integral(self, values: Array) -> tuple[Array, Array]:
+        """Integrals (k, ...) over the pieces of values (k, n, ...) at the inner nodes, and the error's estimate."""
+        length = self.pieces.end - self.pieces.begin
+        fine, coarse = (
+            np.einsum("kn,kn...->k...", table[self.pieces.kind] * length[:, None], values)
+            for table in (self.rule.weights, self.rule.coarse)
+        )
+        return fine, np.abs(fine - coarse)
+
+
+@cache
+def rule(parts: int) -> Rule:
+    """Gauss and Legendre in s on equal parts, t = s at inner ends and ~ s^2 at the ends of a segment."""
+    x, weight = np.polynomial.legendre.leggauss(NODES)
+    half = np.zeros(NODES)
+    moments = np.zeros((NODES + 1) // 2)
+    moments[0] = 2.0
+    half[::2] = np.linalg.solve(np.polynomial.legendre.legvander(x[::2], len(moments) - 1).T, moments)
+    s = ((np.arange(parts)[:, None] + 0.5 * (x + 1.0)) / parts).ravel()
+    maps = np.array([s, s * s, s * (2.0 - s), s * s * (3.0 - 2.0 * s)])
+    slopes = np.array([np.ones_like(s), 2.0 * s, 2.0 - 2.0 * s, 6.0 * s * (1.0 - s)])
+    fine, coarse = (slopes * np.tile(0.5 * table / parts, parts) for table in (weight, half))
+    return Rule(maps, fine, coarse)
+
+
+def pieces_of(run: Trajectory) -> Pieces:
+    """Cut a run at its events and where its inputs change, and each segment into pieces, short ones at its ends."""
+    scene = run.scene
+    edges = np.unique(np.concatenate([[0.0, scene.duration], run.event_table[:, 0], _changes(scene)]))
+    edges = edges[(edges >= 0.0) & (edges <= scene.duration)]
+    spans = [(a, b) for a, b in pairwise(edges.tolist()) if b - a > SHORTEST * b]
+    if len(spans) > MOST_SEGMENTS:
+        third = MOST_SEGMENTS // 3
+        inner = spans[third:-third]
+        spans = [*spans[:third], *inner[:: -(-len(inner) // third)], *spans[-third:]]
+    each = PIECES // max(len(spans), 1)
+    levels = min(max((each - MIDDLE[0]) // 2, LEVELS[0]), LEVELS[1])
+    near = GRADING ** np.arange(levels, 0.0, -1.0)
+    middle = np.linspace(near[-1], 1.0 - near[-1], min(max(each - 2 * levels, MIDDLE[0]), MIDDLE[1]) + 1)[1:-1]
+    cuts = np.concatenate([[0.0], near, middle, 1.0 - near[::-1], [1.0]])
+    rows = []
+    for number, (a, b) in enumerate(spans):
+        at = a + (b - a) * cuts
+        at[-1] = b
+        at = at[np.concatenate([[True], np.diff(at) > SHORTEST * b])]
+        at[-1] = b
+        last = len(at) - 2
+        for k, (begin, end) in enumerate(pairwise(at.tolist())):
+            rows.append((begin, end, FIRST * (k == 0) + LAST * (k == last), number))
+    table = np.array(rows).reshape(-1, 4)
+    return Pieces(table[:, 0], table[:, 1], table[:, 2].astype(np.int64), table[:, 3].astype(np.int64))
+
+
+def _changes(scene: Scene) -> Array:
+    """Times at which the inputs of a run can change."""
+    if scene.sampled:
+        return tick_times(scene)
+    ticks = {tick for force in scene.system.external for tick in force.changes(scene.ticks)}
+    return np.array(sorted(ticks)) * scene.period_ns / NANOSECONDS
+
+
+def grid_of(pieces: Pieces, table: Rule) -> Array:
+    """Times (k, n + 2) of the ends and the nodes of all pieces."""
+    length = pieces.end - pieces.begin
+    inner = pieces.begin[:, None] + length[:, None] * table.nodes[pieces.kind]
+    grid = np.column_stack([pieces.begin, inner, pieces.end])
+    return np.minimum(np.maximum.accumulate(grid, axis=1), pieces.end[:, None])
+
+
+def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
+    """The states of a run whose output times are those of `grid_of`, and after them any others."""
+    states = np.nan_to_num(run.state[: grid.size]).reshape(*grid.shape, 6)
+    system = run.scene.system
+    bodies = system.bodies if run.sampled else system.closed_loop
+    acting: Array = np.repeat(bodies[None], len(pieces.begin), axis=0)
+    if run.sampled:
+        acting[..., FORCE] += run.inputs[: grid.size : grid.shape[1]]
+    elif system.external:
+        ticks = tick_of(run.scene, 0.5 * (pieces.begin + pieces.end)).tolist()
+        acting[..., FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
+    places = np.array(PLACES)
+    return Detail(run, pieces, table, grid, states[..., places], states[..., places + 1], acting)

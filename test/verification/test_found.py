@@ -1,0 +1,38 @@
+"""Scenes with corners against their answers in 25 digits, which `grasp_ros.verification.found` writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from grasp_ros.verification.found import LIMIT, answer, answers, read, verdict
+
+DIRECTORY = Path(__file__).parent / "found"
+SCENES, ANSWERS = read(DIRECTORY), answers(DIRECTORY)
+FLUTTER = {"deep_huge_p_stalled": 250.0}  # 1 + p u' is below the rounding of p u': it clamps and re-enters at first
+CHEAP = ("through_the_finger", "together", "free_fall", "pressed_for_a_moment")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_motion_is_right_within_roundings(name: str) -> None:
+    found = verdict(SCENES[name], ANSWERS[name])
+    assert found.error <= FLUTTER.get(name, LIMIT), f"{name}: {found.status}, error in roundings {found.error:.3g}"
+
+
+def test_every_scene_has_its_answer() -> None:
+    assert set(SCENES) == set(ANSWERS)
+    assert all(len(row) == 6 for right in ANSWERS.values() for row in right.state)
+
+
+@pytest.mark.parametrize("name", CHEAP)
+def test_answers_are_those_of_the_reference(name: str) -> None:
+    found, right = answer(SCENES[name]), ANSWERS[name]
+    assert (found.t, found.state, found.status) == (right.t, right.state, right.status)
+    assert found.amplification == pytest.approx(right.amplification, rel=0.1)
+
+
+def test_a_wrong_answer_is_seen() -> None:
+    right = ANSWERS["touching_chain"]
+    moved = [[f"{float(value) * (1 + 1e-9):.20e}" for value in row] for row in right.state]
+    assert verdict(SCENES["touching_chain"], right._replace(state=moved)).error > 1e4
