@@ -7,21 +7,21 @@ import math
 import numpy as np
 
 from grasp_ros.exact.clock import tick, until
-from grasp_ros.exact.flight import flights_of, fly
+from grasp_ros.exact.flight import fly, launch
 from grasp_ros.exact.friction import slide_in_contact
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.kinematics import keep_resting, rate_lanes
+from grasp_ros.exact.kinematics import arm_of, keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
 from grasp_ros.exact.records import (
     Array,
     Candidate,
     Flight,
-    Flights,
     Integers,
     Output,
     Plant,
+    Regime,
     Settings,
     SlideCandidate,
     State,
@@ -36,8 +36,10 @@ from grasp_ros.physics.layout import (
     EPS,
     LANES,
     LEFT,
+    MASS,
     OBJECT,
     RIGHT,
+    STIFFNESS,
     TIME,
     U_L,
     U_R,
@@ -130,16 +132,35 @@ def write_state(at: Array, step: Step, y: Array) -> None:
 
 
 @inlined
-def place_free(step: Step, left: Flight, right: Flight, t: float, y: Array) -> None:
-    """Put the arms that touch nothing where they fly: the lanes know them by the object and the gap."""
-    if not step.left:
-        y[X_L], y[V_L], _ = fly(left, t)
-    if not step.right:
-        y[X_R], y[V_R], _ = fly(right, t)
+def flies_free(plant: Plant, y: Array, side: Body, touches: bool, t: float) -> bool:
+    """Whether an arm that touches nothing is better put where it flies than where object and gap say.
+
+    Their roundings, of the size of x_o, would show in its place, or drive it by its spring within t s.
+    """
+    x, v, _ = arm_of(y, side)
+    row, x_o = plant.bodies[side], abs(y[X_O])
+    return not touches and (x_o > abs(x) or row[STIFFNESS] * t * x_o > row[MASS] * abs(v))
 
 
 @inlined
-def deliver(tables: Tables, step: Step, s: float, t: float, free: Flights, state: State, out: Output) -> None:
+def free_flight(plant: Plant, y: Array, side: Body, flies: bool) -> Flight:
+    """Flight of an arm; what nobody reads if it does not, because a launch has its price."""
+    x, v, _ = arm_of(y, side)
+    return launch(plant.bodies[side], x, v) if flies else Flight(Regime.DRIFT, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@inlined
+def place_free(flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: float, y: Array) -> None:
+    """Put the arms that fly where they are after t s."""
+    if flies_l:
+        y[X_L], y[V_L], _ = fly(free[0], t)
+    if flies_r:
+        y[X_R], y[V_R], _ = fly(free[1], t)
+
+
+@inlined
+def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, bool], free: tuple[Flight, Flight],
+            state: State, out: Output) -> None:
     """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
     at = tables.at
     row = out.filled[Filled.OUTPUTS]
@@ -149,7 +170,7 @@ def deliver(tables: Tables, step: Step, s: float, t: float, free: Flights, state
             break
         values(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
         write_state(at, step, out.rows[row])
-        place_free(step, free.left, free.right, tau, out.rows[row])
+        place_free(flies[0], flies[1], free, tau, out.rows[row])
         row += 1
     out.filled[Filled.OUTPUTS] = row
 
@@ -176,12 +197,13 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         s = invert_time(tables, step, span, s, t)
         t = span
         values(c, n, s, at)
-    free = flights_of(plant, y)
+    flies = (flies_free(plant, y, LEFT, step.left, t), flies_free(plant, y, RIGHT, step.right, t))
+    free = (free_flight(plant, y, LEFT, flies[0]), free_flight(plant, y, RIGHT, flies[1]))
     write_state(at, step, y)
-    place_free(step, free.left, free.right, t, y)
+    place_free(flies[0], flies[1], free, t, y)
     y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
     keep_resting(state)
-    deliver(tables, step, s, t, free, state, out)
+    deliver(tables, step, s, t, flies, free, state, out)
     tick(state.clock, t)
     make_transitions(plant, state, left, right, slide, s, out)
     return t

@@ -96,7 +96,7 @@ def surface_side(plant: Plant, state: State, side: Body) -> float:
 @kernel
 def initial_modes(plant: Plant, state: State) -> None:
     """Modes of both pairs for a run that starts here, until each follows from the other: both at once, for symmetry."""
-    for _ in range(3):
+    for _ in range(3):  # by its motion, beside the other one, and beside that one where it follows from this
         left, right = mode_of(plant, state, LEFT), mode_of(plant, state, RIGHT)
         state.mode[LEFT], state.mode[RIGHT] = left, right
 

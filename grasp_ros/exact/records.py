@@ -166,7 +166,7 @@ class SlideCandidate(NamedTuple):
     """The first event of the object in a segment."""
 
     when: float
-    what: Slide  # the mode that follows; after a stop `modes.slide_of` decides
+    what: Slide  # the mode that follows; after a stop `modes.initial_slide` decides
 
 
 class Leaning(NamedTuple):

@@ -30,7 +30,7 @@ from grasp_ros.physics.layout import (
 
 HIGHEST = 6  # derivative
 DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
-SHORT = 0.2  # of the time constants, see `flight.is_short`
+SHORT = 0.2  # of the time constants, well within those of `flight.SHORT`, where u keeps its own digits
 UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
 
 

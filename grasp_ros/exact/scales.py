@@ -15,6 +15,7 @@ from grasp_ros.physics.layout import (
     HERTZIAN,
     LEFT,
     MASS,
+    OBJECT,
     RIGHT,
     STIFFNESS,
     U_L,
@@ -103,7 +104,19 @@ def relaxation(plant: Plant, state: State, side: Body) -> float:
 @inlined
 def is_squeezed(plant: Plant, state: State, span: float, out: Output) -> bool:
     """Whether a contact relaxes so fast that an implicit step may be worth its price; a trial that failed waits."""
-    if not max(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT)) * span > STIFF:
+    if not (relaxes(plant, state, LEFT, span) or relaxes(plant, state, RIGHT, span)):
         return False
     out.filled[Filled.WAIT] -= 1
     return out.filled[Filled.WAIT] < 0
+
+
+@inlined
+def relaxes(plant: Plant, state: State, side: Body, span: float) -> bool:
+    """Whether `relaxation` times the span is beyond STIFF, without its quotient and its root."""
+    loss, hertzian, u = plant.pairs[side, DISSIPATION], plant.pairs[side, HERTZIAN], state.y[U_L + side]
+    if loss == 0.0 or state.mode[side] != Pair.CONTACT:
+        return False
+    m, m_o = plant.bodies[side, MASS], plant.bodies[OBJECT, MASS]
+    pressed = loss * hertzian * u * span  # times sqrt(u) / mu; mu is no less than half of the smaller mass
+    fast = pressed * pressed * u > (0.25 * STIFF * STIFF) * min(m, m_o) ** 2
+    return fast and relaxation(plant, state, side) * span > STIFF

@@ -14,7 +14,7 @@ from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, motion_of
 from grasp_ros.exact.contact import place_free
 from grasp_ros.exact.energy_check import check_segment, energy_level
-from grasp_ros.exact.flight import flights_of
+from grasp_ros.exact.flight import launch
 from grasp_ros.exact.friction import slide_in_contact, slip_candidate
 from grasp_ros.exact.impact import elastic_force
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
@@ -26,7 +26,7 @@ from grasp_ros.exact.radau import FIRST, INTEGRAL, STAGES, times
 from grasp_ros.exact.records import (
     Array,
     Candidate,
-    Flights,
+    Flight,
     Integers,
     Output,
     Plant,
@@ -62,7 +62,6 @@ from grasp_ros.physics.layout import (
     Work,
 )
 
-LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
 SOON = 1e-3  # of a step: an event so early may hang on a relaxation that the step does not resolve
 NOISY = 1e-3  # part of e at which what is left of a relaxation hides the course of e between the nodes
 
@@ -98,7 +97,7 @@ def squeezed_candidate(tables: Tables, plant: Plant, state: State, side: Body, h
 
 
 @inlined
-def deliver(tables: Tables, step: Step, t: float, free: Flights, state: State, out: Output) -> None:
+def deliver(tables: Tables, step: Step, t: float, free: tuple[Flight, Flight], state: State, out: Output) -> None:
     """Write the states at the output times before the end t of a segment, from the polynomials in t / h."""
     row = out.filled[Filled.OUTPUTS]
     while row < out.grid.shape[0]:
@@ -107,7 +106,7 @@ def deliver(tables: Tables, step: Step, t: float, free: Flights, state: State, o
             break
         values(tables.c, STAGES, tau / step.unit, tables.at)
         write_state(tables.at, out.rows[row])
-        place_free(step, free.left, free.right, tau, out.rows[row])
+        place_free(not step.left, not step.right, free, tau, out.rows[row])
         row += 1
     out.filled[Filled.OUTPUTS] = row
 
@@ -163,11 +162,11 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
         out.filled[Filled.PENALTY] = 0
     t = s * h
     step = Step(int(STAGES), h, state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT)
-    free = flights_of(plant, y)
+    free = (launch(plant.bodies[LEFT], y[X_L], y[V_L]), launch(plant.bodies[RIGHT], y[X_R], y[V_R]))
     deliver(tables, step, t, free, state, out)
     values(c, STAGES, s, at)
     write_state(at, y)
-    place_free(step, free.left, free.right, t, y)
+    place_free(not step.left, not step.right, free, t, y)
     y[U_L], y[U_R] = at[U_L], at[U_R]
     keep_resting(state)
     tick(state.clock, t)

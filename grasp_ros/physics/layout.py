@@ -88,6 +88,6 @@ class Work(IntEnum):
     """Columns of the work counters."""
 
     FLIGHTS = 0  # closed-form segments
-    CONTACT_STEPS = 1  # Taylor steps
-    REJECTED_STEPS = 2  # Taylor steps shortened after a failed defect test
+    CONTACT_STEPS = 1  # Taylor steps, starts and implicit steps
+    REJECTED_STEPS = 2  # Taylor steps shortened after a failed defect test, implicit ones given up
     ROOT_ITERATIONS = 3  # evaluations of an event function

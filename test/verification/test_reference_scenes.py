@@ -85,6 +85,16 @@ def test_a_stuck_object_is_a_wall_until_it_slips() -> None:
     assert weak.state[0][3] > 0
 
 
+def test_a_stuck_object_slips_when_it_is_pushed_at_a_tick() -> None:
+    """F = 1 N: 5 N for 0.4 s give 8 m/s^2, then friction takes 2 m/s^2."""
+    scene = compose(1.0, 0.1, left_arm=body(1.0, -1.0), object=body(0.5), left_contact=CONTACT,
+                    object_friction={"coulomb_N": 1.0}, object_pulse={"force_N": 5.0, "start_s": 0.2, "length_s": 0.4})
+    found = integrate_scene(scene, [0.2, 0.6, 1.0])
+    assert [[float(number) for number in row[2:4]] for row in found.state] == [
+        [0.0, 0.0], pytest.approx([0.64, 3.2]), pytest.approx([1.76, 2.4])]
+    assert [(event.body, event.kind) for event in found.events] == [(2, "slip")]
+
+
 def test_forces_change_at_ticks() -> None:
     scene = compose(1.0, 0.25, left_arm=body(2.0), left_arm_pulse={"force_N": 8.0, "start_s": 0.25, "length_s": 0.5})
     found = integrate_scene(scene, [0.25, 0.5, 1.0])

@@ -40,6 +40,9 @@ class Automaton(Motion):
         for side in SIDES:
             if self.pairs[side] is Pair.LEAVING:
                 self._press(side)
+        if self.slide is Slide.STUCK and self.sliding() is not Slide.STUCK:
+            self.slide = self.sliding()
+            self.events.append(Event(self.state.t, OBJECT, "slip"))
 
     def fire(self, fired: list[Gap]) -> None:
         """Make the transitions of one instant."""
