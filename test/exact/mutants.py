@@ -22,6 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 ROOM = "grasp_ros.exact"
 MODULES = ("modes", "rest")
 EQUIVALENT: dict[str, str] = {
+    "begin_interval: drop mode[side] == Pair.CONTACT: mode[side] == Pair.CONTACT and is_resting(state.y, side)":
+        "`settle_resting` does the same before the first segment",
+    "impact_beside: drop u <= 0.0: state.mode[beside] != Pair.CONTACT or u <= 0.0": "at u = 0 all terms are 0",
     "settle_resting: delete branch: if not (waits_l or waits_r):": "without a pair that waits nothing changes",
 }
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from exact.bench import TOLERANCE, Bench, bench, bits
 
-from grasp_ros.exact.kinematics import is_closed, is_resting, other
+from grasp_ros.exact.kinematics import is_closed, is_resting, other, velocity_lane
 from grasp_ros.exact.modes import (
     LEFT_OUT,
     begin_interval,
@@ -27,7 +27,7 @@ from grasp_ros.exact.modes import (
     surface_side,
 )
 from grasp_ros.exact.records import Candidate, SlideCandidate
-from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, U_L, V_O, Body, Pair, Slide, Transition
+from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, U_L, V_O, X_O, Body, Pair, Slide, Transition
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 NEVER = Candidate(math.inf, Transition.TOUCH)
@@ -62,6 +62,8 @@ def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float
     assert bits(b.state.y[U_L + side]) == bits(u_after)
     assert b.events == [(side, kind)]
     assert b.recorded_motion == [(u_after, d)]
+    place = b.state.y[velocity_lane(side) - 1]
+    assert place == (b.state.y[X_O] if u_after == 0.0 else (u if side == LEFT else -u))
     assert b.mode(other(side)) is Pair.CONTACT
     assert b.state.y[U_L + other(side)] == 0.2
 
@@ -388,6 +390,28 @@ def test_a_pair_that_has_begun_from_rest_is_released_when_an_input_pulls_it(side
 def test_a_tick_leaves_all_other_pairs_alone(side: Body, u: float, d: float, mode: Pair) -> None:
     b = begin(bench(side, u, d, mode, push=-1.0))
     assert (b.mode(side), b.events) == (mode, [])
+
+
+@SIDES
+def test_an_object_that_inputs_hold_at_its_turn_sticks(side: Body) -> None:
+    b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), object_push=4.0))
+    assert (b.slide, b.events) == (Slide.STUCK, [(OBJECT, Transition.STICK)])
+
+
+@SIDES
+def test_an_open_pair_in_motion_does_not_wait(side: Body) -> None:
+    """u = 1e-17 is rounding: `mode_of` would call it a contact."""
+    b = bench(side, 1e-17, -0.3, beside=(0.0, 0.0))
+    settle_resting(b.plant, b.state, b.out)
+    assert (b.mode(side), b.events) == (Pair.OPEN, [])
+
+
+@SIDES
+def test_pairs_that_approach_do_not_leave(side: Body) -> None:
+    both = (1e-20, 1e-9)
+    b = bench(side, *both, Pair.CONTACT, beside=both, beside_mode=Pair.CONTACT, push=-100.0, beside_push=100.0)
+    leave_together(b.plant, b.state, b.settings)
+    assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CONTACT)
 
 
 @SIDES
