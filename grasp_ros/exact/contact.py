@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.clock import tick, until
+from grasp_ros.exact.clock import tick
 from grasp_ros.exact.flight import fly, launch
 from grasp_ros.exact.friction import slide_in_contact
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of, keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
 from grasp_ros.exact.records import (
     Array,
@@ -124,11 +125,11 @@ def penetration(z: float, touching: bool) -> float:
 
 
 @inlined
-def write_state(at: Array, step: Step, y: Array) -> None:
-    """Positions and velocities from the values of the lanes."""
-    y[X_L], y[V_L] = at[X_O] + penetration(at[Z_L], step.left), at[V_L]
+def write_state(at: Array, u_l: float, u_r: float, y: Array) -> None:
+    """Positions and velocities from the values of the lanes and from u."""
+    y[X_L], y[V_L] = at[X_O] + u_l, at[V_L]
     y[X_O], y[V_O] = at[X_O], at[V_O]
-    y[X_R], y[V_R] = at[X_O] - penetration(at[Z_R], step.right), at[V_R]
+    y[X_R], y[V_R] = at[X_O] - u_r, at[V_R]
 
 
 @inlined
@@ -163,16 +164,14 @@ def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, b
             state: State, out: Output) -> None:
     """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
     at = tables.at
-    row = out.filled[Filled.OUTPUTS]
-    while row < out.grid.shape[0]:
-        tau = until(state.clock, out.grid[row])
-        if not tau < t:
-            break
+    tau = due(state, out)
+    while tau < t:
+        row = out.rows[out.filled[Filled.OUTPUTS]]
         values(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
-        write_state(at, step, out.rows[row])
-        place_free(flies[0], flies[1], free, tau, out.rows[row])
-        row += 1
-    out.filled[Filled.OUTPUTS] = row
+        write_state(at, penetration(at[Z_L], step.left), penetration(at[Z_R], step.right), row)
+        place_free(flies[0], flies[1], free, tau, row)
+        out.filled[Filled.OUTPUTS] += 1
+        tau = due(state, out)
 
 
 @inlined
@@ -199,9 +198,9 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         values(c, n, s, at)
     flies = (flies_free(plant, y, LEFT, step.left, t), flies_free(plant, y, RIGHT, step.right, t))
     free = (free_flight(plant, y, LEFT, flies[0]), free_flight(plant, y, RIGHT, flies[1]))
-    write_state(at, step, y)
-    place_free(flies[0], flies[1], free, t, y)
     y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
+    write_state(at, y[U_L], y[U_R], y)
+    place_free(flies[0], flies[1], free, t, y)
     keep_resting(state)
     deliver(tables, step, s, t, flies, free, state, out)
     tick(state.clock, t)

@@ -16,7 +16,7 @@ import math
 
 from grasp_ros.exact.flight import fly
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import bound, own_acceleration
+from grasp_ros.exact.kinematics import bound, next_derivative, own_acceleration
 from grasp_ros.exact.records import Array, EventFunction, Flights, Integers, Motion, PairFlight, Plant
 from grasp_ros.exact.roots import safe_step
 from grasp_ros.physics.layout import (
@@ -73,10 +73,8 @@ def event_function(kind: Transition, pair: PairFlight, at: Motion, left: float) 
     """A function g of time that rises through 0 at an event."""
     arm, body = pair.arm, pair.body
     a, a_o = own_acceleration(arm, at.x, at.v), own_acceleration(body, at.x_o, at.v_o)
-    j = -(arm[DAMPING] * a + arm[STIFFNESS] * at.v) / arm[MASS]
-    j_o = -(body[DAMPING] * a_o + body[STIFFNESS] * at.v_o) / body[MASS]
-    snap = -(arm[DAMPING] * j + arm[STIFFNESS] * a) / arm[MASS]
-    snap_o = -(body[DAMPING] * j_o + body[STIFFNESS] * a_o) / body[MASS]
+    j, j_o = next_derivative(arm, at.v, a), next_derivative(body, at.v_o, a_o)
+    snap, snap_o = next_derivative(arm, a, j), next_derivative(body, a_o, j_o)
     if pair.alike:
         growth = bound(arm, j - j_o, snap - snap_o, left)
     else:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.clock import tick, until
+from grasp_ros.exact.clock import tick
 from grasp_ros.exact.flight import FLIGHT_ORDER, expand_flight, flights_of, fly
 from grasp_ros.exact.flight_events import first_root, motion_at, pair_in_flight
 from grasp_ros.exact.friction import slide_in_flight
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, keep_resting, write_penetrations
 from grasp_ros.exact.modes import make_transitions
-from grasp_ros.exact.outputs import write_row
+from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Candidate, Flights, Integers, Motion, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.rest import parting_time
@@ -65,22 +65,18 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
 
     The tables belong to fixed parts of the flight, so that no state depends on the other output times.
     """
-    row, rate = out.filled[Filled.OUTPUTS], settings.rate
-    part = -1.0
-    begin = 0.0
-    while row < out.grid.shape[0]:
-        tau = until(state.clock, out.grid[row])
-        if not tau < t:
-            break
+    rate, part, begin = settings.rate, -1.0, 0.0
+    tau = due(state, out)
+    while tau < t:
         own = math.floor(tau * 2.0 * rate)
         if own != part:
             part = own
             begin = part / (2.0 * rate) if part > 0.0 else 0.0
             expand_flight(plant.bodies, flights, begin, tables.c)
         values(tables.c, FLIGHT_ORDER, tau - begin, tables.at)
-        write_row(out, row, tables.at)
-        row += 1
-    out.filled[Filled.OUTPUTS] = row
+        write_row(out, out.filled[Filled.OUTPUTS], tables.at)
+        out.filled[Filled.OUTPUTS] += 1
+        tau = due(state, out)
 
 
 @inlined

@@ -120,8 +120,14 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
 
 
 @kernel
+def push_rounding(plant: Plant, impacts: float) -> float:
+    """Rounding of what pushes the object, N: of impact forces of that sum, of friction and of the rest."""
+    return DOUBT * (impacts + (abs(plant.given[OBJECT, FORCE]) + plant.coulomb))
+
+
+@kernel
 def doubt(tables: Tables, plant: Plant, mode: Integers) -> float:
-    """Rounding of what pushes the object at the begin of a step, N: of the impact forces, friction and the rest."""
+    """`push_rounding` at the begin of a Taylor step."""
     c, impacts = tables.c, 0.0
     for side in (LEFT, RIGHT):
         if mode[side] == Pair.CONTACT:
@@ -129,7 +135,7 @@ def doubt(tables: Tables, plant: Plant, mode: Integers) -> float:
             loss, w = plant.pairs[side, DISSIPATION], c[Z_L + side]
             factor = 1.0 + loss * (abs(c[front]) + abs(c[back]))
             impacts += elastic_force(plant.pairs[side, HERTZIAN], w * w) * factor
-    return DOUBT * (impacts + (abs(plant.given[OBJECT, FORCE]) + plant.coulomb))
+    return push_rounding(plant, impacts)
 
 
 @kernel

@@ -60,7 +60,7 @@ def advance(
     plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, clock)
     settings = new_settings(tolerance, row.shape[0] - 1, given)
     out = Output(grid, rows, events, filled, work)
-    begin_interval(plant, state, settings, out)
+    begin_interval(plant, state, out)
     idle = 0
     before = energy_level(plant, state, 0.0)
     while True:

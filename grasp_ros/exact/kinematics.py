@@ -118,15 +118,21 @@ def bound(body: Array, q: float, q_rate: float, span: float) -> float:
 
 
 @kernel
+def next_derivative(body: Array, before: float, value: float) -> float:
+    """The derivative after two of a body's flight, from the second one on: m q'' = -(c q' + k q)."""
+    return -(body[DAMPING] * value + body[STIFFNESS] * before) / body[MASS]
+
+
+@kernel
 def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, float, float]:
     """Derivatives `order` >= 2 and order + 1 of a body's flight, m/s^order, and the sum of the sizes of the first."""
     m, k, c, f = body[MASS], body[STIFFNESS], body[DAMPING], body[FORCE]
     value, size = own_acceleration(body, x, v), (abs(f) + abs(k * x) + abs(c * v)) / m
     before, before_size = v, abs(v)
     for _ in range(order - 2):
-        following, following_size = -(c * value + k * before) / m, (abs(c) * size + k * before_size) / m
+        following, following_size = next_derivative(body, before, value), (abs(c) * size + k * before_size) / m
         before, before_size, value, size = value, size, following, following_size
-    return value, -(c * value + k * before) / m, size
+    return value, next_derivative(body, before, value), size
 
 
 @inlined

@@ -118,7 +118,7 @@ def initial_slide(plant: Plant, state: State) -> None:
 
 
 @kernel
-def begin_interval(plant: Plant, state: State, settings: Settings, out: Output) -> None:
+def begin_interval(plant: Plant, state: State, out: Output) -> None:
     """Modes under the inputs of a new interval, which may be discontinuous here; a run that starts gets its first.
 
     An interval that goes on after it has handed over its events keeps its modes.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from grasp_ros.exact.clock import until
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Output, State
@@ -43,14 +45,19 @@ def write_row(out: Output, row: int, y: Array) -> None:
 
 
 @inlined
+def due(state: State, out: Output) -> float:
+    """Seconds from now to the next output time; inf if there is none."""
+    row = out.filled[Filled.OUTPUTS]
+    return until(state.clock, out.grid[row]) if row < out.grid.shape[0] else math.inf
+
+
+@inlined
 def write_reached(state: State, out: Output) -> int:
     """Write the state at all output times that are reached; returns the number of rows in use."""
-    row = out.filled[Filled.OUTPUTS]
-    while row < out.grid.shape[0] and until(state.clock, out.grid[row]) <= 0.0:
-        write_row(out, row, state.y)
-        row += 1
-    out.filled[Filled.OUTPUTS] = row
-    return row
+    while due(state, out) <= 0.0:
+        write_row(out, out.filled[Filled.OUTPUTS], state.y)
+        out.filled[Filled.OUTPUTS] += 1
+    return out.filled[Filled.OUTPUTS]
 
 
 @inlined

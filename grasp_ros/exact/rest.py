@@ -1,4 +1,4 @@
-"""A pair at u = u' = 0: which way it goes, how long that is certain, and what is left of a contact near u = 0.
+"""A pair at u = u' = 0: which way it goes, how long that is certain, and whether its force matters.
 
 Each body obeys m x'' + c x' + k x = f, so its derivatives follow from each other, and the first one in which arm and
 object differ decides. Their motion relative to each other obeys an equation of order five: no difference up to order
@@ -128,26 +128,6 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
     if plant.bodies[OBJECT, MASS] == math.inf and force > DOUBT * plant.coulomb:
         return False
     return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
-
-
-@kernel
-def exponent(x: float) -> int:
-    """e of the power of two 2^e <= x < 2^(e + 1)."""
-    return math.frexp(x)[1] - 1
-
-
-@kernel
-def time_of_impulse(per_hertz: float, loss: float, order: int, a: float) -> float:
-    """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
-
-    H u^(5/2) (1 + p u') = mu u'^2, without the numbers; per_hertz is mu / H. It compares exponents, and integers of
-    them: other units give the same time.
-    """
-    n, above = float(order), exponent(a) + 1  # 2^above >= a
-    e = (4 * exponent(per_hertz * n * n) - 2 * above) // (2 * order + 8)
-    if loss > 0.0:
-        e = min(e, (2 * exponent(per_hertz * n / loss) - 3 * above) // (3 * order + 2))
-    return math.ldexp(1.0, e)
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""How fast the regularised time runs: the unit of a Taylor step, from the state alone; the step may correct it."""
+"""Powers of two for units and times, and the unit of a Taylor step, from the state alone; the step may correct it."""
 
 from __future__ import annotations
 
@@ -28,9 +28,37 @@ STIFF = 500.0  # relaxations within an implicit step from which on it is no dear
 
 
 @kernel
+def exponent(x: float) -> int:
+    """e of the power of two 2^e <= x < 2^(e + 1)."""
+    return math.frexp(x)[1] - 1
+
+
+@kernel
+def orders_to_one(x: float, most: int) -> int:
+    """Binary orders by which a unit is to change for x >= 0 to come near 1: at most `most`, and these for 0 and inf."""
+    if 0.0 < x < math.inf:
+        return min(max(math.frexp(x)[1], -most), most)
+    return most if x > 0.0 else -most
+
+
+@kernel
 def power_of_two_root(x: float, degree: int) -> float:
     """The power of two above the root of x >= 0; comparing exponents is cheaper than taking the root."""
-    return math.ldexp(1.0, (math.frexp(x)[1] - 1) // degree + 1) if x > 0.0 else 0.0
+    return math.ldexp(1.0, exponent(x) // degree + 1) if x > 0.0 else 0.0
+
+
+@kernel
+def time_of_impulse(per_hertz: float, loss: float, order: int, a: float) -> float:
+    """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
+
+    H u^(5/2) (1 + p u') = mu u'^2, without the numbers; per_hertz is mu / H. It compares exponents, and integers of
+    them: other units give the same time.
+    """
+    n, above = float(order), exponent(a) + 1  # 2^above >= a
+    e = (4 * exponent(per_hertz * n * n) - 2 * above) // (2 * order + 8)
+    if loss > 0.0:
+        e = min(e, (2 * exponent(per_hertz * n / loss) - 3 * above) // (3 * order + 2))
+    return math.ldexp(1.0, e)
 
 
 @kernel

@@ -12,15 +12,15 @@ import math
 
 from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, motion_of
-from grasp_ros.exact.contact import place_free
+from grasp_ros.exact.contact import free_flight, place_free, write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
-from grasp_ros.exact.flight import launch
 from grasp_ros.exact.friction import slide_in_contact, slip_candidate
 from grasp_ros.exact.impact import elastic_force
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import is_clamped, keep_resting
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.radau import FIRST, INTEGRAL, STAGES, times
 from grasp_ros.exact.records import (
@@ -33,7 +33,6 @@ from grasp_ros.exact.records import (
     SlideCandidate,
     Start,
     State,
-    Step,
     Tables,
 )
 from grasp_ros.exact.roots import first_rise
@@ -47,12 +46,6 @@ from grasp_ros.physics.layout import (
     RIGHT,
     U_L,
     U_R,
-    V_L,
-    V_O,
-    V_R,
-    X_L,
-    X_O,
-    X_R,
     Body,
     Filled,
     Outcome,
@@ -97,25 +90,17 @@ def squeezed_candidate(tables: Tables, plant: Plant, state: State, side: Body, h
 
 
 @inlined
-def deliver(tables: Tables, step: Step, t: float, free: tuple[Flight, Flight], state: State, out: Output) -> None:
+def deliver(tables: Tables, h: float, t: float, flies: tuple[bool, bool], free: tuple[Flight, Flight], state: State,
+            out: Output) -> None:
     """Write the states at the output times before the end t of a segment, from the polynomials in t / h."""
-    row = out.filled[Filled.OUTPUTS]
-    while row < out.grid.shape[0]:
-        tau = until(state.clock, out.grid[row])
-        if not tau < t:
-            break
-        values(tables.c, STAGES, tau / step.unit, tables.at)
-        write_state(tables.at, out.rows[row])
-        place_free(not step.left, not step.right, free, tau, out.rows[row])
-        row += 1
-    out.filled[Filled.OUTPUTS] = row
-
-
-@inlined
-def write_state(at: Array, y: Array) -> None:
-    """Positions and velocities from the values of the lanes."""
-    y[X_L], y[V_L], y[X_O], y[V_O] = at[X_O] + at[U_L], at[V_L], at[X_O], at[V_O]
-    y[X_R], y[V_R] = at[X_O] - at[U_R], at[V_R]
+    tau = due(state, out)
+    while tau < t:
+        row = out.rows[out.filled[Filled.OUTPUTS]]
+        values(tables.c, STAGES, tau / h, tables.at)
+        write_state(tables.at, tables.at[U_L], tables.at[U_R], row)
+        place_free(flies[0], flies[1], free, tau, row)
+        out.filled[Filled.OUTPUTS] += 1
+        tau = due(state, out)
 
 
 @kernel
@@ -161,13 +146,13 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     else:
         out.filled[Filled.PENALTY] = 0
     t = s * h
-    step = Step(int(STAGES), h, state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT)
-    free = (launch(plant.bodies[LEFT], y[X_L], y[V_L]), launch(plant.bodies[RIGHT], y[X_R], y[V_R]))
-    deliver(tables, step, t, free, state, out)
+    flies = (state.mode[LEFT] != Pair.CONTACT, state.mode[RIGHT] != Pair.CONTACT)
+    free = (free_flight(plant, y, LEFT, flies[0]), free_flight(plant, y, RIGHT, flies[1]))
+    deliver(tables, h, t, flies, free, state, out)
     values(c, STAGES, s, at)
-    write_state(at, y)
-    place_free(not step.left, not step.right, free, t, y)
     y[U_L], y[U_R] = at[U_L], at[U_R]
+    write_state(at, y[U_L], y[U_R], y)
+    place_free(flies[0], flies[1], free, t, y)
     keep_resting(state)
     tick(state.clock, t)
     make_transitions(plant, state, left, right, slide, s, out)

@@ -10,14 +10,14 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.clock import tick, until
+from grasp_ros.exact.clock import tick
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, keep_resting, reduced_mass
-from grasp_ros.exact.outputs import write_row
+from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, Start, State, Tables
-from grasp_ros.exact.rest import NEVER, UNDECIDED, is_negligible, leaning, time_of_impulse
-from grasp_ros.exact.scales import power_of_two_root
+from grasp_ros.exact.rest import NEVER, UNDECIDED, is_negligible, leaning
+from grasp_ros.exact.scales import orders_to_one, power_of_two_root, time_of_impulse
 from grasp_ros.exact.start_series import NONE, POWERS, damped_leads, expand_start, first_of, force_of, leads, reach_of
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -130,8 +130,7 @@ def scaled_series(tables: Tables, plant: Plant, state: State, settings: Settings
         reach = reach_of(tables.start.c, n, settings, tail)
         if 1.0 / FITS < reach < FITS or reach == math.inf:
             break
-        e = math.frexp(reach)[1] if reach > 0.0 else -MOST  # 0: coefficients have left the range of numbers
-        scale *= math.ldexp(1.0, POWERS * min(max(e, -MOST), MOST))
+        scale *= math.ldexp(1.0, POWERS * orders_to_one(reach, MOST))
     return scale, reach
 
 
@@ -162,16 +161,13 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
             break
         h *= 0.5
     t = span if h == whole else scale * ((h * h) * (h * h))
-    row = out.filled[Filled.OUTPUTS]
-    while row < out.grid.shape[0]:
-        tau = until(state.clock, out.grid[row])
-        if not tau < t:
-            break
+    tau = due(state, out)
+    while tau < t:
         values(tables.start.c, n, math.sqrt(math.sqrt(tau / scale)), at)
         place(at, state.mode)
-        write_row(out, row, at)
-        row += 1
-    out.filled[Filled.OUTPUTS] = row
+        write_row(out, out.filled[Filled.OUTPUTS], at)
+        out.filled[Filled.OUTPUTS] += 1
+        tau = due(state, out)
     values(tables.start.c, n, h, at)
     place(at, state.mode)
     for lane in range(LANES):

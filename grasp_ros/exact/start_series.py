@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.friction import push_rounding
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import rate_lanes
 from grasp_ros.exact.records import Array, Plant, Settings, Start
-from grasp_ros.exact.rest import DOUBT
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -107,22 +107,17 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
         one = 1.0 if k == 0 else 0.0
         c[following + V_L] = share * pushed(plant.bodies[LEFT], one, c[i + X_L], c[i + V_L], -force_l)
         c[following + V_R] = share * pushed(plant.bodies[RIGHT], one, c[i + X_R], c[i + V_R], force_r)
-        a = pushed(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force_l - force_r)
-        slips = k == 0 and plant.coulomb > 0.0 and y[V_O] == 0.0
-        c[following + V_O] = 0.0 if slips and is_doubtful(plant, a, force_l + force_r) else share * a
+        a_o = pushed(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force_l - force_r)
+        slips = k == 0 and plant.coulomb > 0.0 and y[V_O] == 0.0  # within rounding the next order decides
+        if slips and abs(a_o) * plant.bodies[OBJECT, MASS] <= push_rounding(plant, force_l + force_r):
+            a_o = 0.0
+        c[following + V_O] = share * a_o
         c[following + X_L], c[following + X_R] = share * c[i + V_L], share * c[i + V_R]
         c[following + X_O] = share * c[i + V_O]
         if k + POWERS >= begin_l:
             c[following + U_L] = share * (c[i + V_L] - c[i + V_O])
         if k + POWERS >= begin_r:
             c[following + U_R] = share * (c[i + V_O] - c[i + V_R])
-
-
-@kernel
-def is_doubtful(plant: Plant, a: float, impacts: float) -> bool:
-    """Whether an object that has just slipped is pushed by no more than rounding: the next order decides."""
-    terms = impacts + (abs(plant.given[OBJECT, FORCE]) + plant.coulomb)
-    return abs(a) * plant.bodies[OBJECT, MASS] <= DOUBT * terms
 
 
 @kernel

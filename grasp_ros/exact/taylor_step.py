@@ -8,6 +8,7 @@ from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import rate_lanes, velocity_lane
 from grasp_ros.exact.polynomial import curvatures, larger, products, sizes, values
 from grasp_ros.exact.records import Array, Integers, Plant, Settings, State, Step, Tables
+from grasp_ros.exact.scales import orders_to_one
 from grasp_ros.exact.series import ONE, expand_both, expand_one
 from grasp_ros.physics.layout import (
     CHECK,
@@ -154,8 +155,7 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
             apart = (step.left and tables.at[Z_L] <= 0.0) or (step.right and tables.at[Z_R] <= 0.0)
             if apart or tables.at[TIME] >= span:
                 return step, 1.0
-        e = math.frexp(h)[1] if 0.0 < h < math.inf else (MOST if h > 0.0 else -MOST)
-        unit = step.unit * math.ldexp(1.0, min(max(e, -MOST), MOST))
+        unit = step.unit * math.ldexp(1.0, orders_to_one(h, MOST))
         step = Step(step.order, unit, step.left, step.right)
     return step, math.nan
 

@@ -16,7 +16,7 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Product
 from grasp_ros.verification.relations import SWAPPED, mirrored, scaled
-from grasp_ros.verification.roundings import TINY
+from grasp_ros.verification.roundings import TINY, largest
 
 UNDERFLOW = 1e-100  # motions below lose digits in squares and powers 5/2, in other units others
 UNITS = 4.0, 2.0, 0.5  # of length, time and mass
@@ -85,7 +85,7 @@ def short_periods(run: Trajectory, product: Product) -> Iterator[tuple[str, floa
     continuous = part(PERIODS[-1], False)
     if len(continuous.event_table) > FEW or continuous.work[Work.CONTACT_STEPS] > SOME:
         return
-    size = np.tile(np.abs(np.nan_to_num(continuous.state).reshape(-1, 3, 2)).max(axis=(0, 1)) + TINY, 3)
+    size = largest(continuous.state) + TINY
     first, *_, last = (
         float(np.nanmax(np.abs(part(periods, True).state[-1] - continuous.state[-1]) / size)) for periods in PERIODS
     )

@@ -23,6 +23,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.verification.reference import integrate_scene
+from grasp_ros.verification.roundings import largest, rates
 
 ANSWERS = "answers.json"
 DIGITS = 25
@@ -31,7 +32,6 @@ HALVINGS, PARTS = 16, 16  # of the horizon, where it may end
 FORGOTTEN = 1e6  # amplification beyond which a comparison tells little
 LARGE = 1e300  # m, m/s: beyond, the motion outgrows doubles
 DRAWS, DRAWN_DIGITS = 2, 20  # of the amplification
-PLACES = [0, 0, 2, 2, 4, 4]  # the position of each number of a state
 LIMIT = 100.0  # roundings that are right
 TIMES = {"start_s", "length_s", "time_s"}  # must stay whole control periods
 EXACT = ("time", "left_sensor", "right_sensor")  # sections whose numbers stay
@@ -80,12 +80,10 @@ def answer(scene: Scene) -> Answer:
     right = integrate_scene(scene, times, DIGITS, budget=STEPS)
     small = [row for row in right.state if max(map(abs, row)) < LARGE]
     drawn = [integrate_scene(moved, times[: len(small)], DRAWN_DIGITS, budget=STEPS).state for moved in _moved(scene)]
-    start, amplification = scene.initial_state.tolist(), []
+    amplification = []
     for row, *changed in zip(small, *drawn, strict=False):
-        places = np.array([start, [float(a) for a in row]])
-        size = np.maximum(_size(places), _creep(scene) * np.abs(places).max(axis=0)[PLACES])
         changes = np.array([[float(a - b) for a, b in zip(draw, row, strict=True)] for draw in changed])
-        amplification.append(float(_relative(changes, size).max() / EPS))
+        amplification.append(float(_relative(changes, _size(scene, row)).max() / EPS))
     last = max((k for k, value in enumerate(amplification) if value <= FORGOTTEN), default=0)
     middle = max((k for k in range(last) if times[k] <= times[last] / 2), default=last)
     kept = sorted({middle, last})
@@ -98,9 +96,18 @@ def _text(value: Any) -> str:
     return f"{value:.{DIGITS - 1}e}"
 
 
-def _size(states: Array) -> Array:
-    """The largest position and the largest speed, for each column (6,)."""
-    return np.array([np.nanmax(np.abs(states[:, ::2])), np.nanmax(np.abs(states[:, 1::2]))] * 3)
+def _size(scene: Scene, row: Sequence[Any]) -> Array:
+    """What errors of a state are relative to, (6,): the largest position, or speed, of the start and of that state.
+
+    A rounding of its position also drives a body on a spring, which gives it a speed of `roundings.rates` times that.
+    """
+    states = np.array([scene.initial_state, [float(number) for number in row]])
+    size = largest(states)
+    places = np.abs(states).max(axis=0)
+    for body, rate in enumerate(rates(scene.system.closed_loop)):
+        column = COLUMN[body]
+        size[column + 1] = max(size[column + 1], rate * places[column])
+    return size
 
 
 def _relative(changes: Array, size: Array) -> Array:
@@ -124,23 +131,12 @@ def _moved(scene: Scene) -> Iterator[Scene]:
         yield scene.changed(changes)
 
 
-def _creep(scene: Scene) -> Array:
-    """Speeds (6,) of the bodies over the displacement from rest that causes them, 1/s; 0 in place of positions."""
-    creep = np.zeros(6)
-    for body, (mass, stiffness, damping, _) in enumerate(scene.system.closed_loop):
-        if mass > 0.0 and stiffness > 0.0:
-            rate = np.sqrt(stiffness / mass)
-            creep[COLUMN[body] + 1] = rate if damping <= 2.0 * rate * mass else stiffness / damping
-    return creep
-
-
 def verdict(scene: Scene, right: Answer) -> Verdict:
     """Run a scene and compare it with its answer.
 
     The error is relative to what one rounding explains: one of the state, and one of each number of the scene,
     amplified by the motion. So it is |x - right| / (EPS size (1 + amplification)), the largest over bodies, positions
-    and velocities, and times, where the size is the largest position, or speed, of the start and of that time. A
-    rounding of its position also drives a body on a spring, which gives it a speed of `_creep` times that.
+    and velocities, and times, relative to `_size`.
 
     Returns
     -------
@@ -153,10 +149,9 @@ def verdict(scene: Scene, right: Answer) -> Verdict:
     if run.status.name != right.status:
         return Verdict(run.status.name, np.inf)
     there = [COLUMN[body] + k for body in scene.system.present for k in (0, 1)]
-    start, worst = scene.initial_state, 0.0
+    worst = 0.0
     for state, row, amplification in zip(run.state, right.state, right.amplification, strict=False):
-        places = np.array([start, [float(a) for a in row]])
-        size = np.maximum(_size(places), _creep(scene) * np.abs(places).max(axis=0)[PLACES])
+        size = _size(scene, row)
         errors = np.array([float(mpfr(row[i], 120) - float(state[i])) for i in there])
         worst = max(worst, float(_relative(errors, size[there]).max() / (EPS * (1.0 + amplification))))
     return Verdict(run.status.name, worst if np.isfinite(worst) else np.inf)

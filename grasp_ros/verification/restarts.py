@@ -21,7 +21,7 @@ from grasp_ros.verification.cases.case import Product, Unfinished
 from grasp_ros.verification.cases.scenes import reference
 from grasp_ros.verification.deadline import Deadline, deadline
 from grasp_ros.verification.relations import FLIP
-from grasp_ros.verification.roundings import TINY, impacts, rates, sizes, walk
+from grasp_ros.verification.roundings import TINY, impacts, largest, rates, sizes, walk
 from grasp_ros.verification.segments import FIRST, LAST, PLACES, Detail
 
 NUDGE = 2.0**-46  # of the size of a state
@@ -130,7 +130,7 @@ def _go(run: Trajectory, state: Array, inputs: Array, offsets: Array, product: P
 def _end_beside_nudged(run: Trajectory, start: Array, product: Product) -> tuple[Array, Array]:
     """The end (6,) of a whole run from a state, and what roundings of the start and at each event make of it."""
     system, seconds = run.scene.system, np.array([run.scene.duration])
-    size = np.tile(np.abs(np.nan_to_num(run.state).reshape(-1, 3, 2)).max(axis=(0, 1)) + TINY, 3)
+    size = largest(run.state) + TINY
     size[[COLUMN[body] + part for body in system.absent for part in (0, 1)]] = 0.0
     end, *nudged = (_go(run, start + nudge * size * PATTERN, np.zeros(3), seconds, product)[0]
                     for nudge in (0.0, NUDGE, -NUDGE))

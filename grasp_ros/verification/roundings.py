@@ -44,6 +44,12 @@ def walk(run: Trajectory, parts: int) -> float:
     return math.sqrt(1.0 + float(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS]) / parts)
 
 
+def largest(states: Array) -> Array:
+    """The largest position and the largest speed of states (n, 6), for each column (6,); what is absent counts as 0."""
+    found: Array = np.tile(np.abs(np.nan_to_num(states).reshape(-1, 3, 2)).max(axis=(0, 1)), 3)
+    return found
+
+
 def largest_in_segment(detail: Detail, values: Array) -> Array:
     """The largest of values (k, ...) of all pieces of the same segment."""
     segment = detail.pieces.segment

@@ -320,7 +320,7 @@ def test_an_object_that_turns_without_a_rest_is_no_event(side: Body) -> None:
 
 def begin(b: Bench) -> Bench:
     """Begin an interval, as far as its first segment."""
-    begin_interval(b.plant, b.state, b.settings, b.out)
+    begin_interval(b.plant, b.state, b.out)
     settle_resting(b.plant, b.state, b.out)
     return b
 

@@ -22,8 +22,8 @@ from grasp_ros.exact.rest import (
     impact_beside,
     leaning,
     parting_time,
-    time_of_impulse,
 )
+from grasp_ros.exact.scales import time_of_impulse
 from grasp_ros.physics.layout import (
     DAMPING,
     EPS,

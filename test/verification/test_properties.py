@@ -1,8 +1,9 @@
-"""Properties of all scenes, searched by hypothesis with a fixed seed; `grasp study fuzz` searches for longer."""
+"""Properties of scenes drawn with a fixed seed; `grasp study fuzz` searches for longer."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import DAMPING
 from grasp_ros.physics.model import Arm, Contact
+from grasp_ros.scene import Scene
 from grasp_ros.verification import fuzz, properties
 from grasp_ros.verification.cases.case import Product
 from grasp_ros.verification.cases.impacts import impact_error
@@ -28,20 +30,19 @@ FIXED = settings(
     derandomize=True, database=None, deadline=None, max_examples=100, phases=(Phase.explicit, Phase.generate),
     suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.filter_too_much],
 )
-PART = st.floats(0.0, 1.0, exclude_max=True)
-NUMBERS_OF_A_SCENE = st.lists(PART, min_size=NUMBERS, max_size=NUMBERS)
+DRAWS = 100
 
 
-@FIXED
-@given(NUMBERS_OF_A_SCENE)
-def test_every_ordinary_scene_keeps_all_properties_or_ends_with_a_status(numbers: list[float]) -> None:
-    assert examine(draw_ordinary(Draw(numbers))).broken == []
+def drawn(draw_scene: Callable[[Draw], Scene]) -> list[Scene]:
+    """The same scenes whatever else runs: hypothesis mixes numbers from the sources of the day into its floats."""
+    rng = np.random.default_rng(1)
+    return [draw_scene(Draw(rng.random(NUMBERS).tolist())) for _ in range(DRAWS)]
 
 
-@FIXED
-@given(NUMBERS_OF_A_SCENE)
-def test_every_degenerate_scene_keeps_all_properties_or_ends_with_a_status(numbers: list[float]) -> None:
-    assert examine(draw_degenerate(Draw(numbers))).broken == []
+@pytest.mark.parametrize("draw_scene", [draw_ordinary, draw_degenerate])
+def test_every_scene_keeps_all_properties_or_ends_with_a_status(draw_scene: Callable[[Draw], Scene]) -> None:
+    broken = {scene.to_yaml(): checks for scene in drawn(draw_scene) if (checks := examine(scene).broken)}
+    assert broken == {}
 
 
 def test_ordinary_scenes_cover_what_they_should() -> None:
