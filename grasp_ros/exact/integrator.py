@@ -12,9 +12,11 @@ import numpy as np
 from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
-from grasp_ros.exact.records import Tables
+from grasp_ros.exact.records import Plant, State, Tables
 from grasp_ros.exact.series import new_tables, series_order
+from grasp_ros.exact.sight import Wanted
 from grasp_ros.exact.squeezed import creep
+from grasp_ros.exact.watcher import Watcher
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EVENT_TIME, FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Transition, Work
@@ -116,9 +118,9 @@ class Integrator:
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
-        self._system, self._accuracy = system, accuracy
+        self._system, self._continuous, self._accuracy = system, continuous, accuracy
         self._max_events, self._max_work = max_events, max_work
-        self._time = 0.0
+        self._time, self._clock = 0.0, np.zeros(2)
         self._given = system.closed_loop if continuous else system.bodies.copy()
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
@@ -130,6 +132,27 @@ class Integrator:
         self._tables, self._event_rows = _workspace(accuracy)
         self._events: list[Array] = []
         self._event_count = 0
+        self._watcher: Watcher | None = None
+
+    def watch(self, wanted: Wanted, bound: float) -> Watcher:
+        """Watch the run from here on; it is compiled where it has not been.
+
+        Parameters
+        ----------
+        wanted : Wanted
+        bound : float
+            Part of the largest displacement within which the run counts as settled.
+        """
+        plant, state = Plant(self._given, self._bodies, self._pairs, self._coulomb), State(self._y, self._mode, self._clock)
+        system, watcher = self._system, Watcher(plant, state, wanted)
+        watcher.loop[:], watcher.own[:] = system.closed_loop, system.bodies
+        watcher.base[:] = watcher.loop if self._continuous else watcher.own
+        if self._continuous:
+            for side, law in system.laws.items():
+                watcher.gains[side] = law.position_gain, law.velocity_gain
+        watcher.begin(bound)
+        self._watcher = watcher
+        return watcher
 
     @property
     def state(self) -> Array:
@@ -194,7 +217,10 @@ class Integrator:
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else np.ascontiguousarray(grid, dtype=float)
         out = np.empty((len(times), 6))
-        clock, filled = np.zeros(2), np.zeros(len(Filled), dtype=np.int64)
+        clock, filled = self._clock, np.zeros(len(Filled), dtype=np.int64)
+        clock[:] = 0.0
+        if self._watcher is not None:
+            self._watcher.attach(filled, self._tables)
         door = advance
         while self.status is Status.DONE:
             allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
