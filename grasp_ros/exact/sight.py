@@ -58,16 +58,14 @@ class Seen(IntEnum):
     RISE = 31  # largest V_c less the least before it
     OUTSIDE = 32  # last time at which a body was outside the bound, s
     BOUND = 33  # m
-    BEGIN = 34  # of the interval, s
-    CLOCK = 35  # time since then
-    SEGMENTS = 36
-    KEPT = 37  # kind of the segment that is kept, for the last time outside; NONE: it is known
-    KEPT_TIME = 38  # its length, s
-    KEPT_BEGIN = 39
-    KEPT_STEP = 40  # its end in the variable of its polynomials
-    KEPT_UNIT = 41
-    INSIDE = 42  # 1: no body was outside when the last segment ended
-    STATE = 43  # at the begin of the next segment
+    SEGMENTS = 34
+    KEPT = 35  # kind of the segment that is kept, for the last time outside; NONE: it is known
+    KEPT_TIME = 36  # its length, s
+    KEPT_BEGIN = 37
+    KEPT_STEP = 38  # its end in the variable of its polynomials
+    KEPT_UNIT = 39
+    INSIDE = 40  # 1: no body was outside when the last segment ended
+    STATE = 41  # at the begin of the next segment
 
 
 SEEN = Seen.STATE + STATES

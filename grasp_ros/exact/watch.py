@@ -49,7 +49,7 @@ from grasp_ros.physics.layout import (
     Segment,
 )
 
-PLACES = len(Context)
+PLACES, CLOCK = len(Context), 3
 
 
 
@@ -120,22 +120,13 @@ def watch_level(context: Integers, sight: Sight, seen: Array) -> None:
     seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
 
 
-@inlined
-def time_of_end(seen: Array, clock: Array, t: float) -> float:
-    """Time of the end of a segment, s; the clock begins anew with each interval."""
-    now = clock[0] + clock[1]
-    if now - t < 0.5 * seen[Seen.CLOCK]:
-        seen[Seen.BEGIN] += seen[Seen.CLOCK]
-    seen[Seen.CLOCK] = now
-    return seen[Seen.BEGIN] + now
-
-
 @allocating
 def observe(address: int, kind: int, t: float) -> int:
     """Remember what is wanted of a segment of t s, which has just ended; called by `observer.notify`."""
     context = carray(integers_at(address), (PLACES,))
     sight, seen, wanted = sight_of(context, kind, t), seen_at(context), context[Context.WANTED]
-    now = time_of_end(seen, carray(floats_at(context[Context.CLOCK]), (2,)), t)
+    clock = carray(floats_at(context[Context.CLOCK]), (CLOCK,))
+    now = clock[2] + (clock[0] + clock[1])
     if not math.isfinite(sight.y.sum() + t):
         return 0
     seen[Seen.SEGMENTS] += 1.0
