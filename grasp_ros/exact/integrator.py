@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.events import Event, to_events
 from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
@@ -18,7 +18,7 @@ from grasp_ros.exact.watcher import Watcher
 from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Place, Transition, Work
+from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -41,25 +41,6 @@ class Status(Enum):
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
-class Event(NamedTuple):
-    """One event of one pair, or of the object."""
-
-    time: float  # s
-    side: Body  # LEFT or RIGHT; OBJECT for what friction does
-    kind: Transition
-    u: float  # penetration, m; 0 for the object
-    u_rate: float  # m/s; 0 for the object
-
-
-def to_events(table: Array) -> list[Event]:
-    """Records of rows (m, 5)."""
-    time, side, kind, u, u_rate = table.T.tolist()
-    bodies = map(_BODIES.__getitem__, map(int, side))
-    kinds = map(_KINDS.__getitem__, map(int, kind))
-    return list(map(Event, time, bodies, kinds, u, u_rate))
-
-
-_KINDS, _BODIES = tuple(Transition), tuple(Body)
 _OUTPUTS, _EVENTS = int(Filled.OUTPUTS), int(Filled.EVENTS)
 _GOES_ON = (Outcome.GO_ON, Outcome.SQUEEZED)
 _NO_TIMES = np.zeros(0)
@@ -123,24 +104,12 @@ class Integrator:
         self._watcher: Watcher | None = None
 
     def watch(self, wanted: Wanted, bound: float) -> Watcher:
-        """Watch the run from here on; it is compiled where it has not been.
-
-        Parameters
-        ----------
-        wanted : Wanted
-        bound : float
-            Part of the largest displacement within which the run counts as settled.
-        """
-        plant, state = Plant(self._given, self._bodies, self._pairs, self._coulomb), State(self._y, self._mode, self._clock)
-        system, watcher = self._system, Watcher(plant, state, wanted)
-        watcher.loop[:], watcher.own[:] = system.closed_loop, system.bodies
-        watcher.base[:] = watcher.loop if self._continuous else watcher.own
-        if self._continuous:
-            for side, law in system.laws.items():
-                watcher.gains[side] = law.position_gain, law.velocity_gain
-        watcher.begin(bound)
-        self._watcher = watcher
-        return watcher
+        """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
+        plant = Plant(self._given, self._bodies, self._pairs, self._coulomb)
+        self._watcher = Watcher(plant, State(self._y, self._mode, self._clock), wanted)
+        self._watcher.set_system(self._system, self._continuous)
+        self._watcher.begin(bound)
+        return self._watcher
 
     @property
     def state(self) -> Array:

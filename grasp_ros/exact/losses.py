@@ -11,13 +11,13 @@ import math
 import numpy as np
 
 from grasp_ros.exact.energy_check import own_energy
-from grasp_ros.exact.impact import damping_factor, elastic_force, stored_energy
+from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, velocity_lane
 from grasp_ros.exact.polynomial import values
-from grasp_ros.exact.quantities import WORK
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.sight import Seen, Sight
+from grasp_ros.exact.step_extremes import WORK
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,

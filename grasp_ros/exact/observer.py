@@ -15,11 +15,11 @@ from numba import types
 from numba.extending import intrinsic
 
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.records import Array, Output, Tables
+from grasp_ros.exact.records import Output, Tables
 from grasp_ros.physics.layout import CHECK, TIME, Filled, Segment
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def call(_: Any, address: Any, context: Any, kind: Any, t: Any) -> Any:
     """Call the function int64(int64, int64, float64) at an address."""
     def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:
@@ -30,7 +30,7 @@ def call(_: Any, address: Any, context: Any, kind: Any, t: Any) -> Any:
     return types.int64(types.int64, types.int64, types.int64, types.float64), code
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def floats_at(_: Any, address: Any) -> Any:
     """A pointer to the floats at an address."""
     def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:
@@ -39,7 +39,7 @@ def floats_at(_: Any, address: Any) -> Any:
     return types.CPointer(types.float64)(types.int64), code
 
 
-@intrinsic
+@intrinsic  # type: ignore[untyped-decorator]
 def integers_at(_: Any, address: Any) -> Any:
     """A pointer to the integers at an address."""
     def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:

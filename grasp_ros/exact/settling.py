@@ -8,20 +8,13 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.flight import fly, launch
+from grasp_ros.exact.flight_extremes import first_zero
 from grasp_ros.exact.jit import allocating, inlined, kernel
 from grasp_ros.exact.kinematics import own_acceleration, velocity_lane
-from grasp_ros.exact.quantities import (
-    ROW,
-    SQUARE,
-    WORK,
-    expand_quantity,
-    extremes_of,
-    first_zero,
-    value_of,
-)
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.exact.roots import first_rise, shift
 from grasp_ros.exact.sight import COUNTS, LOWER, MODES, NONE, STATES, UPPER, Seen, Sight
+from grasp_ros.exact.step_extremes import FIRST, ROW, SQUARE, WORK, expand_quantity, extremes_of, value_of
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, TIME, U_L, X_L, X_O, X_R, Body, Segment
 
 BISECTIONS = 60
@@ -132,7 +125,7 @@ def last_in_step(sight: Sight, q: int, bound: float) -> float:
     for sign in (1.0, -1.0):
         for k in range(n + 1):
             rows[WORK, k] = sign * rows[ROW, k] * (1.0 if k % 2 == 0 else -1.0)
-        rows[WORK, 0] -= bound
+        rows[WORK, FIRST] -= bound
         first = min(first, first_rise(rows[WORK], n, sight.s, 0.0, sight.counts))
     if not first < math.inf:
         return 0.0

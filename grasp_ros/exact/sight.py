@@ -5,19 +5,19 @@ from __future__ import annotations
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
-import numpy as np
 from numba import carray
 
 from grasp_ros.exact.jit import allocating
 from grasp_ros.exact.observer import floats_at, integers_at
-from grasp_ros.exact.records import Array, Integers
 from grasp_ros.exact.radau import STAGES
+from grasp_ros.exact.records import Array, Integers
 from grasp_ros.exact.start import ORDER
 from grasp_ros.physics.layout import CHECK, LANES, TIME, Segment
 
 QUANTITIES = 12
 STATES = 8
 COUNTS, MODES = 4, 3
+POSITION, VELOCITY = 0, 1  # columns of gains
 LOOKS = 6  # rows of scratch, one polynomial each
 LOWER, UPPER = 4, 5  # those of them that hold bounds of the quantities
 LONGEST = int(ORDER) + 1
@@ -95,6 +95,7 @@ class Context(IntEnum):
     COUNTS = 16  # scratch, and the modes of the segment that is kept
     DEGREE = 17  # of the Taylor tables
     WANTED = 18
+    LOSSES = 19  # address of `watch.observe_losses`, 0: they are not wanted
 
 
 class Sight(NamedTuple):
@@ -136,9 +137,9 @@ def sight_of(context: Integers, kind: Segment, t: float) -> Sight:
     """The segment that has just ended."""
     seen = seen_at(context)
     size = carray(floats_at(context[Context.SIZE]), (LANES,))
-    degree = np.int64(context[Context.DEGREE])
+    degree = int(context[Context.DEGREE])
     if kind != Segment.CONTACT:
-        degree = ORDER if kind == Segment.START else STAGES
+        degree = int(ORDER) if kind == Segment.START else int(STAGES)
     table = context[Context.START] if kind == Segment.START else context[Context.C]
     return Sight(
         kind, t, size[TIME], size[CHECK], degree,
@@ -147,5 +148,6 @@ def sight_of(context: Integers, kind: Segment, t: float) -> Sight:
         carray(integers_at(context[Context.MODE]), (3,)), bodies_at(context, Context.BODIES),
         carray(floats_at(context[Context.PAIRS]), (2, 2)), bodies_at(context, Context.GIVEN),
         bodies_at(context, Context.OWN), carray(floats_at(context[Context.GAINS]), (2, 2)),
-        carray(floats_at(context[Context.ROWS]), (LOOKS, LONGEST)), carray(integers_at(context[Context.COUNTS]), (COUNTS + MODES,)),
+        carray(floats_at(context[Context.ROWS]), (LOOKS, LONGEST)),
+        carray(integers_at(context[Context.COUNTS]), (COUNTS + MODES,)),
     )

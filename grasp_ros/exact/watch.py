@@ -7,13 +7,12 @@ import math
 import numpy as np
 from numba import carray
 
-from grasp_ros.exact.energy_check import own_energy
+from grasp_ros.exact.flight_extremes import flight_ranges, state_of, weights
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import allocating, inlined, kernel
 from grasp_ros.exact.kinematics import velocity_lane
 from grasp_ros.exact.losses import add_losses
-from grasp_ros.exact.observer import floats_at, integers_at
-from grasp_ros.exact.quantities import extremes_of, flight_ranges, state_of, step_ranges, weights
+from grasp_ros.exact.observer import call, floats_at, integers_at
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.exact.settling import kept_sight, last_outside, watch_bound
 from grasp_ros.exact.sight import (
@@ -33,6 +32,7 @@ from grasp_ros.exact.sight import (
     seen_at,
     sight_of,
 )
+from grasp_ros.exact.step_extremes import extremes_of, step_ranges
 from grasp_ros.physics.layout import (
     FORCE,
     HERTZIAN,
@@ -50,6 +50,7 @@ from grasp_ros.physics.layout import (
 )
 
 PLACES, CLOCK = len(Context), 3
+BEGIN, FINISH = -2, -1  # in place of a kind of segment
 
 
 
@@ -121,30 +122,6 @@ def watch_level(context: Integers, sight: Sight, seen: Array) -> None:
 
 
 @allocating
-def observe(address: int, kind: int, t: float) -> int:
-    """Remember what is wanted of a segment of t s, which has just ended; called by `observer.notify`."""
-    context = carray(integers_at(address), (PLACES,))
-    sight, seen, wanted = sight_of(context, kind, t), seen_at(context), context[Context.WANTED]
-    clock = carray(floats_at(context[Context.CLOCK]), (CLOCK,))
-    now = clock[2] + (clock[0] + clock[1])
-    if not math.isfinite(sight.y.sum() + t):
-        return 0
-    seen[Seen.SEGMENTS] += 1.0
-    if wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value | Wanted.SETTLING.value):
-        write_ranges(sight)
-        watch_quantities(sight, seen, wanted)
-    if wanted & Wanted.SETTLING.value:
-        watch_bound(sight, seen, carray(floats_at(context[Context.KEPT]), (KEPT,)), now)
-    if wanted & Wanted.LOSSES.value:
-        add_losses(sight, bodies_at(context, Context.BASE), seen)
-    if wanted & Wanted.RISE.value:
-        watch_level(context, sight, seen)
-    for place in range(STATES):
-        sight.before[place] = sight.y[place]
-    return 0
-
-
-@allocating
 def begin(context: Integers, bound: float) -> None:
     """Forget the last run, and remember the state at which this one begins."""
     seen = seen_at(context)
@@ -170,3 +147,45 @@ def finish(context: Integers) -> None:
         sight = kept_sight(last, kept, seen)
         seen[Seen.OUTSIDE] = seen[Seen.KEPT_BEGIN] + last_outside(sight, seen[Seen.BOUND])
         seen[Seen.KEPT] = NONE
+
+
+@allocating
+def observe(address: int, kind: int, t: float) -> int:
+    """Remember what is wanted of a segment of t s, which has just ended; called by `observer.notify`.
+
+    Before a run it is called with BEGIN and the part of the largest displacement that counts as settled; after it with
+    FINISH.
+    """
+    context = carray(integers_at(address), (PLACES,))
+    if kind == BEGIN:
+        begin(context, t)
+        return 0
+    if kind == FINISH:
+        finish(context)
+        return 0
+    sight, seen, wanted = sight_of(context, kind, t), seen_at(context), context[Context.WANTED]
+    clock = carray(floats_at(context[Context.CLOCK]), (CLOCK,))
+    now = clock[2] + (clock[0] + clock[1])
+    if not math.isfinite(sight.y.sum() + t):
+        return 0
+    seen[Seen.SEGMENTS] += 1.0
+    if wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value | Wanted.SETTLING.value):
+        write_ranges(sight)
+        watch_quantities(sight, seen, wanted)
+    if wanted & Wanted.SETTLING.value:
+        watch_bound(sight, seen, carray(floats_at(context[Context.KEPT]), (KEPT,)), now)
+    if context[Context.LOSSES] != 0:
+        call(context[Context.LOSSES], address, kind, t)
+    if wanted & Wanted.RISE.value:
+        watch_level(context, sight, seen)
+    for place in range(STATES):
+        sight.before[place] = sight.y[place]
+    return 0
+
+
+@allocating
+def observe_losses(address: int, kind: int, t: float) -> int:
+    """Add the losses of a segment; a function of its own, so that only who asks for them waits for its compilation."""
+    context = carray(integers_at(address), (PLACES,))
+    add_losses(sight_of(context, kind, t), bodies_at(context, Context.BASE), seen_at(context))
+    return 0

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from grasp_ros.exact.jit import with_deep_stack
+from grasp_ros.exact.jit import compiled_address
 from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
 from grasp_ros.exact.sight import COUNTS, KEPT, LONGEST, LOOKS, MODES, SEEN, Context, Wanted
-from grasp_ros.exact.watch import begin, finish, observe
+from grasp_ros.exact.watch import BEGIN, FINISH, observe, observe_losses
 from grasp_ros.physics.layout import Filled
+from grasp_ros.physics.system import System
 
 SIGNATURE = "int64(int64, int64, float64)"
 
@@ -51,36 +53,34 @@ class Watcher:
         for place, array in places.items():
             self.context[place] = array.ctypes.data
         self.context[Context.WANTED] = wanted
+        self.context[Context.LOSSES] = address_of(observe_losses) if wanted & Wanted.LOSSES else 0
 
     def attach(self, filled: Integers, tables: Tables) -> None:
         """Have a run with these counters and this workspace call the observer after each segment."""
         for place, table in ((Context.C, tables.c), (Context.START, tables.start.c), (Context.SIZE, tables.size)):
             self.context[place] = table.ctypes.data
         self.context[Context.DEGREE] = len(tables.row) - 1
-        filled[Filled.OBSERVER], filled[Filled.CONTEXT] = address_of_observer(), self.context.ctypes.data
+        filled[Filled.OBSERVER], filled[Filled.CONTEXT] = address_of(observe), self.context.ctypes.data
+
+    def set_system(self, system: System, continuous: bool) -> None:
+        """Say whose energies and inputs are watched, and whether its feedback acts all the time."""
+        self.loop[:], self.own[:] = system.closed_loop, system.bodies
+        self.base[:] = self.loop if continuous else self.own
+        self.gains[:] = 0.0
+        for side, law in system.laws.items():
+            if continuous:
+                self.gains[side] = law.position_gain, law.velocity_gain
 
     def begin(self, bound: float) -> None:
         """Before a run: `bound` is the part of the largest displacement within which it counts as settled."""
-        begin(self.context, bound)
+        observe(self.context.ctypes.data, BEGIN, bound)
 
     def finish(self) -> None:
         """After a run."""
-        finish(self.context)
+        observe(self.context.ctypes.data, FINISH, 0.0)
 
 
-_ADDRESS: list[int] = []
-
-
-def address_of_observer() -> int:
-    """Address of the compiled observer, which is compiled where it has not been."""
-    if not _ADDRESS:
-        _compile()
-    return _ADDRESS[0]
-
-
-@with_deep_stack
-def _compile() -> None:
-    compiled: Any = observe
-    compiled.compile(SIGNATURE)
-    (result,) = compiled.overloads.values()
-    _ADDRESS.append(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+@cache
+def address_of(function: Any) -> int:
+    """Address of an observer, which is compiled where it has not been."""
+    return compiled_address(function, SIGNATURE)

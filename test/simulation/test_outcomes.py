@@ -14,7 +14,8 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Contact, impact_force, penetration
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
-from grasp_ros.simulation.ensemble import SETTLED, Setup, Table, ensemble
+from grasp_ros.simulation.chunk import SETTLED, Setup
+from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.outcomes import GROUPS, LYAPUNOV
 from grasp_ros.verification.oracles import impact_numbers
 
@@ -79,7 +80,8 @@ def check_settling(found: float, run: Trajectory) -> None:
 def check_balance(found: dict[str, float], run: Trajectory) -> None:
     level = run.energy.V_c
     taken = sum(found[f"lost_{cause}"] for cause in ("dampers", "feedback", "friction", "impacts"))
-    assert taken - found["work_inputs"] == pytest.approx(0.5 * (level[0] - level[-1]), abs=1e-10 * max(level.max(), 1e-3))
+    fallen = 0.5 * (level[0] - level[-1])
+    assert taken - found["work_inputs"] == pytest.approx(fallen, abs=1e-10 * max(level.max(), 1e-3))
 
 
 @pytest.mark.parametrize("name", DENSE)
