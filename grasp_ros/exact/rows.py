@@ -26,9 +26,7 @@ from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.layout import (
     EVENT_BODY,
     EVENT_KIND,
-    LEFT,
     MASS,
-    RIGHT,
     Filled,
     Outcome,
     Pair,
@@ -139,9 +137,8 @@ def count_events(rows: Rows, i: int, room: Room) -> int:
     """Count the touches among the events, and forget these; returns their number."""
     count = room.filled[Filled.EVENTS]
     for k in range(count):
-        for side in (LEFT, RIGHT):
-            if room.events[k, EVENT_KIND] == Transition.TOUCH and room.events[k, EVENT_BODY] == side:
-                rows.touches[i, side] += 1.0
+        if room.events[k, EVENT_KIND] == Transition.TOUCH.value:
+            rows.touches[i, int(room.events[k, EVENT_BODY])] += 1.0
     room.filled[Filled.EVENTS] = 0
     return int(count)
 
@@ -157,7 +154,7 @@ def run_rows(door: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watc
         loop.place[Place.INTERVAL] = loop.place[Place.BEGUN] = 0
         if room.filled[Filled.OBSERVER] != 0:
             call(room.filled[Filled.OBSERVER], room.filled[Filled.CONTEXT], BEGIN, watch.bound[0])
-        outcome, events = int(Outcome.EVENTS_FULL), 0
+        outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
         while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
             outcome = door(
                 tables.c, tables.f, tables.at, tables.size, tables.row, tables.start.c, tables.start.f,
@@ -178,7 +175,7 @@ def run_rows(door: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watc
 
 
 def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted, settled: float, stop: Integers,
-                   max_events: int) -> int:
+                   max_events: int, max_work: int) -> int:
     """Integrate rows of one length under continuous feedback; returns how many.
 
     Parameters
@@ -189,8 +186,8 @@ def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted,
         As for an `Integrator` and its `watch`.
     stop : array (1,)
         Another thread may set it, to have the rows stop.
-    max_events : int
-        Budget of each row.
+    max_events, max_work : int
+        Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too.
     """
     y, mode, clock = np.zeros(8), np.zeros(3, dtype=np.int64), np.zeros(3)
     given, bodies, pairs = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((2, 2))
@@ -198,10 +195,11 @@ def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted,
     filled = np.zeros(len(Filled), dtype=np.int64)
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
     watch = Watch(watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]))
+    limits = Limits(accuracy, max_events, min(max_work, BREATH), stop)
     with workspace(accuracy) as (tables, events):
         if wanted:
             watcher.attach(filled, tables)
         room = Room(given, bodies, pairs, y, mode, clock, events, filled, np.zeros(len(Work), dtype=np.int64),
                     np.zeros(3), np.zeros(0), np.zeros((0, 6)))
-        done = run_rows(door(), tables, loop, rows, room, watch, Limits(accuracy, max_events, BREATH, stop))
+        done = run_rows(door(), tables, loop, rows, room, watch, limits)
     return int(done)

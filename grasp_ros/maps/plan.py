@@ -58,7 +58,10 @@ def read_axis(option: str, text: str) -> Axis:
     Refused
         If it is written otherwise.
     """
-    allowed = "allowed: section.key=low:high, keys of one value joined by +, :n behind it for n >= 2 values, and :log behind that for a scale > 0"
+    allowed = (
+        "allowed: section.key=low:high, keys of one value joined by +, :n behind it for n >= 2 values, and :log behind"
+        " that for a scale > 0"
+    )
     match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d+)(?::(log))?)?", text)
     if match is None:
         raise Refused(f"{option} {text}: not understood; {allowed}")
@@ -159,7 +162,7 @@ def check(plan: Plan) -> None:
         raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")
     if not plan.sample and len(plan.axes) > MOST_AXES:
         raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
-    for axis, key in ((axis, key) for axis in plan.axes for key in axis.keys):
+    for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
         parameter = parameter_of(plan.scene, key)
         if parameter.whole:
             raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")

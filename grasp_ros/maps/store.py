@@ -126,9 +126,11 @@ def open_group(path: Path, mode: str = "r") -> Any:
         group = zarr.open_group(path, mode=mode)
         if group.attrs.get("format") != FORMAT:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
-        missing = {MARKS, STATUS, *(axis["name"] for axis in group.attrs["plan"]["axes"])} - set(group.array_keys())
-        if missing or "versions" not in group.attrs or "chunk_rows" not in group.attrs:
-            raise Refused(f"{path}: a damaged map: without {', '.join(sorted(missing))}; allowed: a whole one")
+        parts = (MARKS, STATUS, *(axis["name"] for axis in group.attrs["plan"]["axes"]))
+        missing = [name for name in parts if not (path / name / "zarr.json").is_file()]
+        missing += [name for name in ("versions", "chunk_rows") if name not in group.attrs]
+        if missing:
+            raise Refused(f"{path}: a damaged map: without {', '.join(missing)}; allowed: a whole one")
     except Refused:
         raise
     except DAMAGE as error:

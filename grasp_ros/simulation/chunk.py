@@ -147,7 +147,8 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
         block.closed_loop[which], block.bodies[which], gains, block.pairs[which], block.coulomb[which, 0, 0],
         block.state[which, :, 0], np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)), np.full(n, LEFT_OUT),
     )
-    integrate_rows(rows, variants.scene.duration, setup.accuracy, wanted, setup.settled, stop, setup.max_events)
+    integrate_rows(rows, variants.scene.duration, setup.accuracy, wanted, setup.settled, stop, setup.max_events,
+                   setup.max_work)
     done = rows.outcome == Ended.DONE
     runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
     runs.touches[which[done]] = rows.touches[done]
