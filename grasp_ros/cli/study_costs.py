@@ -1,8 +1,9 @@
-"""The studies of what a loop, an effect and a graph cost: `loop`, `effects` and `graph`."""
+"""The studies of what a loop, an effect and a graph cost, and of many runs: `loop`, `effects`, `graph`, `maps`."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_study_directory, load_scene, prepare
@@ -68,4 +69,21 @@ def _graph(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene, options.settings)
     prepare()
     graph.run(scene)
+    return 0
+
+
+def add_maps(commands: Any) -> Parser:
+    """`grasp study maps`."""
+    sub = add_command(commands, "maps", _maps, "where a grasp settles, what sampling does to it, how robust it is; resumes")
+    sub.add_argument("--docs", type=Path, default=Path("docs"), metavar="DIRECTORY", help="default: docs")
+    sub.add_argument("--quick", action="store_true", help="few pixels and rows: to see that it works")
+    add_study_directory(sub)
+    return sub
+
+
+def _maps(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import map_page
+
+    prepare()
+    print(f"written to {map_page.write(options.docs, options.output, options.quick)}")
     return 0
