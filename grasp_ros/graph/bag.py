@@ -139,7 +139,7 @@ def open_storage(path: Path, salvage: bool = False) -> Storage:
     with decoding(path, KIND, BagError):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
         if len(files) != 1:
-            raise BagError(f"{path}: holds {len(files)} .mcap files; allowed: one")
+            raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
         return Storage(files[0], salvage)
 
 

@@ -83,7 +83,7 @@ class Storage:
         """
         data = self._data
         if data[: len(MAGIC)] != MAGIC:
-            raise BagError(f"{self.path}: not an MCAP file")
+            raise BagError(f"{self.path}: not a bag of this package: no MCAP file")
         if self.closed and not self._salvage:
             self._check_sums()
         offset = len(MAGIC)
@@ -114,7 +114,7 @@ class Storage:
     def _read(self, opcode: int, body: bytes) -> Iterator[Stored]:
         stream = ReadDataStream(BytesIO(body))
         if opcode == Opcode.HEADER and Header.read(stream).profile != PROFILE:
-            raise BagError(f"{self.path}: not a file of ROS 2")
+            raise BagError(f"{self.path}: not a bag of this package: no file of ROS 2")
         if opcode == Opcode.METADATA:
             found = Metadata.read(stream)
             if found.name in (OWN_RECORD, LOST_RECORD) and found.metadata != signed(found.metadata):

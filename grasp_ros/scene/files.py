@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 from zipfile import BadZipFile
 
 from grasp_ros.physics.errors import Refused
@@ -68,6 +70,29 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
         raise
     except OSError as error:
         raise refusal(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write that takes the place of what was there only when it is whole.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written; what was there is still there.
+    """
+    with writing(path):
+        if path.exists() and not path.is_file():  # a device, a pipe; a directory refuses by itself
+            with path.open("wb") as file:
+                yield file
+            return
+        part = path.with_name(f".{path.name[:200]}.{os.getpid()}.part")
+        try:
+            with part.open("xb") as file:
+                yield file
+            part.replace(path.resolve())
+        finally:
+            part.unlink(missing_ok=True)
 
 
 @contextmanager
