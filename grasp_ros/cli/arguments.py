@@ -85,12 +85,12 @@ def check_output(output: Path, force: bool, inputs: Sequence[str] = ()) -> None:
         Names the file.
     """
     with writing(output):
-        if not output.exists() or (output.exists() and not output.is_file() and not output.is_dir()):
-            return  # new; or a device or a pipe
+        if not (output.is_file() or output.is_dir()):
+            return  # new, a device or a pipe
         if output.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
-        for name in inputs:
-            if os.path.exists(name) and os.path.samefile(name, output):
+        for given in map(Path, inputs):
+            if given.exists() and (given.samefile(output) or output.resolve().is_relative_to(given.resolve())):
                 raise Refused(f"-o {output}: is the input; allowed: another file")
         if not force:
             raise Refused(f"{output}: is there; allowed: a new file, or --force to replace it")
