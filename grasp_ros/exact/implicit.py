@@ -139,7 +139,9 @@ def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: App
     last = write_lane(tables, U_L + side, pair.u, h, pair.rate * (pair.e - pair.offset))
     if pair.hertzian == 0.0 or not pair.u > 0.0:
         return last / max(start.scale, abs(pair.e))
-    moving = largest_in_contact(state, VELOCITY)
+    v_end = start.v + f[V_NODES + STAGES - 1]
+    d_end = pair.rate * (f[nodes + STAGES - 1] - pair.offset)
+    moving = max(abs(start.v), abs(state.y[v]), abs(v_end), abs(v_end + pair.sign * d_end))
     relative = max(moving, 1024.0 * pair.rate * largest) if pair.stiff else moving
     return last / max(min(relative, pair.u / h), 0.25 * moving)
 
