@@ -26,6 +26,7 @@ setup(
         "ros-jazzy-common-interfaces",
         "numpy",
         "rosbags",
+        "mcap",
         "numba",
         "matplotlib",
         "tqdm",
@@ -33,10 +34,14 @@ setup(
     ],
     extras_require={
         "test": [
-            "pytest", "hypothesis", "gmpy2", "mpmath", "mcap", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
-            "types-tqdm", "colcon-common-extensions", "scipy",
+            "pytest", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
+            "types-tqdm", "colcon-common-extensions", "scipy", "xarray", "zarr>=3.1", "distributed",
         ],
-        "study": ["gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],
+        "map": ["xarray", "zarr>=3.1", "scipy"],
+        "cluster": ["xarray", "zarr>=3.1", "scipy", "distributed"],
+        "study": [
+            "gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark", "xarray", "zarr>=3.1",
+        ],
     },
     entry_points={
         "console_scripts": [

@@ -1,12 +1,19 @@
-"""The studies of what a loop, an effect and a graph cost, and of many runs: `loop`, `effects`, `graph`, `maps`."""
+"""The studies of what a loop, an effect, a graph and a bag cost: `loop`, `effects`, `graph` and `recorder`."""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_study_directory, load_scene, prepare
+from grasp_ros.cli.arguments import (
+    add_command,
+    add_output,
+    add_scene,
+    add_study_directory,
+    load_scene,
+    prepare,
+    whole,
+)
 
 Parser = argparse.ArgumentParser
 
@@ -72,18 +79,18 @@ def _graph(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_maps(commands: Any) -> Parser:
-    """`grasp study maps`."""
-    sub = add_command(commands, "maps", _maps, "where a grasp settles, what sampling does to it, how robust it is; resumes")
-    sub.add_argument("--docs", type=Path, default=Path("docs"), metavar="DIRECTORY", help="default: docs")
-    sub.add_argument("--quick", action="store_true", help="few pixels and rows: to see that it works")
-    add_study_directory(sub)
+def add_recorder(commands: Any) -> Parser:
+    """`grasp study recorder`."""
+    sub = add_command(commands, "recorder", _recorder, "bytes and time per tick of a bag; recordings that are killed")
+    add_scene(sub)
+    sub.add_argument("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)")
+    sub.add_argument("--seed", type=whole(0), default=0, help="another seed kills at other moments (default 0)")
     return sub
 
 
-def _maps(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import map_page
+def _recorder(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import recorder
 
+    scene = load_scene(options.scene, options.settings)
     prepare()
-    print(f"written to {map_page.write(options.docs, options.output, options.quick)}")
-    return 0
+    return 0 if recorder.run(scene, options.kills, options.seed) else 1

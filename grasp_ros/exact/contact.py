@@ -34,6 +34,7 @@ from grasp_ros.exact.roots import first_rise
 from grasp_ros.exact.scales import new_step
 from grasp_ros.exact.taylor_step import accepted_length, fitted_step
 from grasp_ros.physics.layout import (
+    DAMPING,
     DISSIPATION,
     EPS,
     LANES,
@@ -138,11 +139,13 @@ def write_state(at: Array, u_l: float, u_r: float, y: Array) -> None:
 def flies_free(plant: Plant, y: Array, side: Body, touches: bool, t: float) -> bool:
     """Whether an arm that touches nothing is better put where it flies than where object and gap say.
 
-    Their roundings, of the size of x_o, would show in its place, or drive it by its spring within t s.
+    Their roundings, of the size of x_o, would show in its place, or drive it by its spring within t s; a damper that
+    stops it within t leaves less than the roundings of a series.
     """
     x, v, _ = arm_of(y, side)
     row, x_o = plant.bodies[side], abs(y[X_O])
-    return not touches and (x_o > abs(x) or row[STIFFNESS] * t * x_o > row[MASS] * abs(v))
+    coarse = x_o > abs(x) or row[STIFFNESS] * t * x_o > row[MASS] * abs(v)
+    return not touches and (coarse or row[DAMPING] * t > row[MASS])
 
 
 @inlined
