@@ -18,7 +18,7 @@ COMMAND = "grasp study maps"
 STRONGEST = 4
 
 
-def write(docs: Path, directory: Path, quick: bool) -> Path:
+def write(docs: Path, directory: Path, quick: bool, pixels: int = maps.PIXELS) -> Path:
     """Compute what is not there yet, and write the page with its pictures; returns it.
 
     Raises
@@ -30,7 +30,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)
         directory.mkdir(parents=True, exist_ok=True)
-    settled = maps.settling(directory, 24 if quick else maps.PIXELS)
+    settled = maps.settling(directory, 24 if quick else pixels)
     limits = maps.limits(*((6, 5) if quick else ()))
     plan, data, seconds = maps.robustness(directory, 64 if quick else maps.SAMPLE)
     map_figures.settling(settled, place / "settling.png")
@@ -60,10 +60,10 @@ def _settling(found: maps.Settling) -> str:
         f"Case 3 has neither dampers nor velocity feedback: only impacts take energy. Of {times.size} pairs of gain"
         f" and dissipation {100.0 * settles.mean():.1f} % settle within 10 s to {100.0 * maps.SETTLED:g} % of the"
         f" largest initial displacement: {100.0 * lossy[:quarter].mean():.1f} % in the quarter with the least"
-        f" dissipation, {100.0 * lossy[-quarter:].mean():.1f} % in that with the most. The edge between them is not a"
-        f" curve: counted with boxes of 2 to 32 pixels its dimension is {found.dimension:.2f}, so that a small change of"
-        f" a number decides whether the grasp settles. The zoom, Kp {x.low:.4g} to {x.high:.4g} N/m and p {y.low:.4g}"
-        f" to {y.high:.4g} s/m, holds {100.0 * zoomed.mean():.0f} % that settle. An accuracy of 1e-16 instead of"
+        f" dissipation, {100.0 * lossy[-quarter:].mean():.1f} % in that with the most. The edge is no curve: counted"
+        f" with boxes of 2 to 32 pixels its dimension is {found.dimension:.2f}, so that a small change of a number"
+        f" decides whether the grasp settles. The zoom, Kp {x.low:.4g} to {x.high:.4g} N/m and p {y.low:.4g} to"
+        f" {y.high:.4g} s/m, holds {100.0 * zoomed.mean():.0f} % that settle. An accuracy of 1e-16 instead of"
         f" {maps.MAP_ACCURACY:g} moves {100.0 * found.changed:.2g} % of its pixels to the other side of the edge. The"
         f" {times.size} runs took {found.seconds:.0f} s on this machine.")
     head = "## Where the grasp of case 3 settles"
