@@ -194,6 +194,7 @@ class HeyokaGrasp:
         self._ballistic = hy.taylor_adaptive(flight, [0.0] * 6, **settings)
 
     def __call__(self, grid: Array) -> Answer:
+        """States at the output times."""
         out, row, mode, begin, touches = np.empty((len(grid), 6)), 0, 0, 0.0, [0, 0]
         state, w = self._start, [0.0, 0.0]
         while True:
