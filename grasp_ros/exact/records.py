@@ -76,7 +76,7 @@ class Loop(NamedTuple):
 def new_place(tick: int = 0) -> Integers:
     """Where a loop begins; the tick is that of its first interval."""
     place = np.zeros(len(Place), dtype=np.int64)
-    place[Place.TICK] = tick
+    place[Place.TICK], place[Place.FAILED] = tick, -1
     return place
 
 

@@ -24,7 +24,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.energy import PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
@@ -178,6 +178,11 @@ class Recording:
             inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
         inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
         return inputs
+
+    @property
+    def energy_of(self) -> str:
+        """What `energy` is the energy of: the controllers of a graph are those of its scene."""
+        return PLANT_AND_FEEDBACK
 
     @property
     def energy(self) -> Energy:

@@ -120,7 +120,11 @@ class ControlLaw:
         """Standard normal numbers (2,) of a tick; 0 without noise."""
         return NO_NOISE if self.seed is None else normals(*self.seed, tick // BLOCK)[tick % BLOCK]
 
+    def measured(self, tick: int, x: float, v: float) -> tuple[float, float]:
+        """What its sensor makes of the state (x, v) of a tick."""
+        return measured(self.row.tolist(), self.noise(tick).tolist(), x, v)  # plain floats overflow without a warning
+
     def command(self, tick: int, x: float, v: float) -> float:
         """Command in N that answers the state (x, v) of a tick."""
-        row = self.row.tolist()  # plain floats overflow without a warning
-        return float(limited(row, feedback(row, *measured(row, self.noise(tick).tolist(), x, v))))
+        row = self.row.tolist()
+        return float(limited(row, feedback(row, *self.measured(tick, x, v))))

@@ -20,6 +20,8 @@ from grasp_ros.physics.system import COLUMN, System
 FLAGS: dict[int, Mode] = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
 ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
+PLANT_AND_FEEDBACK, PLANT_ALONE = "plant and feedback", "the plant alone"  # what V and V_c are the energy of
+
 
 class Energy(NamedTuple):
     """The paper's V (16), its continuous repair V_c, the rate V' (18) and the contact mode."""

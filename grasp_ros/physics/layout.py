@@ -90,7 +90,7 @@ class Place(IntEnum):
     INTERVAL = 0  # done so far in this call
     BEGUN = 1  # whether the inputs of the next one act already
     TICK = 2  # at which the first one begins
-    FAILED = 3  # side whose controller gave no number
+    FAILED = 3  # side whose controller gave no number; -1: none
 
 
 class Filled(IntEnum):

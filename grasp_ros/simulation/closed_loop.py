@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby, islice
 
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.exact.foreign import Foreign, Law
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
+from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import BLOCK, LEFT, RIGHT
+from grasp_ros.physics.layout import BLOCK, LEFT, MASS, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.simulation.sampled_plant import NO_INTERVAL, Outputs, Record, SampledPlant
 from grasp_ros.simulation.trajectory import Loop
 
@@ -28,7 +30,25 @@ SHORTEST = 16  # ticks of the first block
 Changes = Mapping[int, Mapping[str, float]]
 
 
-def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
+def foreign_controllers(scene: Scene, controllers: Mapping[str, Law]) -> dict[int, Foreign]:
+    """Controllers from outside by side, as the kernels call them.
+
+    Raises
+    ------
+    Refused
+        If there is no such arm, or what is to control it cannot be called.
+    """
+    found = {}
+    arms = [side for side, body in SIDES.items() if scene.system.bodies[body, MASS] > 0.0]
+    for side, law in controllers.items():
+        if side not in arms:
+            allowed = " or ".join(arms) or "none, without an arm"
+            raise Refused(f"controllers: {side!r} is not allowed; allowed: {allowed}")
+        found[int(SIDES[side])] = Foreign(side, law)
+    return found
+
+
+def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[str] = ()) -> None:
     """Refuse changes that a running graph would refuse.
 
     Raises
@@ -40,9 +60,11 @@ def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
         return
     if not held:
         raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
-    live = scene.live
+    live, replaced = scene.live, tuple(f"{side}_feedback." for side in foreign)
     for tick, numbers in changes.items():
         for name in numbers:
+            if name.startswith(replaced):
+                raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
             if name not in live or not 0 <= tick <= scene.ticks:
                 raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
@@ -59,10 +81,15 @@ class SampledLoop:
         Numbers of the controllers that are set while it runs, by the tick from which they act.
     progress : callable or None
         Called with the time reached, in s.
+    foreign : mapping of int to Foreign
+        Controllers from outside, by side.
     """
 
-    def __init__(self, scene: Scene, grid: Array, changes: Changes, progress: Progress) -> None:
+    def __init__(
+        self, scene: Scene, grid: Array, changes: Changes, progress: Progress, foreign: Mapping[int, Foreign]
+    ) -> None:
         self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
+        self._foreign = foreign
         self._records: list[Record] = []  # at the output times
 
     def drive(self, integrator: Integrator) -> Array:
@@ -73,7 +100,7 @@ class SampledLoop:
             if plant.tick in self._changes:
                 self._scene = self._scene.changed(self._changes[plant.tick])
             outputs, interval = _outputs(self._grid, ticks, scene.period_ns)
-            record = plant.run(self._scene.system.laws, outputs)
+            record = plant.run(self._laws, outputs, self._foreign)
             reached = interval[: len(record.states)]
             self._records.append(Record(record.states, record.answers[reached], record.inputs[reached]))
             if plant.status is not Status.DONE:
@@ -83,6 +110,11 @@ class SampledLoop:
         else:
             self._end(plant)
         return np.concatenate([record.states for record in self._records])
+
+    @property
+    def _laws(self) -> dict[int, ControlLaw]:
+        """Laws as they are now; those of foreign controllers measure and limit as the scene says."""
+        return {**{side: ControlLaw(0.0, 0.0) for side in self._foreign}, **self._scene.system.laws}
 
     def _blocks(self) -> Iterator[NDArray[np.int64]]:
         """Ticks of the run, ascending, in blocks that end where a law changes, and with the block of the noise.
@@ -102,7 +134,7 @@ class SampledLoop:
         """The output times of the last tick and later; nothing acts there."""
         if plant.tick in self._changes:
             self._scene = self._scene.changed(self._changes[plant.tick])
-        record = plant.run(self._scene.system.laws, NO_INTERVAL)
+        record = plant.run(self._laws, NO_INTERVAL, self._foreign)
         states = _rest(self._grid, plant.tick, self._scene.period_ns, plant.state)
         shape = (len(states), 3)
         self._records.append(Record(states, np.broadcast_to(record.answers, shape), np.full(shape, np.nan)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, Event, Status, to_events
 from grasp_ros.methods.registry import EXACT, METHODS, find
-from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
@@ -65,6 +65,8 @@ class Trajectory:
         Its accuracy, step in s, or tolerance.
     stop : str
         Why and where a run of `exact` stopped, with time, contact mode and state; empty if it did not.
+    controllers : mapping of str to str
+        Names of the controllers that acted in place of the scene's feedback, by side.
     """
 
     scene: Scene
@@ -77,6 +79,7 @@ class Trajectory:
     method: str = EXACT
     setting: float = ACCURACY
     stop: str = ""
+    controllers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def sampled(self) -> bool:
@@ -120,8 +123,18 @@ class Trajectory:
 
     @property
     def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode at the output times."""
-        return energy(self.scene.system, self.state)
+        """V, V_c, V' and the contact mode at the output times; see `energy_of`."""
+        system = self.scene.system
+        return energy(replace(system, laws={}) if self.controllers else system, self.state)
+
+    @property
+    def energy_of(self) -> str:
+        """What `energy` is the energy of: the plant with its feedback, or the plant alone.
+
+        Nobody knows the energy of a controller that is any function: then V and V_c have no term of feedback, of
+        neither side, and V' is the rate without any command.
+        """
+        return PLANT_ALONE if self.controllers else PLANT_AND_FEEDBACK
 
     @property
     def events(self) -> list[Event]:
@@ -151,7 +164,8 @@ class Trajectory:
                 events=self.event_table, work=self.work,
                 work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
                 method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
-                scene_name=self.scene.name, scene=self.scene.to_yaml(),
+                scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
+                controllers=np.array([f"{side}={name}" for side, name in self.controllers.items()], dtype=str),
             )
 
 
@@ -172,6 +186,7 @@ def load(path: Path) -> Trajectory:
             scene, _numbers(data, "t", rows), _numbers(data, "state", rows, 6), loop if data["sampled"] else None,
             _numbers(data, "events", events, 5), _numbers(data, "work", len(method.counters)),
             Status[str(data["status"])], method.name, float(data["setting"]), str(data["stop"]),
+            dict(str(text).split("=", 1) for text in data["controllers"]),
         )
 
 
