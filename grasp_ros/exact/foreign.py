@@ -54,6 +54,13 @@ def _compiled(law: Any) -> Any:
     return numba.cfunc(SIGNATURE)(command)
 
 
+if numba.config.DISABLE_JIT:
+
+    def call(address: int, tick: int, time: float, x: float, v: float) -> float:
+        """The command of the function at an address."""
+        return float(PROTOTYPE(address)(tick, time, x, v))
+
+
 class Foreign:
     """A controller from outside, as the kernels call it.
 

@@ -66,10 +66,17 @@ def limited(row: Any, force: float) -> Any:
     return limit if force > limit else force
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def normals(seed: int, side: int, block: int) -> Array:
     """Standard normal numbers (BLOCK, 2) of one block of ticks: the same for whoever asks, in whatever order."""
     return np.random.default_rng([seed, side, block]).standard_normal((BLOCK, 2))
+
+
+def normals_over(seed: tuple[int, int], first: int, count: int) -> Array:
+    """Standard normal numbers (count, 2) of the ticks from the first on; seed and side."""
+    blocks = range(first // BLOCK, (first + count - 1) // BLOCK + 1)
+    drawn = np.concatenate([normals(*seed, block) for block in blocks])
+    return drawn[first % BLOCK :][:count]
 
 
 class ControlLaw:

@@ -17,7 +17,7 @@ from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import BLOCK, LEFT, MASS, RIGHT
+from grasp_ros.physics.layout import MASS, OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
@@ -26,7 +26,7 @@ from grasp_ros.simulation.trajectory import Loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
-SHORTEST = 16  # ticks of the first block
+SHORTEST, LONGEST = 16, 8192  # ticks of the first block, and of any
 Changes = Mapping[int, Mapping[str, float]]
 
 
@@ -90,7 +90,9 @@ class SampledLoop:
     ) -> None:
         self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
         self._foreign = foreign
-        self._records: list[Record] = []  # at the output times
+        self._states, self._inputs = np.empty((len(grid), 6)), np.full((len(grid), 3), np.nan)
+        self._command = np.empty((len(grid), 2))
+        self._rows = 0  # filled
 
     def drive(self, integrator: Integrator) -> Array:
         """States (n, 6) at the output times; only the rows reached, if the integrator stops. To be called once."""
@@ -100,16 +102,24 @@ class SampledLoop:
             if plant.tick in self._changes:
                 self._scene = self._scene.changed(self._changes[plant.tick])
             outputs, interval = _outputs(self._grid, ticks, scene.period_ns)
-            record = plant.run(self._laws, outputs, self._foreign)
-            reached = interval[: len(record.states)]
-            self._records.append(Record(record.states, record.answers[reached], record.inputs[reached]))
+            rows = self._states[self._rows : self._rows + len(interval)]
+            record = plant.run(self._laws, outputs, self._foreign, rows)
+            self._keep(record, interval[: len(record.states)])
             if plant.status is not Status.DONE:
                 break
             if self._progress is not None:
                 self._progress(plant.time)
         else:
             self._end(plant)
-        return np.concatenate([record.states for record in self._records])
+        return self._states[: self._rows]
+
+    def _keep(self, record: Record, interval: NDArray[np.int64]) -> None:
+        """Keep what was answered and what acted in the intervals of the next output times."""
+        rows = slice(self._rows, self._rows + len(interval))
+        self._command[rows] = record.answers[interval, :OBJECT]
+        if len(record.inputs):
+            self._inputs[rows] = record.inputs[interval]
+        self._rows += len(interval)
 
     @property
     def _laws(self) -> dict[int, ControlLaw]:
@@ -117,32 +127,30 @@ class SampledLoop:
         return {**{side: ControlLaw(0.0, 0.0) for side in self._foreign}, **self._scene.system.laws}
 
     def _blocks(self) -> Iterator[NDArray[np.int64]]:
-        """Ticks of the run, ascending, in blocks that end where a law changes, and with the block of the noise.
+        """Ticks of the run, ascending, in blocks that end where a law changes.
 
         Between them the progress shows and Ctrl-C acts: a run whose ticks are slow has shorter ones.
         """
         last, first, size = self._scene.ticks, 0, SHORTEST
         changes = sorted({*self._changes, last})
         while first < last:
-            end = min(first + size, first - first % BLOCK + BLOCK, changes[bisect_right(changes, first)])
+            end = min(first + size, changes[bisect_right(changes, first)])
             begin = time.monotonic()
             yield np.arange(first, end + 1)
             first = end
-            size = min(2 * size, BLOCK) if time.monotonic() - begin < PATIENCE else max(size // 2, 1)
+            size = min(4 * size, LONGEST) if time.monotonic() - begin < PATIENCE else max(size // 4, 1)
 
     def _end(self, plant: SampledPlant) -> None:
         """The output times of the last tick and later; nothing acts there."""
         if plant.tick in self._changes:
             self._scene = self._scene.changed(self._changes[plant.tick])
         record = plant.run(self._laws, NO_INTERVAL, self._foreign)
-        states = _rest(self._grid, plant.tick, self._scene.period_ns, plant.state)
-        shape = (len(states), 3)
-        self._records.append(Record(states, np.broadcast_to(record.answers, shape), np.full(shape, np.nan)))
+        self._states[self._rows :] = plant.state
+        self._keep(record, np.zeros(len(self._grid) - self._rows, dtype=np.int64))
 
     def record(self) -> Loop:
         """What was answered and what acted, at the output times that were reached."""
-        answers, inputs = (np.concatenate([record[part] for record in self._records]) for part in (1, 2))
-        return Loop(answers[:, [LEFT, RIGHT]], inputs)
+        return Loop(self._command[: self._rows], self._inputs[: self._rows])
 
 
 def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
@@ -154,7 +162,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     system = scene.system
     changes = (force.changes(scene.ticks) for force in system.external)
     following = (tick for tick, _ in groupby(merge([0], *changes, [scene.ticks])))
-    rows, block = [], list(islice(following, BLOCK + 1))
+    rows, block = [], list(islice(following, LONGEST + 1))
     while len(block) > 1:
         ticks = np.array(block)
         outputs, _ = _outputs(grid, ticks, scene.period_ns)
@@ -165,7 +173,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
         rows.append(integrator.run(loop, outputs.offsets))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
-        block = [block[-1], *islice(following, BLOCK)]
+        block = [block[-1], *islice(following, LONGEST)]
     return np.concatenate([*rows, _rest(grid, scene.ticks, scene.period_ns, integrator.state)])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -124,8 +124,7 @@ class Trajectory:
     @property
     def energy(self) -> Energy:
         """V, V_c, V' and the contact mode at the output times; see `energy_of`."""
-        system = self.scene.system
-        return energy(replace(system, laws={}) if self.controllers else system, self.state)
+        return energy(self.scene.system, self.state, feedback=not self.controllers)
 
     @property
     def energy_of(self) -> str:

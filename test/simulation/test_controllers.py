@@ -14,7 +14,10 @@ import pytest
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.cli.report import describe_trajectory
+from grasp_ros.exact import control as compiled
 from grasp_ros.exact.integrator import Status
+from grasp_ros.physics import control
+from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -50,6 +53,24 @@ def test_the_feedback_of_the_scene_from_outside_gives_the_same_bits(name: str, k
         assert run.controllers["left"].endswith(":paper")
     assert run.sampled
     assert (own.energy_of, run.energy_of) == (PLANT_AND_FEEDBACK, PLANT_ALONE)
+
+
+def test_the_compiled_law_has_the_bits_of_the_one_that_a_node_runs() -> None:
+    """Over many sizes, with zeros of both signs and without any limit, noise or step."""
+    draw = np.random.default_rng(5)
+    for _ in range(3000):
+        row = ControlLaw(0.0, 0.0).row
+        for columns in ([0, 1, 2, 3], [4, 5], [6, 7], [8]):
+            chosen = [column for column in columns if draw.random() < 0.6]
+            row[chosen] = 10.0 ** draw.uniform(-9.0, 3.0, len(chosen))
+        normals = draw.normal(size=2)
+        x, v = (float(draw.choice([0.0, -0.0, draw.normal() * 10.0 ** draw.uniform(-9.0, 9.0)])) for _ in range(2))
+        seen = compiled.measured(row, normals, x, v)
+        plain = row.tolist()
+        assert np.array(seen).tobytes() == np.array(control.measured(plain, normals.tolist(), x, v)).tobytes()
+        force = compiled.limited(row, compiled.feedback(row, *seen))
+        expected = control.limited(plain, control.feedback(plain, *seen))
+        assert np.array(force).tobytes() == np.array(expected).tobytes()
 
 
 class Notes:
