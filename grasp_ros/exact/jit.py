@@ -7,6 +7,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -115,9 +116,20 @@ def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False,
         )(function)
     finally:
         numba.config.CACHE_DIR = before
-    if not (door or numba.config.DISABLE_JIT):
-        found.__class__ = Kernel
+    if not numba.config.DISABLE_JIT:
+        found._cache.save_overload = _where_there_is_room(found._cache.save_overload)
+        if not door:
+            found.__class__ = Kernel
     return found
+
+
+def _where_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
+    """Keeping machine code is a help, no need: a disk that is full only means to compile again."""
+    def attempt(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    return attempt
 
 
 def kernels_on_disk() -> bool:
