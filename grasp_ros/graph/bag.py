@@ -18,7 +18,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph.recorder import LOST_RECORD, OWN_RECORD, Recorder
 from grasp_ros.graph.rosbag2 import INFORMATION, METADATA_KEY, METADATA_RECORD, BagError, decode, topics_of
 from grasp_ros.graph.storage import Storage, Stored
-from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.energy import PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -105,6 +105,11 @@ class Recording:
             inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
         inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
         return inputs
+
+    @property
+    def energy_of(self) -> str:
+        """What `energy` is the energy of: the controllers of a graph are those of its scene."""
+        return PLANT_AND_FEEDBACK
 
     @property
     def energy(self) -> Energy:
