@@ -134,15 +134,12 @@ def test_every_flipped_bit_is_noticed(tmp_path: Path, closed: Path, run: Traject
         with pytest.raises(bag.BagError, match=r"bag\.mcap"):
             bag.read(closed)
     storage(closed).write_bytes(whole)
-    for place in rng.integers(8 * len(text), size=15).tolist():
+    for place in rng.integers(8 * len(text), size=60).tolist():
         content = bytearray(text)
         content[place // 8] ^= 1 << place % 8
         (closed / "metadata.yaml").write_bytes(content)
-        try:
+        with pytest.raises(bag.BagError, match=r"metadata\.yaml"):
             bag.read(closed)
-        except bag.BagError:
-            continue
-        assert yaml.safe_load(content.decode()) == yaml.safe_load(text)  # a blank that is another blank
 
 
 def test_what_is_whole_is_recovered_around_damage(tmp_path: Path, closed: Path, run: Trajectory) -> None:
