@@ -27,6 +27,7 @@ setup(
         "numpy",
         "rosbags",
         "mcap",
+        "zstandard",
         "numba",
         "matplotlib",
         "tqdm",
@@ -35,9 +36,9 @@ setup(
     extras_require={
         "test": [
             "pytest", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
-            "types-tqdm", "colcon-common-extensions", "scipy",
+            "types-tqdm", "colcon-common-extensions", "scipy", "ruamel.yaml",
         ],
-        "study": ["gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],
+        "study": ["gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark", "ruamel.yaml"],
     },
     entry_points={
         "console_scripts": [

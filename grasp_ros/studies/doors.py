@@ -9,13 +9,10 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
-from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
 import numpy as np
-from mcap.data_stream import ReadDataStream
-from mcap.records import Chunk
 from ruamel.yaml import YAML
 from tqdm import tqdm
 
@@ -23,7 +20,7 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.graph import bag
 from grasp_ros.graph.recover import recover
-from grasp_ros.graph.storage import decompress
+from grasp_ros.graph.storage import unpack
 from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.studies import mutations, recorder
@@ -193,15 +190,11 @@ def _make_bag(whole: bytes, metadata: bytes, rng: Random) -> bytes:
         case 2:
             return b"c" + _joined(b"", whole[: int(rng.integers(len(whole)))])
         case _:
-            return b"r" + _joined(b"", mutations.records(whole, rng, _unpacked))
+            return b"r" + _joined(b"", mutations.records(whole, rng, unpack))
 
 
 def _joined(metadata: bytes, storage: bytes) -> bytes:
     return len(metadata).to_bytes(4, "little") + metadata + storage
-
-
-def _unpacked(body: bytes) -> bytes:
-    return decompress(Chunk.read(ReadDataStream(BytesIO(body))))
 
 
 def _read_bag(right: Trajectory, whole: bytes, place: Path, content: bytes) -> None:
