@@ -87,7 +87,8 @@ def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> An
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
-        compiled = numba.njit(cache=not inline, error_model="numpy", _nrt=counts, forceinline=inline)(function)
+        options = {"error_model": "numpy", "nogil": True, "_nrt": counts, "forceinline": inline}
+        compiled = numba.njit(cache=not inline, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
     if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
