@@ -104,8 +104,7 @@ class Integrator:
 
     def watch(self, wanted: Wanted, bound: float) -> Watcher:
         """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
-        plant = Plant(self._given, self._bodies, self._pairs, self._coulomb)
-        self._watcher = Watcher(plant, State(self._y, self._mode, self._clock), wanted)
+        self._watcher = Watcher(Plant(*self._plant), State(self._y, self._mode, self._clock), wanted)
         self._watcher.set_system(self._system, self._continuous)
         self._watcher.begin(bound)
         return self._watcher

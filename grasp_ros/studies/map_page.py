@@ -61,9 +61,9 @@ def _settling(found: maps.Settling) -> str:
         f" and dissipation {100.0 * settles.mean():.1f} % settle within 10 s to {100.0 * maps.SETTLED:g} % of the"
         f" largest initial displacement: {100.0 * lossy[:quarter].mean():.1f} % in the quarter with the least"
         f" dissipation, {100.0 * lossy[-quarter:].mean():.1f} % in that with the most. The edge between them is not a"
-        f" curve: counted with boxes of 2 to 32 pixels its dimension is {found.dimension:.2f}, so that a small change of"
-        f" a number decides whether the grasp settles. The zoom, Kp {x.low:.4g} to {x.high:.4g} N/m and p {y.low:.4g}"
-        f" to {y.high:.4g} s/m, holds {100.0 * zoomed.mean():.0f} % that settle. An accuracy of 1e-16 instead of"
+        f" curve: counted with boxes of 2 to 32 pixels its dimension is {found.dimension:.2f}, so that a small change"
+        f" of a number decides whether the grasp settles. The zoom, Kp {x.low:.4g} to {x.high:.4g} N/m and p"
+        f" {y.low:.4g} to {y.high:.4g} s/m, holds {100.0 * zoomed.mean():.0f} % that settle. An accuracy of 1e-16 instead of"
         f" {maps.MAP_ACCURACY:g} moves {100.0 * found.changed:.2g} % of its pixels to the other side of the edge. The"
         f" {times.size} runs took {found.seconds:.0f} s on this machine.")
     head = "## Where the grasp of case 3 settles"
