@@ -5,6 +5,7 @@
 goes from interval to interval, with the controllers of `control` and `foreign`.
 """
 
-from grasp_ros.exact.integrator import Event, Integrator, Status
+from grasp_ros.exact.events import Event
+from grasp_ros.exact.integrator import Integrator, Status
 
 __all__ = ["Event", "Integrator", "Status"]

@@ -18,6 +18,7 @@ from grasp_ros.exact.kinematics import (
     write_penetrations,
 )
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.observer import notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Candidate, Flights, Integers, Motion, Output, Plant, Settings, State, Tables
@@ -38,6 +39,7 @@ from grasp_ros.physics.layout import (
     Body,
     Filled,
     Pair,
+    Segment,
     Transition,
     Work,
 )
@@ -137,5 +139,6 @@ def flight_segment(tables: Tables, plant: Plant, state: State, settings: Setting
     deliver(tables, plant, state, settings, flights, t, out)
     move(flights, state, t)
     tick(state.clock, t)
+    notify(out, Segment.FLIGHT, t)
     make_transitions(plant, state, left, right, slide, t, out)
     return t
