@@ -15,7 +15,7 @@ from grasp_ros.exact.records import Loop, Plant, State, new_place
 from grasp_ros.exact.sight import Wanted
 from grasp_ros.exact.squeezed import creep
 from grasp_ros.exact.watcher import Watcher
-from grasp_ros.exact.workspace import borrow, give_back
+from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
@@ -104,7 +104,8 @@ class Integrator:
 
     def watch(self, wanted: Wanted, bound: float) -> Watcher:
         """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
-        self._watcher = Watcher(Plant(*self._plant), State(self._y, self._mode, self._clock), wanted)
+        plant = Plant(*self._plant)
+        self._watcher = Watcher(plant, State(self._y, self._mode, self._clock), wanted)
         self._watcher.set_system(self._system, self._continuous)
         self._watcher.begin(bound)
         return self._watcher
@@ -194,8 +195,7 @@ class Integrator:
         out = np.empty((len(grid), 6)) if rows is None else rows
         filled = np.zeros(len(Filled), dtype=np.int64)
         clock, outcome = self._clock, Outcome.GO_ON
-        tables, event_rows = workspace = borrow(self._accuracy)
-        try:
+        with workspace(self._accuracy) as (tables, event_rows):
             if self._watcher is not None:
                 self._watcher.attach(filled, tables)
             while self.status is Status.DONE:
@@ -215,8 +215,6 @@ class Integrator:
                     filled[_EVENTS] = 0
                 if outcome == Outcome.NO_COMMAND or self._ends(outcome):
                     break
-        finally:
-            give_back(self._accuracy, workspace)
         self._time = float(clock[2] + (clock[0] + clock[1]))
         return out[: filled[_OUTPUTS]]
 

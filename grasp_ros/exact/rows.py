@@ -13,16 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.core import types
 
+from grasp_ros.exact import jit
 from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.integrator import BREATH, compile_kernels
-from grasp_ros.exact.jit import door, kernel
+from grasp_ros.exact.jit import kernel
 from grasp_ros.exact.kinematics import write_penetrations
 from grasp_ros.exact.observer import call
 from grasp_ros.exact.records import Array, Integers, Loop, Plant, State, Tables, new_place
 from grasp_ros.exact.sight import Wanted
 from grasp_ros.exact.watch import BEGIN, FINISH
 from grasp_ros.exact.watcher import Watcher
-from grasp_ros.exact.workspace import borrow, give_back
+from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.layout import (
     EVENT_BODY,
     EVENT_KIND,
@@ -106,7 +107,7 @@ class Door(types.WrapperAddressProtocol):
 
 
 @cache
-def advance_door() -> Door:
+def door() -> Door:
     """`advance`, compiled where it has not been."""
     return Door()
 
@@ -143,8 +144,8 @@ def count_events(rows: Rows, i: int, room: Room) -> int:
     return int(count)
 
 
-@door
-def run_rows(run: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watch: Watch, limits: Limits) -> int:
+@jit.door
+def run_rows(door: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watch: Watch, limits: Limits) -> int:
     """Integrate the rows; returns how many, fewer only if a stop was asked for."""
     n = rows.state.shape[0]
     for i in range(n):
@@ -156,7 +157,7 @@ def run_rows(run: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watch
             call(room.filled[Filled.OBSERVER], room.filled[Filled.CONTEXT], BEGIN, watch.bound[0])
         outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
         while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
-            outcome = run(
+            outcome = door(
                 tables.c, tables.f, tables.at, tables.size, tables.row, tables.start.c, tables.start.f,
                 room.given, room.bodies, room.pairs, rows.coulomb[i], room.y, room.mode, room.clock,
                 limits.tolerance, limits.max_work, room.times, room.rows, room.events, room.filled, room.work,
@@ -196,12 +197,10 @@ def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted,
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
     watch = Watch(watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]))
     limits = Limits(accuracy, max_events, min(max_work, BREATH), stop)
-    tables, events = workspace = borrow(accuracy)
-    try:
+    with workspace(accuracy) as (tables, events):
         if wanted:
             watcher.attach(filled, tables)
         room = Room(given, bodies, pairs, y, mode, clock, events, filled, np.zeros(len(Work), dtype=np.int64),
                     np.zeros(3), np.zeros(0), np.zeros((0, 6)))
-        return int(run_rows(advance_door(), tables, loop, rows, room, watch, limits))
-    finally:
-        give_back(accuracy, workspace)
+        done = run_rows(door(), tables, loop, rows, room, watch, limits)
+    return int(done)

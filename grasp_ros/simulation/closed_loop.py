@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby, islice
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,12 +82,13 @@ class SampledLoop:
         Numbers of the controllers that are set while it runs, by the tick from which they act.
     progress : callable or None
         Called with the time reached, in s.
-    foreign : mapping of int to Foreign
+    foreign : mapping of int to Foreign, optional
         Controllers from outside, by side.
     """
 
     def __init__(
-        self, scene: Scene, grid: Array, changes: Changes, progress: Progress, foreign: Mapping[int, Foreign]
+        self, scene: Scene, grid: Array, changes: Changes, progress: Progress,
+        foreign: Mapping[int, Foreign] = MappingProxyType({}),
     ) -> None:
         self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
         self._foreign = foreign
