@@ -13,6 +13,7 @@ from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of, keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
 from grasp_ros.exact.records import (
@@ -56,6 +57,7 @@ from grasp_ros.physics.layout import (
     Body,
     Filled,
     Pair,
+    Segment,
     Slide,
     Transition,
     Work,
@@ -207,5 +209,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     keep_resting(state)
     deliver(tables, step, s, t, flies, free, state, out)
     tick(state.clock, t)
+    leave_step(tables, s, step.unit)
+    notify(out, Segment.CONTACT, t)
     make_transitions(plant, state, left, right, slide, s, out)
     return t

@@ -7,6 +7,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -81,14 +82,34 @@ def with_deep_stack(function: Callable[[], None]) -> Callable[[], None]:
     return FunctionType(code, function.__globals__, function.__name__)
 
 
+def compiled_address(function: Any, signature: str) -> int:
+    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been."""
+    function.compile(signature)
+    (result,) = function.overloads.values()
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+
+
 def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> Any:
     """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
-        return numba.njit(cache=not inline, error_model="numpy", _nrt=counts, forceinline=inline)(function)
+        options = {"error_model": "numpy", "nogil": True, "_nrt": counts, "forceinline": inline}
+        compiled = numba.njit(cache=not inline, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
+    if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
+        compiled._cache.save_overload = _where_there_is_room(compiled._cache.save_overload)
+    return compiled
+
+
+def _where_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
+    """Keeping machine code is a help, no need: a disk that is full only means to compile again."""
+    def attempt(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    return attempt
 
 
 def kernels_on_disk() -> bool:

@@ -8,6 +8,7 @@ pairs are rows LEFT, RIGHT of an array (2, 2).
 from enum import IntEnum
 
 EPS = 2.220446049250313e-16  # distance from 1.0 to the next double
+BLOCK = 1024  # ticks that a sampled run makes at once, and whose noise is drawn at once
 
 
 class Body(IntEnum):
@@ -49,6 +50,15 @@ class Slide(IntEnum):
     STUCK = 3
 
 
+class Segment(IntEnum):
+    """How a piece of the motion is known, and what its table of polynomials holds."""
+
+    FLIGHT = 0  # a closed form
+    CONTACT = 1  # a Taylor step in regularised time: w = sqrt(u) of what touches
+    START = 2  # the begin of a contact: u, in powers of t^(1/4)
+    CREEP = 3  # an implicit step: u, in powers of t
+
+
 class Transition(IntEnum):
     """Events of one pair, and of the object."""
 
@@ -73,15 +83,34 @@ class Outcome(IntEnum):
     SQUEEZED = 6  # a contact is stiff: an implicit step is cheaper
     ENERGY_FALLS = 7
     PENETRATES = 8
+    NO_COMMAND = 9  # a controller gave no finite number
+
+
+class Answer(IntEnum):
+    """Where the command of a side comes from, if not from a function at this address."""
+
+    GIVEN = 0  # from outside; 0 without a controller
+    LAW = 1  # the row of the side, see `control`
+
+
+class Place(IntEnum):
+    """Where a loop stands."""
+
+    INTERVAL = 0  # done so far in this call
+    BEGUN = 1  # whether the inputs of the next one act already
+    TICK = 2  # at which the first one begins
+    FAILED = 3  # side whose controller gave no number
 
 
 class Filled(IntEnum):
-    """Counters of the rows in use, and of the steps for which no implicit one is tried."""
+    """Counters of the rows in use and of the steps for which no implicit one is tried; the observer of a run."""
 
     OUTPUTS = 0
     EVENTS = 1
     WAIT = 2  # contact steps until the next trial
     PENALTY = 3  # their number after the last trial that failed
+    OBSERVER = 4  # address of what is called after each segment, see `exact.observer`; 0: nothing
+    CONTEXT = 5  # address of what it is called with
 
 
 class Work(IntEnum):
