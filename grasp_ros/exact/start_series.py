@@ -58,7 +58,7 @@ def own_factors(f: Array, c: Array, n: int, k: int, side: Body, a: int, loss: fl
     else:
         for j in range(1, k):
             total -= f[root + j] * f[root + k - j]
-        f[root + k] = total / (2.0 * f[root])
+        f[root + k] = total / (2.0 * f[root]) if f[root] > 0.0 else 0.0  # what has underflowed pushes nothing
     cubed = 0.0
     for j in range(k + 1):
         cubed += c[LANES * (j + a) + lane] * f[root + k - j]
