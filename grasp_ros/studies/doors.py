@@ -30,6 +30,7 @@ from grasp_ros.verification.deadline import Deadline, deadline
 SECONDS = 10.0  # no door takes longer
 MEMORY = 4 * 2**30  # bytes that a door may ask for beyond what is there
 FEW_EVENTS, FEW_WORK = 100, 10_000  # budgets of what is done with an accepted scene
+SQUEEZED = [f"{side}_contact.dissipation_s_per_m=1e6" for side in ("left", "right")]
 Random = np.random.Generator
 
 
@@ -104,6 +105,7 @@ def attempt(doors: list[Door], place: Path, seed: int, number: int, directory: P
 def all_doors(place: Path) -> list[Door]:
     """The doors, with valid files to damage."""
     library = [scenes.load(name).to_yaml() for name in scenes.names()]
+    simulate(scenes.load("preload", SQUEEZED), max_work=FEW_WORK)  # compiles what is compiled at first use
     case = scenes.load("case_01", ["time.duration_s=0.004"])
     result, recorded = simulate(case, grid=np.linspace(0.0, 0.004, 5)), simulate(case, sampled=True)
     result.save(place / "valid.npz")
@@ -152,8 +154,9 @@ def _read_scene(place: Path, content: bytes) -> None:
             if (tuple(said) if isinstance(said, list) else said) != value or isinstance(said, bool):
                 _differs(f"{section}.{key} is {said!r}, not {value!r}")
     for key in ("title", "watch"):
-        if other.get(key, "") != getattr(scene, key):
-            _differs(f"{key} is {other.get(key)!r}")
+        said = other.get(key, "")
+        if isinstance(said, str) and said != getattr(scene, key):  # 0x1F is a text for us, and a number for others
+            _differs(f"{key} is {said!r}")
     if other.keys() != scene.values.keys() | {"title", "readings"} | ({"watch"} if "watch" in other else set()):
         _differs("its sections are others")
     if scenes.parse(scene.to_yaml(), scene.name, "again") != scene:

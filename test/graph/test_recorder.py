@@ -192,6 +192,22 @@ def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajec
     assert recording.versions == {"python": "3"}
 
 
+def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:
+    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
+    for time_ns, messages, own in study.ticks_of(run):
+        recorder.write_tick(time_ns, messages[:1] + messages[2:], own)
+    recorder.close()
+    recording = bag.read(tmp_path / "bag")
+    assert np.isnan(recording.command[:, 0]).all()
+    assert recording.missing["left/effort_command"] == len(run.t)
+    result = command("inspect", "bag")
+    assert result.returncode == 0
+    assert f"lost                  left/effort_command {len(run.t)}" in result.stdout
+    with pytest.raises(bag.BagError, match="nothing can be recovered: it holds no complete tick"):
+        recover(tmp_path / "bag", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
 def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path, run: Trajectory) -> None:
     recorder = Recorder(tmp_path / "bag", run.scene, {})
     for _, tick in zip(range(3), study.ticks_of(run), strict=False):
