@@ -23,7 +23,7 @@ from grasp_ros.simulation.ensemble import ensemble
 
 GAINS = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
 LOSSES = "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"
-PIXELS, ZOOM_PIXELS, WINDOW = 1000, 500, 50
+PIXELS = 1000
 SETTLED, MAP_ACCURACY, CHECKED = 0.05, 1e-10, 2000
 TICKS, FIRST_S, LAST_S, GROWN = 300, 0.01, 0.4, 3.0
 PERIODS, LEVELS = 40, 26
@@ -71,7 +71,7 @@ def settling(directory: Path, pixels: int = PIXELS) -> Settling:
     seconds = _computed(plan, directory / f"settling_{pixels}.zarr").seconds
     data = store.read(directory / f"settling_{pixels}.zarr")
     settles = np.isfinite(data["settling_time"].values)
-    zoom = Plan(scene, setup, _window(plan, settles, max(pixels // 20, 4), min(ZOOM_PIXELS, pixels)))
+    zoom = Plan(scene, setup, _window(plan, settles, max(pixels // 20, 4), max(pixels // 2, 2)))
     _computed(zoom, directory / f"zoom_{pixels}.zarr")
     zoomed = store.read(directory / f"zoom_{pixels}.zarr")
     return Settling(plan, data, zoom, zoomed, dimension(settles), _changed(zoom, zoomed), seconds)
