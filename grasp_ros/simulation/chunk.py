@@ -165,7 +165,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
     if wanted:
         watcher = integrator.watch(wanted, setup.settled)
     if sampled:
-        SampledLoop(scene, NO_GRID, {}, None).drive(integrator)
+        SampledLoop(scene, NO_GRID, {}, None, {}).drive(integrator)
     elif system.external:
         drive_external(scene, NO_GRID, integrator)
     else:
