@@ -1,4 +1,4 @@
-"""The studies of what is promised: `certificate`, `hard` and `fuzz`."""
+"""The studies of what is promised: `certificate`, `paper`, `hard` and `fuzz`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from grasp_ros.cli.arguments import add_command, add_output, prepare
 from grasp_ros.physics.errors import Refused
 
 Parser = argparse.ArgumentParser
+PAPER_PAGE = Path("runs") / "paper.html"
 
 
 def add_certificate(commands: Any) -> Parser:
@@ -26,6 +27,32 @@ def _certificate(options: argparse.Namespace) -> int:
 
     prepare()
     certificate.run(options.output)
+    return 0
+
+
+def add_paper(commands: Any) -> Parser:
+    """`grasp study paper`."""
+    text = "the paper reproduced and judged: equations, figures, quantities, verdicts, and what it lacks, on one page"
+    sub = add_command(commands, "paper", _paper, text)
+    sub.add_argument("--ros", action="store_true", help="run the eleven cases through the graph as well, some minutes")
+    sub.add_argument("--docs", type=Path, metavar="FILE.md", help="write it as Markdown too, with figures beside it")
+    add_output(sub, "FILE.html", f"the page, in one file (default {PAPER_PAGE})", PAPER_PAGE)
+    return sub
+
+
+def _paper(options: argparse.Namespace) -> int:
+    from grasp_ros.studies.paper import page, study
+
+    prepare()
+    found = study.report(graph=options.ros)
+    page.write_html(found, options.output)
+    print(found.summary)
+    for claim in found.claims:
+        print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
+    print(f"written to {options.output}")
+    if options.docs is not None:
+        page.write_markdown(found, options.docs)
+        print(f"written to {options.docs}")
     return 0
 
 

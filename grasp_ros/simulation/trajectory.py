@@ -16,6 +16,7 @@ from grasp_ros.methods.registry import EXACT, METHODS, find
 from grasp_ros.physics.energy import Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -125,6 +126,16 @@ class Trajectory:
         return energy(self.scene.system, self.state)
 
     @property
+    def parts(self) -> Parts:
+        """V by parts at the output times: V_l, V_o, V_r of (29), and the contacts."""
+        return parts(self.scene.system, self.state)
+
+    @property
+    def epsilon(self) -> Array:
+        """Epsilon of (35), (36): the largest deformation of each pair up to an output time, (n, 2) in m."""
+        return largest_deformation(self.scene.system, self.state)
+
+    @property
     def events(self) -> list[Event]:
         """The events as records."""
         return to_events(self.event_table)
@@ -142,11 +153,12 @@ class Trajectory:
         Refused
             If the file cannot be written.
         """
-        level = self.energy
+        level, parts = self.energy, self.parts
         with writing(path), path.open("wb") as file:
             np.savez_compressed(
                 file, t=self.t, state=self.state, command=self.command, inputs=self.inputs,
-                V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode,
+                V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **parts._asdict(),
+                epsilon=self.epsilon,
                 touch_left=self.times(Transition.TOUCH, LEFT), touch_right=self.times(Transition.TOUCH, RIGHT),
                 release_left=self.times(Transition.RELEASE, LEFT), release_right=self.times(Transition.RELEASE, RIGHT),
                 events=self.event_table, work=self.work,

@@ -25,6 +25,10 @@ BELOW = {  # what the files of a room may import beside their own room
     "cli": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification", "studies"),
 }
 ROOMS = tuple(BELOW)
+DRAWS = (
+    "simulation/plots.py", "studies/figures.py", "studies/page_figures.py", "studies/paper/figures.py",
+    "studies/paper/beyond_figures.py",
+)
 
 
 def imports(name: str) -> set[str]:
@@ -86,8 +90,10 @@ def test_each_library_has_its_place(name: str) -> None:
         }
     if name != "graph/bag.py":
         assert "rosbags" not in found
-    if name not in ("simulation/plots.py", "studies/figures.py", "studies/page_figures.py"):
+    if name not in DRAWS:
         assert "matplotlib" not in found
+    if name != "studies/paper/page.py":
+        assert "jinja2" not in found
     if not name.startswith("exact/"):
         assert "numba" not in found
     if not name.startswith("verification/"):
