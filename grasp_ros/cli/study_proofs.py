@@ -11,6 +11,7 @@ from grasp_ros.cli.arguments import add_command, add_output, prepare
 from grasp_ros.physics.errors import Refused
 
 Parser = argparse.ArgumentParser
+QUICK_STARTS = 4
 PAPER_PAGE = Path("runs") / "paper.html"
 
 
@@ -35,6 +36,7 @@ def add_paper(commands: Any) -> Parser:
     text = "the paper reproduced and judged: equations, figures, quantities, verdicts, and what it lacks, on one page"
     sub = add_command(commands, "paper", _paper, text)
     sub.add_argument("--ros", action="store_true", help="run the eleven cases through the graph as well, some minutes")
+    sub.add_argument("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out")
     sub.add_argument("--docs", type=Path, metavar="FILE.md", help="write it as Markdown too, with figures beside it")
     add_output(sub, "FILE.html", f"the page, in one file (default {PAPER_PAGE})", PAPER_PAGE)
     return sub
@@ -42,9 +44,10 @@ def add_paper(commands: Any) -> Parser:
 
 def _paper(options: argparse.Namespace) -> int:
     from grasp_ros.studies.paper import page, study
+    from grasp_ros.studies.paper.definitions import RANDOM_STARTS
 
     prepare()
-    found = study.report(graph=options.ros)
+    found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
     page.write_html(found, options.output)
     print(found.summary)
     for claim in found.claims:

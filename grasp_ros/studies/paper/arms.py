@@ -17,7 +17,8 @@ from grasp_ros.studies.paper.motion import alone_settling, contacts_found, first
 
 STIFFNESSES = (5.0, 10.0, 20.0, 40.0, 70.0, 100.0, 200.0, 400.0)  # N/m
 DAMPINGS = (0.0, 0.05, 0.1, 0.2, 0.35, 0.7, 1.2, 2.0, 3.5, 5.0)  # C = c + Kv, N s/m
-FEW = 15  # random starts of each value
+FEW = 15  # random starts of each damping
+MANY = 30  # of each stiffness, whose effect is smaller
 STEPS = (1e-3, 1e-2)  # s, plausible for 1990
 
 
@@ -36,7 +37,7 @@ def stiffer(cases: Cases, starts: Sequence[Start]) -> list[Stiffer]:
     """Settling time and what makes it, over the stiffness of the arms."""
     found = []
     for k in STIFFNESSES:
-        scenes = [started(with_values(cases[STANDARD], {"k": k}), start) for start in starts[:FEW]]
+        scenes = [started(with_values(cases[STANDARD], {"k": k}), start) for start in starts[:MANY]]
         rows = [_row(scene) for scene in scenes]
         found.append(Stiffer(k, *(float(np.median([row[column] for row in rows])) for column in range(5))))
     return found

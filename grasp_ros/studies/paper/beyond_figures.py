@@ -10,6 +10,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure as Drawing
+from matplotlib.ticker import LogLocator
 
 from grasp_ros.physics.layout import DISSIPATION
 from grasp_ros.physics.model import penetration
@@ -195,6 +196,9 @@ def sweeps(curves: Sequence[Curve]) -> Drawing:
             axes.set_ylim(min(0.8 * finite.min(), 0.5), max(1.25 * finite.max(), 2.0))
             axes.set_title(title, fontsize="small", loc="left")
             axes.set_xlabel(label)
+            for axis in (axes.xaxis, axes.yaxis):
+                axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+                axis.set_major_formatter("{x:g}")
             axes.minorticks_off()
         for axes in panels.ravel()[len(curves) :]:
             axes.set_axis_off()

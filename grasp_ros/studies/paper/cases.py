@@ -10,19 +10,29 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 
-Start = tuple[float, float]  # x_l(0), x_r(0) in m; at rest, x_o(0) = 0
 Cases = Mapping[int, Scene]  # by the paper's number
+
+
+
+class Start(NamedTuple):
+    """Where a motion begins, at rest, in m."""
+
+    x_l: float
+    x_r: float
+    x_o: float = 0.0
+
 
 STANDARD = 1
 NUMBERS = tuple(range(1, 12))
-PRINTED: Start = (-0.3, 0.5)
-SYMMETRIC: Start = (-0.5, 0.5)
-LITERAL: Start = (0.3, 0.5)  # Table 1 without the minus
-MIRRORED: Start = (-0.5, 0.3)
+PRINTED = Start(-0.3, 0.5)
+SYMMETRIC = Start(-0.5, 0.5)
+LITERAL = Start(0.3, 0.5)  # Table 1 without the minus
 READ_STARTS: Mapping[str, Start] = {
     "x_l(0) = -0.3, x_r(0) = 0.5 m": PRINTED,
     "x_l(0) = -0.5, x_r(0) = 0.5 m": SYMMETRIC,
-    "x_l(0) = -0.5, x_r(0) = 0.3 m": MIRRORED,
+    "x_l(0) = -0.3, x_r(0) = 0.3 m": Start(-0.3, 0.3),
+    "x_l(0) = -0.5, x_r(0) = 0.3 m": Start(-0.5, 0.3),
+    "x_l(0) = -0.3, x_o(0) = 0.1, x_r(0) = 0.5 m": Start(-0.3, 0.5, 0.1),
     "x_l(0) = +0.3 as printed, inside the object": LITERAL,
 }
 SEED = 1990
@@ -82,8 +92,8 @@ def load_cases() -> dict[int, Scene]:
 
 def started(scene: Scene, start: Start) -> Scene:
     """A scene that begins at rest somewhere else."""
-    x_l, x_r = start
-    return scene.changed({"left_arm.position_m": x_l, "right_arm.position_m": x_r})
+    x_l, x_r, x_o = start
+    return scene.changed({"left_arm.position_m": x_l, "object.position_m": x_o, "right_arm.position_m": x_r})
 
 
 def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
@@ -101,10 +111,10 @@ def random_starts(number: int, seed: int = SEED) -> list[Start]:
     """Starts at rest, x_l in [-0.5, -0.1], x_o = 0, x_r in [0.1, 0.5] m."""
     rng = np.random.default_rng(seed)
     draws = rng.uniform(NEAREST, FARTHEST, (number, 2)).tolist()
-    return [(-x_l, x_r) for x_l, x_r in draws]
+    return [Start(-x_l, x_r) for x_l, x_r in draws]
 
 
 def start_of(scene: Scene) -> Start:
     """Where the arms of a scene begin."""
     state = scene.initial_state.tolist()
-    return state[0], state[4]
+    return Start(state[0], state[4], state[2])

@@ -101,11 +101,11 @@ class Comparison(NamedTuple):
         return [
             self._check(
                 Kind.ALIKE,
-                f"both from {x_l:g}, {x_r:g} m",
-                started(cases[self.changed], (x_l, x_r)),
-                started(cases[self.other], (x_l, x_r)),
+                f"both from {start.x_l:g}, {start.x_r:g} m",
+                started(cases[self.changed], start),
+                started(cases[self.other], start),
             )
-            for x_l, x_r in ALIKE
+            for start in ALIKE
         ]
 
     def _readings(self, cases: Cases) -> list[Check]:

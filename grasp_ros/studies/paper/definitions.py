@@ -65,7 +65,7 @@ def definitions(starts: int) -> list[tuple[str, str]]:
         (
             "readings",
             (
-                "the sign of x_l(0), the start of the symmetric cases, p of No. 4, and other measures for the same word"
+                "the sign of x_l(0), x_o(0), the starts of the symmetric cases, p of No. 4, and other measures for the same word"
                 " do not enter the verdict; those by which it would come out the other way are named beside it."
             ),
         ),

@@ -143,7 +143,7 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
                 x = 0 if side == LEFT else 4
                 stiffness[side] = max(stiffness[side], relative(-P[:, x, 2] * sample.pair(side)[0] ** 2, stored))
     return [
-        Equation("(11)", "V = x' P(x) x", "physics.lyapunov.quadratic_form", "x' P x against V, relative", form, 1e-14),
+        Equation("(11)", "V = x' P(x) x", "physics.lyapunov.quadratic_form", "x' P x against V, relative", form, 1e-13),
         Equation("(12)", "P(x)", "physics.lyapunov.matrix", "P against its transpose, N/m", symmetric, 0.0),
         Equation(
             "(13)",

@@ -16,7 +16,7 @@ from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.quantities import impact_forces_of, last_outside, settled_distance
-from grasp_ros.studies.paper.cases import started
+from grasp_ros.studies.paper.cases import Cases, Start, started
 from grasp_ros.studies.paper.measures import measure
 from grasp_ros.studies.paper.universal import Found
 
@@ -228,7 +228,7 @@ def alone_settling(scene: Scene) -> float:
     return float(found[:2].max())
 
 
-def collisions_help(cases: dict[int, Scene], number: int, start: tuple[float, float]) -> Found:
+def collisions_help(cases: Cases, number: int, start: Start) -> Found:
     """Settling time with the object over that of the arms alone."""
     scene = started(cases[number], start)
     together, alone = measure(scene).settling, alone_settling(scene)

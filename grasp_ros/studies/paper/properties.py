@@ -18,10 +18,10 @@ HEAVY_LEFT = Comparison(
     "settling",
     6,
     True,
-    "A heavier arm keeps C and K, so its envelope exp(-C t / 2m) is slower; equal arms that are both heavy are slower"
-    " still.",
+    "Unequal arms meet the object at different times and push it about, and the envelope exp(-C t / 2m) of the heavier"
+    " one is slower; of two heavy arms both are.",
     "m_l",
-    tenfold(1.0),
+    (0.1, 0.2, 0.5, *tenfold(1.0)),
     ("settling_1", "settling_5", "rest"),
     others=(("both arms with 10 kg", (("m", 10.0),)), ("both arms with 5.5 kg, the same mass in all", (("m", 5.5),))),
 )

@@ -53,7 +53,7 @@ def _column(scene: Scene) -> list[str]:
     u_l, _, u_r, _ = penetration(run.state[-1])
     slope = float(np.polyfit(run.t, np.log(level), 1)[0])
     whole = float(level[0])
-    x_l, x_r = start_of(scene)
+    x_l, x_r, _ = start_of(scene)
     return [
         f"{x_l:g}, {x_r:g}",
         f"{1e3 * settled_distance(scene):g}",

@@ -17,7 +17,7 @@ NO_RISE = "<= 1e-12 V(0) a second"
 
 
 def _helped(number: int, cases: Cases, start: Start) -> Found:
-    return motion.collisions_help(dict(cases), number, start)
+    return motion.collisions_help(cases, number, start)
 
 
 def _help(number: int, what: str) -> Share:

@@ -21,13 +21,14 @@ from grasp_ros.studies.paper.cases import (
     SYMMETRIC,
     Cases,
     Figure,
+    Start,
     load_cases,
     random_starts,
     started,
     value_of,
 )
 from grasp_ros.studies.paper.compare import Comparison
-from grasp_ros.studies.paper.definitions import RANDOM_STARTS, SUBTITLE, SWEEPS, TITLE, definitions
+from grasp_ros.studies.paper.definitions import SUBTITLE, SWEEPS, TITLE, definitions
 from grasp_ros.studies.paper.equations import equations
 from grasp_ros.studies.paper.judgement import Wanted, judged, measured, statements, tasks, wanted_of
 from grasp_ros.studies.paper.measures import Measures, remember
@@ -42,7 +43,7 @@ CHUNK = 8  # scenes that a process measures before it reports
 Job = tuple[str, Callable[..., Any], tuple[Any, ...]]
 
 
-def report(graph: bool = False, starts: int = RANDOM_STARTS, processes: int | None = None) -> Report:
+def report(graph: bool, starts: int) -> Report:
     """Compute everything.
 
     Parameters
@@ -51,13 +52,11 @@ def report(graph: bool = False, starts: int = RANDOM_STARTS, processes: int | No
         Whether to run the eleven cases through the graph as well.
     starts : int
         Random starts.
-    processes : int, optional
-        Default: one for each processor.
     """
     cases, drawn = load_cases(), random_starts(starts)
     wanted = wanted_of(cases, drawn, statements())
     context = multiprocessing.get_context("spawn")
-    with context.Pool(processes or os.cpu_count() or 1) as pool, tqdm(
+    with context.Pool(os.cpu_count() or 1) as pool, tqdm(
         total=len(wanted), desc="random starts and sweeps", file=sys.stderr
     ) as bar:
         known: dict[Wanted, Measures] = {}
@@ -81,7 +80,7 @@ def _called(job: Job) -> tuple[str, Any]:
     return key, function(*arguments)
 
 
-def _jobs(cases: Cases, drawn: list[tuple[float, float]]) -> list[Job]:
+def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
     """What can be computed at the same time, the longest first."""
     return [
         ("found", _chaos, (cases,)),
@@ -134,12 +133,12 @@ def _tail(cases: Cases) -> tuple[str, Any, Image]:
     return "tail", found, image(beyond_figures.tail(found))
 
 
-def _stiffer(cases: Cases, drawn: list[tuple[float, float]]) -> tuple[str, Any, Image]:
+def _stiffer(cases: Cases, drawn: list[Start]) -> tuple[str, Any, Image]:
     found = arms.stiffer(cases, drawn)
     return "stiffer", found, image(beyond_figures.stiffer(found))
 
 
-def _damped(cases: Cases, drawn: list[tuple[float, float]]) -> tuple[str, Any, Image]:
+def _damped(cases: Cases, drawn: list[Start]) -> tuple[str, Any, Image]:
     found = arms.damped(cases, drawn)
     return "damped", found, image(beyond_figures.damped(found))
 
@@ -174,7 +173,7 @@ def _same_V(run: Any) -> bool:
     return bool((run.energy.V_c == run.energy.V).all())
 
 
-def _curves(cases: Cases, drawn: list[tuple[float, float]]) -> list[beyond_figures.Curve]:
+def _curves(cases: Cases, drawn: list[Start]) -> list[beyond_figures.Curve]:
     found: list[beyond_figures.Curve] = []
     for key, statement in statements().items():
         for part in statement.parts:
@@ -186,7 +185,7 @@ def _curves(cases: Cases, drawn: list[tuple[float, float]]) -> list[beyond_figur
 
 
 def _put_together(
-    cases: Cases, drawn: list[tuple[float, float]], done: Mapping[str, list[Any]], graph: list[Any]
+    cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]], graph: list[Any]
 ) -> Report:
     order = list(statements())
     claims = sorted(done["claim"], key=lambda claim: order.index(claim.key))
