@@ -41,9 +41,11 @@ def _plot(options: argparse.Namespace) -> int:
         captions.append(motion.scene.feedback_in_words(sampled))
     if span is not None:
         longest = max(motion.scene.duration for motion in motions)
-        span = span[0], min(span[1], longest)
-        if not 0.0 <= span[0] < span[1]:
+        if not 0.0 <= span[0] < longest:
             raise Refused(f"--from {span[0]!r} is not allowed; allowed: 0 to below {longest:g} s")
+        if math.isfinite(span[1]) and span[1] > longest:
+            raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
+        span = span[0], min(span[1], longest)
     output = options.output or _beside(options.sources[0], motions[0].scene.name)
     plots.draw_several(motions, captions, output, width_mm=options.width, span=span)
     print(f"written to {output}")

@@ -46,6 +46,8 @@ def _paper(options: argparse.Namespace) -> int:
     from grasp_ros.studies.paper import page, study
     from grasp_ros.studies.paper.definitions import RANDOM_STARTS
 
+    for path in filter(None, (options.output, options.docs)):
+        page.claim(path)
     prepare()
     found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
     page.write_html(found, options.output)

@@ -38,6 +38,7 @@ def test_sampled_and_files(command: Any, tmp_path: Path) -> None:
     [
         (("--from", "3", "--to", "2"), "--from 3.0, --to 2.0 is not allowed; allowed: --from below --to"),
         (("--from", "99"), "--from 99.0 is not allowed; allowed: 0 to below 20 s"),
+        (("--to", "21"), "--to 21.0 is not allowed; allowed: up to 20 s"),
         (("--width", "5"), "--width 5.0 is not allowed; allowed: 60 to 1000 mm"),
     ],
 )

@@ -33,6 +33,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return directory
 
 
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(["study", "paper", "-o", str(tmp_path / "file" / "page.html")]) == 2
+    assert "grasp: " in capsys.readouterr().err
+
+
 def test_the_page_needs_nothing_else(made: Path) -> None:
     text = (made / "page.html").read_text(encoding="utf-8")
     for title in CONTENT:

@@ -65,8 +65,9 @@ def definitions(starts: int) -> list[tuple[str, str]]:
         (
             "readings",
             (
-                "the sign of x_l(0), x_o(0), the starts of the symmetric cases, p of No. 4, and other measures for the same"
-                " word do not enter the verdict; those by which it would come out the other way are named beside it."
+                "the sign of x_l(0), x_o(0), the starts of the symmetric cases, p of No. 4, and other measures for the"
+                " same word do not enter the verdict; those by which it would come out the other way are named beside"
+                " it."
             ),
         ),
         (

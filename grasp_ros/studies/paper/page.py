@@ -69,6 +69,19 @@ def template(name: str) -> str:
     return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
+def claim(path: Path) -> None:
+    """Make sure, before the work, that a page can be written to where it is to go.
+
+    Raises
+    ------
+    Refused
+        If it cannot.
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.open("a", encoding="utf-8").close()
+
+
 def write_html(report: Report, path: Path) -> None:
     """Write the page into one file that needs nothing else.
 
@@ -80,8 +93,7 @@ def write_html(report: Report, path: Path) -> None:
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False)
     page = environment.from_string(template("page.html"))
     runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
+    claim(path)
     write(
         path,
         page.render(
