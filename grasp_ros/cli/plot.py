@@ -9,7 +9,17 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.cli.arguments import add_command, add_output, add_settings, check_memory, load_scene, prepare, warn
+from grasp_ros.cli.arguments import (
+    add_command,
+    add_force,
+    add_output,
+    add_settings,
+    check_memory,
+    check_output,
+    load_scene,
+    prepare,
+    warn,
+)
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
@@ -30,10 +40,13 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
     add_output(sub, "FILE", "image file, .png, .svg or .pdf (default: .png beside the source)")
+    add_force(sub)
 
 
 def _plot(options: argparse.Namespace) -> int:
     span = _span(options)
+    output = options.output or _beside(options.sources[0])
+    check_output(output, options.force, options.sources)
     motions, captions = [], []
     for source in options.sources:
         motion, sampled = _motion(source, options, span)
@@ -46,7 +59,6 @@ def _plot(options: argparse.Namespace) -> int:
         if math.isfinite(span[1]) and span[1] > longest:
             raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
         span = span[0], min(span[1], longest)
-    output = options.output or _beside(options.sources[0], motions[0].scene.name)
     plots.draw_several(motions, captions, output, width_mm=options.width, span=span)
     print(f"written to {output}")
     return 0
@@ -94,10 +106,10 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
     return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step)
 
 
-def _beside(source: str, name: str) -> Path:
+def _beside(source: str) -> Path:
     """Where the figure goes if nothing else is said."""
     path = Path(source)
     with reading(path):
         if not path.exists():
-            return Path(f"{name}.png")
+            return Path(f"{path.stem}.png")
         return Path(f"{path.resolve()}.png") if path.is_dir() else path.with_suffix(".png")

@@ -101,6 +101,7 @@ def describe_recording(recording: Recording) -> list[Row]:
         ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
         ("messages", per_topic),
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
+        ("end", recording.lost["end"]),
         ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items())),
     ]
     for tick, numbers in recording.changes.items():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -43,13 +44,18 @@ def add_paper(commands: Any) -> Parser:
 
 
 def _paper(options: argparse.Namespace) -> int:
+    from grasp_ros.graph.processes import GraphError
     from grasp_ros.studies.paper import page, study
     from grasp_ros.studies.paper.definitions import RANDOM_STARTS
 
     for path in filter(None, (options.output, options.docs)):
         page.claim(path)
     prepare()
-    found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
+    try:
+        found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
+    except GraphError as error:
+        print(f"grasp: {error}", file=sys.stderr)
+        return 1
     page.write_html(found, options.output)
     print(found.summary)
     for claim in found.claims:

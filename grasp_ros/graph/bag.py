@@ -1,36 +1,30 @@
-"""Recording and reading bags: rosbag2 directories with MCAP storage, stamped in simulated time."""
+"""Reading bags: rosbag2 directories with MCAP storage, stamped in simulated time.
+
+`recorder` writes them, `storage` knows their records, `recover` makes a new bag of one that is damaged.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from array import array
+from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph.recorder import LOST_RECORD, OWN_RECORD, Recorder
+from grasp_ros.graph.rosbag2 import INFORMATION, METADATA_KEY, METADATA_RECORD, BagError, decode, topics_of
+from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.energy import Energy, energy
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.effects.force import SECTIONS
-from grasp_ros.scene.files import decoding, writing
+from grasp_ros.scene.files import decoding, read_text
+from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import (
     CHANGES,
     EXTERNAL_FORCES,
@@ -42,81 +36,10 @@ from grasp_ros.scene.topics import (
     state_of,
 )
 
-_TYPES = get_typestore(Stores.ROS2_JAZZY)
-_NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
-
-
-class BagError(Refused):
-    """A bag that cannot be written or read: names the path and the reason."""
-
-
-def _qos(topic: Topic) -> Qos:
-    return Qos(
-        QosHistory.KEEP_LAST, topic.depth, QosReliability.RELIABLE,
-        QosDurability.TRANSIENT_LOCAL if topic.latched else QosDurability.VOLATILE, _NO_LIMIT, _NO_LIMIT,
-        QosLiveliness.AUTOMATIC, _NO_LIMIT, False,
-    )
-
-
-class Recorder:
-    """Writes one bag: the scene and the versions first, then ticks.
-
-    Parameters
-    ----------
-    path : Path
-        Directory that does not exist yet.
-    scene : Scene
-        Its topics get a connection each.
-    versions : mapping of str to str
-        Stored in the bag's metadata.
-
-    Raises
-    ------
-    BagError
-        If the directory exists or cannot be written, now or later.
-    """
-
-    def __init__(self, path: Path, scene: scenes.Scene, versions: dict[str, str]) -> None:
-        self._path = path
-        try:
-            self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-            self._writer.open()
-        except (WriterError, OSError) as error:
-            raise BagError(f"{path}: cannot be written: {error}") from None
-        scene_yaml = scene.to_yaml()
-        self._writer.set_custom_data("scene", scene_yaml)
-        for name, version in sorted(versions.items()):
-            self._writer.set_custom_data(f"version {name}", version)
-        self._connections: dict[str, Connection] = {
-            topic.name: self._writer.add_connection(
-                f"/{topic.name}", topic.type, typestore=_TYPES, offered_qos_profiles=[_qos(topic)]
-            )
-            for topic in (SCENE, *scene.topics, *CHANGES.values())
-        }
-        string = _TYPES.types[SCENE.type](data=scene_yaml)
-        self.write(SCENE, 0, bytes(_TYPES.serialize_cdr(string, SCENE.type)))
-
-    def write(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
-        """Append one serialized message with its simulated time."""
-        with writing(self._path, BagError):
-            self._writer.write(self._connections[topic.name], time_ns, cdr)
-
-    def write_lyapunov(self, time_ns: int, values: Sequence[float]) -> None:
-        """Append the monitor's own values; serialized here, because rclpy pads this type with stray bytes."""
-        types = _TYPES.types
-        seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
-        stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
-        nothing = np.zeros(0)
-        message = types[LYAPUNOV.type](
-            header=header, name=LYAPUNOV_NAMES, position=np.array(values), velocity=nothing, effort=nothing
-        )
-        self.write(LYAPUNOV, time_ns, bytes(_TYPES.serialize_cdr(message, LYAPUNOV.type)))
-
-    def close(self) -> None:
-        """Finish the bag; only now it has its metadata."""
-        with writing(self._path, BagError):
-            self._writer.close()
+__all__ = ["BagError", "Recorder", "Recording", "open_storage", "read", "scene_of"]
+KIND = "a bag of this package"
+VERSION = "version "  # how the keys of versions begin
+WIDTH = {JOINT_STATES: 8, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
 @dataclass(frozen=True)
@@ -144,6 +67,9 @@ class Recording:
         What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
     changes : dict of int to dict of str to float
         Numbers that were set while the graph ran, by the tick from which they act.
+    lost : dict of str to str
+        How the recording ended and what is missing from it, as the bag itself says; if it was not closed, what the
+        reader has found.
     """
 
     path: Path
@@ -157,6 +83,7 @@ class Recording:
     outputs: dict[str, Array]
     lyapunov: Array
     changes: dict[int, dict[str, float]]
+    lost: dict[str, str] = field(default_factory=dict)
 
     @property
     def t(self) -> Array:
@@ -201,53 +128,107 @@ class Recording:
         return {name: ticks - count for name, count in self.counts.items()}
 
 
-def read(path: Path) -> Recording:
-    """Read a bag that the monitor recorded, with the rosbags reader.
+def open_storage(path: Path, salvage: bool = False) -> Storage:
+    """The storage file of a bag, or of a directory that holds one.
 
     Raises
     ------
     BagError
-        If the path is not such a bag.
+        If there is none, or more than one.
     """
-    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError, yaml.YAMLError)):
-        metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
-        custom = metadata["rosbag2_bagfile_information"]["custom_data"]
-        scene = scenes.parse(custom["scene"], path.name, str(path))
-        with Reader(path) as reader:
-            columns = {topic: _column(reader, topic, scene) for topic in scene.topics}
-            changes = _changes(reader, scene)
-    ticks, joints = columns[JOINT_STATES]
-    if not len(ticks):
-        raise BagError(f"{path}: holds no tick")
-
-    def aligned(topic: Topic) -> Array:
-        found, values = columns[topic]
-        result = np.full((len(ticks), values.shape[1]), np.nan)
-        _, here, there = np.intersect1d(ticks, found, return_indices=True)
-        result[here] = values[there]
-        return result
-
-    command = np.zeros((len(ticks), 2))
-    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-        command[:, side] = aligned(topic)[:, 0]
-    return Recording(
-        path, scene, {k.removeprefix("version "): v for k, v in custom.items() if k.startswith("version ")},
-        {topic.name: len(found) for topic, (found, _) in columns.items()}, ticks, joints[:, :6], joints[:, 6:], command,
-        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV), changes,
-    )
+    with decoding(path, KIND, BagError):
+        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        if len(files) != 1:
+            raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
+        return Storage(files[0], salvage)
 
 
-def _messages(reader: Reader, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:
-    """Tick and message of everything on a topic."""
-    connections = [connection for connection in reader.connections if connection.topic == f"/{topic.name}"]
-    for _, time_ns, raw in reader.messages(connections) if connections else ():
-        yield time_ns // scene.period_ns, _TYPES.deserialize_cdr(raw, topic.type)
+def scene_of(storage: Storage, path: Path) -> scenes.Scene:
+    """The scene of a bag, once its first record has been read.
+
+    Raises
+    ------
+    BagError
+        If the bag has none.
+    """
+    if OWN_RECORD not in storage.records:
+        raise BagError(f"{path}: not {KIND}: its scene is missing")
+    return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))
 
 
-def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
-    found = [(tick, _values(topic, message)) for tick, message in _messages(reader, topic, scene)]
-    rows = np.array([row for _, row in found], dtype=float).reshape(len(found), -1)
-    return np.array([tick for tick, _ in found], dtype=np.int64), rows
+def read(path: Path) -> Recording:
+    """Read a bag that the monitor recorded, also one that was not closed.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag, or if it is damaged.
+    """
+    storage = open_storage(path)
+    with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
+        columns, changes, scene = _Columns(), _Changes(), None
+        for stored in storage.messages():
+            if scene is None:
+                scene = scene_of(storage, path)
+                known = {f"/{topic.name}": topic for topic in topics_of(scene)}
+            topic = known.get(stored.topic)
+            if topic is None or topic.type != stored.type:
+                raise BagError(f"{path}: {stored.topic}: {stored.type} is not a topic of its scene")
+            if topic in CHANGES.values():
+                changes.add(topic, stored, scene)
+            elif topic != SCENE:
+                columns.add(topic, stored, scene)
+        if scene is None or not columns.ticks.get(JOINT_STATES):
+            raise BagError(f"{path}: holds no tick")
+        _check_metadata(path, storage)
+        return _recording(path, scene, columns, changes, storage)
+
+
+def _check_metadata(path: Path, storage: Storage) -> None:
+    """Refuse a metadata.yaml that says something else than the copy of it within the closed file."""
+    file = path / "metadata.yaml"
+    if storage.closed and path.is_dir() and file.exists():
+        inside = load_yaml(storage.records[METADATA_RECORD][METADATA_KEY])
+        if load_yaml(read_text(file)) != {INFORMATION: inside}:
+            raise BagError(f"{file}: does not describe this bag; `grasp recover` makes a new one")
+
+
+class _Columns:
+    """Ticks and numbers by topic, as they come."""
+
+    def __init__(self) -> None:
+        self.ticks: dict[Topic, array[int]] = {}
+        self.values: dict[Topic, array[float]] = {}
+
+    def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
+        tick, rest = divmod(stored.time_ns, scene.period_ns)
+        ticks = self.ticks.setdefault(topic, array("q"))
+        if rest or tick > scene.ticks or (ticks and ticks[-1] >= tick):
+            raise BagError(f"{stored.topic}: {stored.time_ns} ns; allowed: ticks of the scene in their order")
+        row = _values(topic, decode(topic, stored.cdr))
+        if row.shape != (WIDTH.get(topic, 1),):
+            raise BagError(f"{stored.topic}: {row.size} numbers; allowed: {WIDTH.get(topic, 1)}")
+        ticks.append(tick)
+        self.values.setdefault(topic, array("d")).extend(row.tolist())
+
+    def of(self, topic: Topic) -> tuple[np.ndarray, Array]:
+        """Ticks (n,) and rows (n, k) of a topic."""
+        width = WIDTH.get(topic, 1)
+        found = np.array(self.ticks.get(topic, ()), dtype=np.int64)
+        return found, np.array(self.values.get(topic, ()), dtype=float).reshape(-1, width)
+
+
+class _Changes(dict[int, dict[str, float]]):
+    """Numbers that were set, by the tick from which they act."""
+
+    def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
+        message = decode(topic, stored.cdr)
+        stamp = message.header.stamp  # a monitor that came late has recorded it late
+        tick = (stamp.sec * NANOSECONDS + stamp.nanosec) // scene.period_ns
+        numbers = dict(zip(message.name, message.position.tolist(), strict=True))
+        if not 0 <= tick <= scene.ticks or not numbers.keys() <= set(scene.live):
+            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(scene.live)}")
+        self.setdefault(tick, {}).update(numbers)
 
 
 def _values(topic: Topic, message: Any) -> Array:
@@ -257,11 +238,31 @@ def _values(topic: Topic, message: Any) -> Array:
     return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
 
 
-def _changes(reader: Reader, scene: scenes.Scene) -> dict[int, dict[str, float]]:
-    changes: dict[int, dict[str, float]] = {}
-    for topic in CHANGES.values():
-        for _, message in _messages(reader, topic, scene):
-            stamp = message.header.stamp  # a monitor that came late has recorded it late
-            tick = (stamp.sec * NANOSECONDS + stamp.nanosec) // scene.period_ns
-            changes.setdefault(tick, {}).update(zip(message.name, message.position.tolist(), strict=True))
-    return changes
+def _recording(path: Path, scene: scenes.Scene, columns: _Columns, changes: _Changes, storage: Storage) -> Recording:
+    ticks, joints = columns.of(JOINT_STATES)
+
+    def aligned(topic: Topic) -> Array:
+        found, values = columns.of(topic)
+        result = np.full((len(ticks), values.shape[1]), np.nan)
+        _, here, there = np.intersect1d(ticks, found, return_indices=True)
+        result[here] = values[there]
+        return result
+
+    command = np.zeros((len(ticks), 2))
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        command[:, side] = aligned(topic)[:, 0]
+    own = storage.records[OWN_RECORD]
+    return Recording(
+        path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
+        {topic.name: len(columns.ticks.get(topic, ())) for topic in scene.topics}, ticks, joints[:, :6], joints[:, 6:],
+        command, {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
+        dict(changes), _lost(storage),
+    )
+
+
+def _lost(storage: Storage) -> dict[str, str]:
+    """What the bag says about its end; in place of a word that it does not have, what its reader has seen."""
+    if storage.closed:
+        return storage.records[LOST_RECORD]
+    left_out = sum(size for _, size, _ in storage.left_out)
+    return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}

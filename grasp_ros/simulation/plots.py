@@ -20,13 +20,14 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, Mode, impact_force
 from grasp_ros.scene import PAPER, Scene
-from grasp_ros.scene.files import writing
+from grasp_ros.scene.files import replacing
 from grasp_ros.simulation.quantities import contact_intervals
 from grasp_ros.simulation.trajectory import Trajectory
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
 V_COLOR = "#cc79a7"
 SIDES = ((LEFT, "l", LEFT_COLOR), (RIGHT, "r", RIGHT_COLOR))
+LONGEST_TITLE = 200  # characters
 PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
 PAPER_INPUT = (-10.0, 10.0)  # N
 WIDTH_MM = 230.0  # of a figure with one motion
@@ -129,7 +130,8 @@ def compose(
             figsize=(width / MM, height / MM), layout="constrained",
         )
         for column, (motion, caption) in enumerate(zip(motions, captions, strict=True)):
-            panels[0, column].set_title(_title(motion, caption, width / len(motions), small), fontsize="medium")
+            title = _title(motion, caption, width / len(motions), small)
+            panels[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
             for (draw_panel, label), axes in zip(PANELS, panels[:, column], strict=True):
                 draw_panel(axes, motion)
                 shade_contacts(axes, motion)
@@ -148,7 +150,8 @@ def compose(
 def _title(motion: Motion, caption: str, width_mm: float, small: bool) -> str:
     """Title and caption, filled so that neighbours do not collide."""
     letters = int(0.8 * width_mm / ((SMALL_LETTERS if small else LETTERS) * 0.2))  # a letter is about 0.2 mm/pt wide
-    return "\n".join(textwrap.fill(text, letters) for text in (motion.scene.title, caption))
+    title = textwrap.shorten(motion.scene.title, LONGEST_TITLE, placeholder=" ...")
+    return "\n".join(textwrap.fill(text, letters) for text in (title, caption))
 
 
 def legend_beside(axes: Axes) -> None:
@@ -236,8 +239,8 @@ def save(figure: Figure, path: Path, dpi: int = 150) -> None:
             raise Refused(f"{path}: no ending; allowed: one of {', '.join(sorted(known))}")
         if ending not in known:
             raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
-        with writing(path):
-            figure.savefig(path, dpi=dpi)
+        with replacing(path) as file:
+            figure.savefig(file, format=ending, dpi=dpi)
     except RuntimeError as error:  # a .pgf where there is no TeX
         raise Refused(f"{path}: {error}") from None
     finally:

@@ -108,15 +108,14 @@ class Monitor(GraspNode):
     def _complete(self, time_ns: int, tick: dict[Topic, bytes]) -> None:
         assert self._scene is not None
         assert self._recorder is not None
+        changes = []
         for entry in self._announcements:
             for cdr in entry.take(tick[entry.command]):
-                self._recorder.write(entry.topic, time_ns, cdr)
+                changes.append((entry.topic, cdr))
                 change = deserialize_message(cdr, JointState)
                 self._scene = self._scene.changed(dict(zip(change.name, change.position, strict=True)))
         values = self._evaluate(time_ns, deserialize_message(tick[JOINT_STATES], JointState))
-        for topic, cdr in tick.items():
-            self._recorder.write(topic, time_ns, cdr)
-        self._recorder.write_lyapunov(time_ns, values)
+        self._recorder.write_tick(time_ns, [*changes, *tick.items()], values)
         self._values.publish(messages.lyapunov(time_ns, values))
         self.count("ticks")
         self.finished = bool(self.exit_code) or time_ns == self._scene.ticks * self._scene.period_ns
@@ -146,7 +145,7 @@ class Monitor(GraspNode):
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
-            self._recorder.close()
+            self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._values)
 

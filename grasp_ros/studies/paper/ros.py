@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -29,7 +28,7 @@ def through_the_graph(cases: Cases) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = []
     for number, scene in tqdm(cases.items(), desc="the cases through the graph", file=sys.stderr):
         with tempfile.TemporaryDirectory() as directory:
-            graph = Graph(scene, Path(directory) / "run", ACCURACY, errors=subprocess.DEVNULL)
+            graph = Graph(scene, Path(directory) / "run", ACCURACY)
             try:
                 graph.start()
                 graph.wait([])
