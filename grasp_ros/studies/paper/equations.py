@@ -52,7 +52,7 @@ def force_equations(samples: list[Sample]) -> list[Equation]:
             inputs[side] = max(inputs[side], np.abs(run.command[:, side] - printed).max())
             sign = -1.0 if side == LEFT else 1.0  # how (1), (2) count the impact force
             pushed = arm.mass * sample.rate[:, x + 1] + arm.stiffness * y[:, x] + arm.damping * y[:, x + 1]
-            inferred = sign * (pushed - sample.system.commands(0, y.T)[side])
+            inferred = sign * (pushed - sample.system.feedback(y)[:, side])
             contact = grasp.left_contact if side == LEFT else grasp.right_contact
             stated = impact_force(contact, *sample.pair(side))
             impacts[side] = max(impacts[side], relative(inferred, stated))

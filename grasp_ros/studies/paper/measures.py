@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import DAMPING, DISSIPATION, Transition
 from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -125,7 +125,7 @@ def _of(scene: Scene, states: Array, integrator: Integrator, last: Array) -> Mea
     V_c = energy(scene.system, states[[0, -1]]).V_c
     farthest = settled_distance(scene, 1.0)
     turns = sum(np.count_nonzero(np.diff(np.sign(states[1:, column]))) for column in (1, 5))
-    inputs = scene.system.commands(0, states.T)[[LEFT, RIGHT]]
+    inputs = scene.system.feedback(states)
     table = integrator.event_table
     touches = np.count_nonzero((table[:, 2] == Transition.TOUCH) & (table[:, 0] <= STRETCH))
     one, two, five = last.max(axis=1).tolist()
