@@ -19,15 +19,16 @@ BELOW = {  # what the files of a room may import beside their own room
     "scene": ("physics",),
     "methods": ("physics", "exact", "scene"),
     "simulation": ("physics", "exact", "scene", "methods"),
+    "maps": ("physics", "exact", "scene", "simulation"),
     "graph": ("physics", "exact", "scene", "simulation"),
     "verification": ("physics", "exact", "scene", "simulation"),
-    "studies": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification"),
-    "cli": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification", "studies"),
+    "studies": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification"),
+    "cli": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification", "studies"),
 }
 ROOMS = tuple(BELOW)
 DRAWS = (
-    "simulation/plots.py", "studies/figures.py", "studies/page_figures.py", "studies/paper/figures.py",
-    "studies/paper/beyond_figures.py",
+    "simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py",
+    "studies/paper/figures.py", "studies/paper/beyond_figures.py",
 )
 
 
