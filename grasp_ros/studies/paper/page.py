@@ -79,7 +79,10 @@ def claim(path: Path) -> None:
     """
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
+        there = path.exists()
         path.open("a", encoding="utf-8").close()
+        if not there:
+            path.unlink()
 
 
 def write_html(report: Report, path: Path) -> None:
