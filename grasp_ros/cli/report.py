@@ -9,6 +9,7 @@ import numpy as np
 from grasp_ros.graph.bag import Recording
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
+from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -37,9 +38,11 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     """What happened in a simulation."""
     level = trajectory.energy
     method = METHODS[trajectory.method]
+    foreign = [(f"{side} controller", name) for side, name in trajectory.controllers.items()]
     rows = [
         ("scene", trajectory.scene.title),
-        ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
+        ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled, bool(foreign))),
+        *foreign,
         ("status", trajectory.stop or trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
         ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
@@ -47,9 +50,10 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
     ]
     if len(trajectory.t):
-        rows.append(("V_c at both ends", _ends(level.V_c)))
+        rows.append((f"energy of {PLANT_ALONE}" if foreign else "V_c at both ends", _ends(level.V_c)))
         rows += _amounts(trajectory)
-    rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
+    known = trajectory.scene.certificate_in_words(trajectory.sampled)
+    rows.append(("certificate", "none: V_c needs the energy of every controller" if foreign else known))
     if not method.energy_check and len(trajectory.t):
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
@@ -60,7 +64,8 @@ def _amounts(trajectory: Trajectory) -> list[Row]:
     """Settling times, largest forces, and the energy lost by cause, as far as the scene has them."""
     system = trajectory.scene.system
     rows = []
-    if rests_at_zero(system) and set(system.laws) == {LEFT, RIGHT} and settled_distance(trajectory.scene) > 0.0:
+    regulated = not trajectory.controllers and set(system.laws) == {LEFT, RIGHT} and rests_at_zero(system)
+    if regulated and settled_distance(trajectory.scene) > 0.0:
         times = settling_times(trajectory)
         shown = [(NAMES[body], times[COLUMN[body] // 2]) for body in system.present]
         text = ", ".join(f"{name} {'not yet' if np.isinf(time) else f'{time:.2f} s'}" for name, time in shown)

@@ -29,12 +29,12 @@ class Parts(NamedTuple):
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def parts(system: System, state: Array) -> Parts:
-    """V of states (..., 6) by parts, under continuous feedback; 0 for what is not there."""
+def parts(system: System, state: Array, feedback: bool = True) -> Parts:
+    """V of states (..., 6) by parts, 0 for what is not there; without `feedback` that of the plant alone."""
     state = np.asarray(state, dtype=float)
     zero: Array = np.zeros(np.shape(state)[:-1])
     bodies = {
-        body: mechanical_level(system, body, state) if body in system.present else zero
+        body: mechanical_level(system, body, state, feedback) if body in system.present else zero
         for body in (LEFT, OBJECT, RIGHT)
     }
     touching: dict[int, Array] = {LEFT: zero, RIGHT: zero}

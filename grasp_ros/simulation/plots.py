@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from grasp_ros.physics.energy import Energy, pairs_of
+from grasp_ros.physics.energy import PLANT_ALONE, Energy, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, Mode, impact_force
@@ -55,6 +55,10 @@ class Motion(Protocol):
     @property
     def command(self) -> Array:
         """Input forces (n, 2) in N."""
+
+    @property
+    def energy_of(self) -> str:
+        """Whose energy that is."""
 
     @property
     def energy(self) -> Energy:
@@ -172,7 +176,7 @@ def displacements(axes: Axes, motion: Motion) -> None:
 def inputs(axes: Axes, motion: Motion) -> None:
     """f_l, f_r, on the paper's axes for its cases."""
     for side, letter, color in SIDES:
-        if side in motion.scene.system.laws:
+        if side in motion.scene.system.laws or motion.command[:, side].any():
             axes.plot(motion.t, motion.command[:, side], label=f"$f_{letter}$", color=color, linewidth=1.0)
     if motion.scene.values.keys() == PAPER:
         _widen(axes, PAPER_INPUT, motion.command)
@@ -192,10 +196,10 @@ def impacts(axes: Axes, motion: Motion) -> None:
 
 
 def energies(axes: Axes, motion: Motion) -> None:
-    """V_c, and the paper's V where it is another one."""
-    level = motion.energy
-    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$")
-    if not np.array_equal(level.V, level.V_c, equal_nan=True):
+    """V_c, and the paper's V where it is another one; of the plant alone where nobody knows that of a controller."""
+    level, known = motion.energy, motion.energy_of != PLANT_ALONE
+    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$" if known else f"of {PLANT_ALONE}")
+    if known and not np.array_equal(level.V, level.V_c, equal_nan=True):
         axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="$V$ of the paper")
     if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
         axes.set_yscale("log")

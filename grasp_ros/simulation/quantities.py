@@ -158,8 +158,11 @@ def losses(run: Trajectory) -> Losses:
     if not run.sampled:
         return found
     system, taken = run.scene.system, 0.0
-    virtual = system.closed_loop - system.bodies  # spring and force of the feedback
-    for side in system.laws:
+    own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
+    virtual = own * (system.closed_loop - system.bodies)  # spring and force of the feedback
+    for side in (LEFT, RIGHT):
+        if side not in system.present:
+            continue
         x = run.state[:, COLUMN[side]]
         work = 2.0 * float((run.inputs[:-1, side] * np.diff(x)).sum())
         stored = virtual[side, STIFFNESS] * (x**2)[[0, -1]] - 2.0 * virtual[side, FORCE] * x[[0, -1]]

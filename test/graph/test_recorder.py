@@ -134,15 +134,12 @@ def test_every_flipped_bit_is_noticed(tmp_path: Path, closed: Path, run: Traject
         with pytest.raises(bag.BagError, match=r"bag\.mcap"):
             bag.read(closed)
     storage(closed).write_bytes(whole)
-    for place in rng.integers(8 * len(text), size=15).tolist():
+    for place in rng.integers(8 * len(text), size=60).tolist():
         content = bytearray(text)
         content[place // 8] ^= 1 << place % 8
         (closed / "metadata.yaml").write_bytes(content)
-        try:
+        with pytest.raises(bag.BagError, match=r"metadata\.yaml"):
             bag.read(closed)
-        except bag.BagError:
-            continue
-        assert yaml.safe_load(content.decode()) == yaml.safe_load(text)  # a blank that is another blank
 
 
 def test_what_is_whole_is_recovered_around_damage(tmp_path: Path, closed: Path, run: Trajectory) -> None:
@@ -195,6 +192,22 @@ def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajec
     assert recording.versions == {"python": "3"}
 
 
+def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:
+    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
+    for time_ns, messages, own in study.ticks_of(run):
+        recorder.write_tick(time_ns, messages[:1] + messages[2:], own)
+    recorder.close()
+    recording = bag.read(tmp_path / "bag")
+    assert np.isnan(recording.command[:, 0]).all()
+    assert recording.missing["left/effort_command"] == len(run.t)
+    result = command("inspect", "bag")
+    assert result.returncode == 0
+    assert f"lost                  left/effort_command {len(run.t)}" in result.stdout
+    with pytest.raises(bag.BagError, match="nothing can be recovered: it holds no complete tick"):
+        recover(tmp_path / "bag", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
 def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path, run: Trajectory) -> None:
     recorder = Recorder(tmp_path / "bag", run.scene, {})
     for _, tick in zip(range(3), study.ticks_of(run), strict=False):
@@ -242,11 +255,12 @@ def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Pat
     child.join(SECONDS)
     assert "files may not be larger; the bag is closed, and whole up to there" in sentence
     recording = bag.read(tmp_path / "bag")
-    assert np.array_equal(recording.tick, np.arange(number + 1))  # the tick that was refused is there, too
+    assert len(recording.tick) in (number, number + 1)  # the tick that ends the bag may be in it
+    assert np.array_equal(recording.tick, np.arange(len(recording.tick)))
     assert recording.lost["end"] == "files may not be larger"
     assert storage(tmp_path / "bag").stat().st_size <= LIMIT
     with Reader(tmp_path / "bag") as reader:
-        assert reader.message_count == 6 * (number + 1) + 1
+        assert reader.message_count == 6 * len(recording.tick) + 1
 
 
 FULL = """

@@ -26,8 +26,8 @@ BELOW = {  # what the files of a room may import beside their own room
     "cli": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification", "studies"),
 }
 ROOMS = tuple(BELOW)
-DRAWS = (
-    "simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py",
+DRAW = (
+    "simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py", "studies/map_figures.py",
     "studies/paper/figures.py", "studies/paper/beyond_figures.py",
 )
 
@@ -93,7 +93,7 @@ def test_each_library_has_its_place(name: str) -> None:
         assert "rosbags" not in found
     if name not in ("graph/recorder.py", "graph/storage.py"):
         assert "mcap" not in found
-    if name not in DRAWS:
+    if name not in DRAW:
         assert "matplotlib" not in found
     if name != "studies/paper/page.py":
         assert "jinja2" not in found
