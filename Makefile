@@ -27,6 +27,7 @@ install: $(VENV)/ready
 study: install
 	$(BIN)/pip install --quiet -c constraints.txt ".[study]"
 	$(BIN)/grasp study page
+	$(BIN)/grasp study paper --docs docs/paper.md
 	$(BIN)/grasp study speed case_01
 	$(BIN)/grasp study graph case_01
 

@@ -14,7 +14,7 @@ setup(
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
     # grasp_ros/config is a link to config: the scenes are part of the package however it is installed.
-    package_data={NAME: ["config/*.yaml", "py.typed"]},
+    package_data={NAME: ["config/*.yaml", "py.typed", "studies/paper/templates/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -32,12 +32,13 @@ setup(
         "matplotlib",
         "tqdm",
         "PyYAML",
+        "jinja2",
     ],
     extras_require={
         "test": [
             "pytest", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
             "types-tqdm", "colcon-common-extensions", "scipy", "xarray", "zarr>=3.1", "distributed",
-            "ruamel.yaml",
+            "ruamel.yaml", "playwright",
         ],
         "map": ["xarray", "zarr>=3.1", "scipy"],
         "cluster": ["xarray", "zarr>=3.1", "scipy", "distributed"],

@@ -68,12 +68,13 @@ def _report(graph: Graph, stopped: bool, seconds: float) -> int:
     """Print and draw what a run has recorded; the exit status says whether it is all there and right."""
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
+    from grasp_ros.graph.comparison import compare_recording
     from grasp_ros.simulation import plots
 
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording), True
     if not stopped:
-        comparison = report.compare_recording(recording, graph.accuracy)
+        comparison = compare_recording(recording, graph.accuracy)
         whole = comparison.equal and not recording.alarms and not any(recording.missing.values())
         figure = graph.directory / "figure.png"
         plots.draw(recording, figure, graph.scene.feedback_in_words(sampled=True))
@@ -96,13 +97,14 @@ def _recover(options: argparse.Namespace) -> int:
 def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
+    from grasp_ros.graph.comparison import compare_recording
 
     recording = bag.read(options.bag)
     warn(recording.scene)
     rows, equal = report.describe_recording(recording), True
     if options.replay:
         prepare()
-        comparison = report.compare_recording(recording, options.accuracy)
+        comparison = compare_recording(recording, options.accuracy)
         rows, equal = rows + comparison.rows, comparison.equal
     print(report.table(rows))
     return 0 if equal else 1

@@ -1,61 +1,115 @@
-"""`grasp plot`: a figure of a bag, of a file of `grasp simulate`, or of a scene."""
+"""`grasp plot`: a figure of bags, of files of `grasp simulate`, or of scenes, side by side."""
 
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from grasp_ros.cli.arguments import (
     add_command,
     add_force,
     add_output,
+    add_settings,
     check_memory,
     check_output,
     load_scene,
     prepare,
     warn,
 )
+from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
-from grasp_ros.simulation import Trajectory, load, simulate
+from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
+
+Span = tuple[float, float] | None
 
 
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
-    sub = add_command(commands, "plot", _plot, "draw a bag, a file of `grasp simulate`, or a scene")
-    sub.add_argument("source", metavar="BAG|FILE.npz|SCENE")
-    add_output(sub, "FILE", "image file (default: beside the source)")
+    sub = add_command(commands, "plot", _plot, "draw bags, files of `grasp simulate`, or scenes, side by side")
+    sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+")
+    add_settings(sub)
+    sub.add_argument("--sampled", action="store_true", help="scenes: hold each command over a control period")
+    sub.add_argument("--method", choices=METHODS, default=EXACT, help="scenes: way to integrate; see `grasp methods`")
+    sub.add_argument("--step", type=float, metavar="S", help="scenes: step or tolerance of the method")
+    sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
+    sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
+    sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
+    add_output(sub, "FILE", "image file, .png, .svg or .pdf (default: .png beside the source)")
     add_force(sub)
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from grasp_ros.graph import bag
-    from grasp_ros.simulation import plots
-
-    source = Path(options.source)
-    motion: plots.Motion
-    with reading(source):
-        there, directory = source.exists(), source.is_dir()
-    beside = Path(f"{source.resolve()}.png") if directory else source.with_suffix(".png")
-    output = options.output or (beside if there else Path(f"{source.stem}.png"))
-    check_output(output, options.force, [options.source])
-    if directory:
-        motion, sampled = bag.read(source), True
-        warn(motion.scene)
-    elif source.suffix == ".npz":
-        motion = load(source)
-        sampled = motion.sampled
-        warn(motion.scene)
-    else:
-        motion = _simulated(options.source)
-        sampled = motion.sampled
-    plots.draw(motion, output, motion.scene.feedback_in_words(sampled))
+    span = _span(options)
+    output = options.output or _beside(options.sources[0])
+    check_output(output, options.force, options.sources)
+    motions, captions = [], []
+    for source in options.sources:
+        motion, sampled = _motion(source, options, span)
+        motions.append(motion)
+        captions.append(motion.scene.feedback_in_words(sampled))
+    if span is not None:
+        longest = max(motion.scene.duration for motion in motions)
+        if not 0.0 <= span[0] < longest:
+            raise Refused(f"--from {span[0]!r} is not allowed; allowed: 0 to below {longest:g} s")
+        if math.isfinite(span[1]) and span[1] > longest:
+            raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
+        span = span[0], min(span[1], longest)
+    plots.draw_several(motions, captions, output, width_mm=options.width, span=span)
     print(f"written to {output}")
     return 0
 
 
-def _simulated(reference: str) -> Trajectory:
-    scene = load_scene(reference)
-    check_memory(scene, sampled=False)
+def _span(options: argparse.Namespace) -> Span:
+    """The times that are shown; None: all."""
+    if options.first is None and options.last is None:
+        return None
+    first, last = 0.0 if options.first is None else options.first, math.inf if options.last is None else options.last
+    if not first < last:
+        raise Refused(f"--from {first!r}, --to {last!r} is not allowed; allowed: --from below --to")
+    return first, last
+
+
+def _motion(source: str, options: argparse.Namespace, span: Span) -> tuple[plots.Motion, bool]:
+    """A motion, and whether its commands were held."""
+    from grasp_ros.graph import bag
+
+    path = Path(source)
+    with reading(path):
+        directory = path.is_dir()
+    recorded = directory or path.suffix == ".npz"
+    if recorded and (options.settings or options.sampled or options.method != EXACT or options.step is not None):
+        raise Refused(f"{source}: --set, --sampled, --method, --step are not allowed; allowed for scenes")
+    if directory:
+        recording = bag.read(path)
+        warn(recording.scene)
+        return recording, True
+    motion = load(path) if recorded else _simulated(source, options, span)
+    if recorded:
+        warn(motion.scene)
+    return motion, motion.sampled
+
+
+def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Trajectory:
+    """A scene, with output times where it is looked at."""
+    scene = load_scene(reference, options.settings)
+    check_memory(scene, options.sampled)
     prepare()
-    return simulate(scene)
+    grid = None
+    if span is not None and not (options.sampled or scene.sampled):
+        first, last = min(max(span[0], 0.0), scene.duration), min(span[1], scene.duration)
+        grid = np.linspace(first, last, GRID_POINTS)
+    return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step)
+
+
+def _beside(source: str) -> Path:
+    """Where the figure goes if nothing else is said."""
+    path = Path(source)
+    with reading(path):
+        if not path.exists():
+            return Path(f"{path.stem}.png")
+        return Path(f"{path.resolve()}.png") if path.is_dir() else path.with_suffix(".png")

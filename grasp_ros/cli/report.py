@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,17 @@ from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.simulation import Trajectory
+from grasp_ros.simulation.quantities import (
+    SETTLED,
+    impact_forces_of,
+    losses,
+    rests_at_zero,
+    settled_distance,
+    settling_times,
+)
 
 Row = tuple[str, str]
 
@@ -43,12 +51,39 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     ]
     if len(trajectory.t):
         rows.append((f"energy of {PLANT_ALONE}" if foreign else "V_c at both ends", _ends(level.V_c)))
+        rows += _amounts(trajectory)
     known = trajectory.scene.certificate_in_words(trajectory.sampled)
     rows.append(("certificate", "none: V_c needs the energy of every controller" if foreign else known))
     if not method.energy_check and len(trajectory.t):
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
     return _with_words(trajectory.scene, rows)
+
+
+def _amounts(trajectory: Trajectory) -> list[Row]:
+    """Settling times, largest forces, and the energy lost by cause, as far as the scene has them."""
+    system = trajectory.scene.system
+    rows = []
+    regulated = not trajectory.controllers and set(system.laws) == {LEFT, RIGHT} and rests_at_zero(system)
+    if regulated and settled_distance(trajectory.scene) > 0.0:
+        times = settling_times(trajectory)
+        shown = [(NAMES[body], times[COLUMN[body] // 2]) for body in system.present]
+        text = ", ".join(f"{name} {'not yet' if np.isinf(time) else f'{time:.2f} s'}" for name, time in shown)
+        rows.append((f"settled to {SETTLED:.0%}", text))
+    largest = [f"{name} {value:.4g} N" for name, value in _largest(trajectory) if value > 0.0]
+    if largest:
+        rows.append(("largest forces", ", ".join(largest)))
+    if len(trajectory.t) > 1 and not system.external:
+        lost = losses(trajectory)
+        parts = [f"{name} {float(value):.4g}" for name, value in lost._asdict().items() if float(value) != 0.0]
+        rows.append(("energy lost, J of V", ", ".join(parts) or "none"))
+    return rows
+
+
+def _largest(trajectory: Trajectory) -> list[tuple[str, float]]:
+    """Largest inputs and impact forces at the output times."""
+    inputs, impacts = np.abs(trajectory.command).max(axis=0), impact_forces_of(trajectory).max(axis=0)
+    return [("f_l", inputs[0]), ("f_r", inputs[1]), ("fw_l", impacts[0]), ("fw_r", impacts[1])]
 
 
 def _touches(trajectory: Trajectory) -> str:
@@ -91,49 +126,6 @@ def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
     """What to watch for, and what the scene can hardly mean."""
     watch = [("watch for", scene.watch)] if scene.watch else []
     return [*rows, *watch, *(("warning", warning) for warning in scene.warnings)]
-
-
-class Comparison(NamedTuple):
-    """A recorded motion beside the same scene without ROS."""
-
-    equal: bool  # to the sampled simulation, bit for bit
-    offset: Array | None  # (6,), largest distance from continuous feedback, m and m/s; None if it has none of its own
-
-    @property
-    def rows(self) -> list[Row]:
-        """For `table`."""
-        rows = [("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL")]
-        if self.offset is not None:
-            far = ", ".join(
-                f"{name} {distance:.3g}"
-                for name, distance in zip(("x_l", "x_o", "x_r"), self.offset[0::2], strict=True)
-                if not np.isnan(distance)
-            )
-            rows.append(("from continuous feedback", f"at most {far} m"))
-        return rows
-
-
-def compare_recording(recording: Recording, accuracy: float) -> Comparison:
-    """Simulate a recorded scene without ROS, with commands that are held and with the paper's continuous feedback."""
-    times, scene = recording.t, recording.scene
-    same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
-    equal = _equal(same, recording)
-    if scene.sampled or recording.changes:
-        return Comparison(equal, None)
-    ideal = simulate(scene, grid=times, accuracy=accuracy)
-    return Comparison(equal, np.abs(ideal.state - recording.state).max(axis=0))
-
-
-def _equal(same: Trajectory, recording: Recording) -> bool:
-    """Whether states, commands and the inputs that the bag knows have the same bits."""
-    if len(same.t) != len(recording.t):
-        return False
-    known = ~np.isnan(recording.inputs).any(axis=1)  # not at the last tick
-    pairs = (
-        (same.state, recording.state), (same.command, recording.command),
-        (same.inputs[known], recording.inputs[known]),
-    )
-    return all(simulated.tobytes() == recorded.tobytes() for simulated, recorded in pairs)
 
 
 def _ends(values: Array) -> str:

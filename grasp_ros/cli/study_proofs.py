@@ -1,9 +1,10 @@
-"""The studies of what is promised: `certificate`, `hard`, `fuzz` and `doors`."""
+"""The studies of what is promised: `certificate`, `paper`, `hard`, `fuzz` and `doors`."""
 
 from __future__ import annotations
 
 import argparse
 import math
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,8 @@ from grasp_ros.cli.arguments import add_command, add_output, prepare, whole
 from grasp_ros.physics.errors import Refused
 
 Parser = argparse.ArgumentParser
+QUICK_STARTS = 4
+PAPER_PAGE = Path("runs") / "paper.html"
 
 
 def add_certificate(commands: Any) -> Parser:
@@ -26,6 +29,41 @@ def _certificate(options: argparse.Namespace) -> int:
 
     prepare()
     certificate.run(options.output)
+    return 0
+
+
+def add_paper(commands: Any) -> Parser:
+    """`grasp study paper`."""
+    text = "the paper reproduced and judged: equations, figures, quantities, verdicts, and what it lacks, on one page"
+    sub = add_command(commands, "paper", _paper, text)
+    sub.add_argument("--ros", action="store_true", help="run the eleven cases through the graph as well, some minutes")
+    sub.add_argument("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out")
+    sub.add_argument("--docs", type=Path, metavar="FILE.md", help="write it as Markdown too, with figures beside it")
+    add_output(sub, "FILE.html", f"the page, in one file (default {PAPER_PAGE})", PAPER_PAGE)
+    return sub
+
+
+def _paper(options: argparse.Namespace) -> int:
+    from grasp_ros.graph.processes import GraphError
+    from grasp_ros.studies.paper import page, study
+    from grasp_ros.studies.paper.definitions import RANDOM_STARTS
+
+    for path in filter(None, (options.output, options.docs)):
+        page.claim(path)
+    prepare()
+    try:
+        found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
+    except GraphError as error:
+        print(f"grasp: {error}", file=sys.stderr)
+        return 1
+    page.write_html(found, options.output)
+    print(found.summary)
+    for claim in found.claims:
+        print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
+    print(f"written to {options.output}")
+    if options.docs is not None:
+        page.write_markdown(found, options.docs)
+        print(f"written to {options.docs}")
     return 0
 
 

@@ -59,11 +59,11 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     V_c = V
     V_rate = _power(system, bodies, state, external)
     mode = np.zeros(np.shape(V), dtype=np.int64)
-    for side, u, d in _pairs(system, state):
+    for side, u, d in pairs_of(system, state):
         contact = Contact(*system.pairs[side])
         force = hertzian_force(contact, u)
         touching = in_contact(contact, u, d)
-        stored = _elastic(system, side, u)
+        stored = elastic_level(system, side, u)
         V_c = V_c + stored
         V = V + np.where(touching, stored, 0.0)
         V_rate = V_rate + np.where(touching, -2.0 * contact.dissipation * force * d * d, 2.0 * force * d)
@@ -102,9 +102,9 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):
         level, size = _own_energy(system, state)
-        for side, u, _ in _pairs(system, state):
+        for side, u, _ in pairs_of(system, state):
             force = hertzian_force(Contact(*system.pairs[side]), u)
-            level = level + _elastic(system, side, u)
+            level = level + elastic_level(system, side, u)
             rounding = rounding + 8.0 * EPS * force * _place(system, side, state)
         levels.append(level)
         rounding = rounding + ROUNDING * size
@@ -115,18 +115,31 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     return EnergyBalance(levels[1] - levels[0], work, rounding)
 
 
+def mechanical_level(system: System, body: int, state: Array, feedback: bool = True) -> Array:
+    """Twice the kinetic energy and the potential of the linear terms of one body, in J; V_l, V_o or V_r of (29)."""
+    kinetic, potential = _levels(system.closed_loop if feedback else system.bodies, body, state)
+    return np.asarray(kinetic + potential)
+
+
+def _levels(bodies: Array, body: int, state: Array) -> tuple[Array, Array]:
+    """Twice the kinetic energy and the potential of one body."""
+    x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
+    stiffness, force = bodies[body, STIFFNESS], bodies[body, FORCE]
+    potential: Array = np.zeros(np.shape(state)[:-1])
+    if stiffness > 0.0:
+        potential = stiffness * (x - force / stiffness) * (x - force / stiffness)
+    elif force != 0.0:
+        potential = -2.0 * force * x
+    return bodies[body, MASS] * v * v, potential
+
+
 def _mechanical(system: System, bodies: Array, state: Array) -> Array:
     """Kinetic energy and potential of the linear terms, twice."""
     kinetic: Array = np.zeros(np.shape(state)[:-1])
     potential: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
-        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
-        stiffness, force = bodies[body, STIFFNESS], bodies[body, FORCE]
-        kinetic = kinetic + bodies[body, MASS] * v * v
-        if stiffness > 0.0:
-            potential = potential + stiffness * (x - force / stiffness) * (x - force / stiffness)
-        elif force != 0.0:
-            potential = potential - 2.0 * force * x
+        moving, held = _levels(bodies, body, state)
+        kinetic, potential = kinetic + moving, potential + held
     return kinetic + potential
 
 
@@ -142,7 +155,7 @@ def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
     return total, size
 
 
-def _elastic(system: System, side: int, u: Array) -> Array:
+def elastic_level(system: System, side: int, u: Array) -> Array:
     """Twice the elastic energy of a pair, (19): a = b = 4/5; 0 without penetration."""
     return np.asarray(2.0 * stored_energy(system.pairs[side, HERTZIAN], np.maximum(u, 0.0)))
 
@@ -166,7 +179,8 @@ def _power(system: System, bodies: Array, state: Array, external: Array | None) 
     return -2.0 * loss
 
 
-def _pairs(system: System, state: Array) -> list[tuple[int, Array, Array]]:
+def pairs_of(system: System, state: Array) -> list[tuple[int, Array, Array]]:
+    """Side, u in m and u' in m/s of every pair that can push, from states (..., 6)."""
     u_l, d_l, u_r, d_r = penetration(state)
     found: dict[int, tuple[Array, Array]] = {LEFT: (u_l, d_l), RIGHT: (u_r, d_r)}
     return [(side, *found[side]) for side in system.contacts]

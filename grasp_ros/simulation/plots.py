@@ -1,9 +1,10 @@
-"""Figures in the layout of the paper: displacements, inputs, and below them V with the contacts."""
+"""Figures in the layout of the paper: displacements and inputs, below them impact forces and V, contacts shaded."""
 
 from __future__ import annotations
 
+import textwrap
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from textwrap import shorten
 from typing import Protocol
 
 import matplotlib
@@ -14,17 +15,26 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from grasp_ros.physics.energy import PLANT_ALONE, Energy
+from grasp_ros.physics.energy import PLANT_ALONE, Energy, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.model import Array, Contact, Mode, impact_force
 from grasp_ros.scene import PAPER, Scene
 from grasp_ros.scene.files import replacing
+from grasp_ros.simulation.quantities import contact_intervals
+from grasp_ros.simulation.trajectory import Trajectory
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
+V_COLOR = "#cc79a7"
+SIDES = ((LEFT, "l", LEFT_COLOR), (RIGHT, "r", RIGHT_COLOR))
 LONGEST_TITLE = 200  # characters
 PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
 PAPER_INPUT = (-10.0, 10.0)  # N
+WIDTH_MM = 230.0  # of a figure with one motion
+NARROWEST_MM, WIDEST_MM = 60.0, 1000.0
+MM = 25.4
+ONE_COLUMN_MM = 130.0  # narrower motions get smaller letters
+LETTERS, SMALL_LETTERS = 9.0, 6.5  # pt
 
 
 class Motion(Protocol):
@@ -71,32 +81,152 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
     Refused
         If the motion is empty, matplotlib does not know the format, or the file cannot be written.
     """
-    if not len(motion.t):
+    draw_several([motion], [caption], path)
+
+
+def draw_several(
+    motions: Sequence[Motion], captions: Sequence[str], path: Path, *, width_mm: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> None:
+    """Draw motions side by side into an image file, with common axes; see `compose`.
+
+    Raises
+    ------
+    Refused
+        If a motion is empty, the width is not allowed, matplotlib does not know the format, or the file cannot be
+        written.
+    """
+    save(compose(motions, captions, width_mm=width_mm, span=span), path)
+
+
+def compose(
+    motions: Sequence[Motion], captions: Sequence[str], *, width_mm: float | None = None,
+    span: tuple[float, float] | None = None,
+) -> Figure:
+    """A figure of motions side by side, with common axes.
+
+    Parameters
+    ----------
+    motions : sequence of Motion
+    captions : sequence of str
+        Second lines of their titles.
+    width_mm : float, optional
+        Of the page; default: 230 mm, and 150 mm for each of several motions.
+    span : tuple of float, optional
+        First and last time in s; default: the whole motions.
+
+    Raises
+    ------
+    Refused
+        If a motion is empty, or the width is not allowed.
+    """
+    if any(not len(motion.t) for motion in motions):
         raise Refused("nothing to draw: the motion has no output times")
-    figure, (top, middle, bottom) = plt.subplots(
-        3, 1, sharex=True, figsize=(9.0, 9.0), height_ratios=(3, 2, 3), layout="constrained"
-    )
-    title = shorten(motion.scene.title, LONGEST_TITLE, placeholder=" ...")
-    figure.suptitle(f"{title}\n{caption}", fontsize="medium", parse_math=False)  # a $ of a title is a $
+    width = width_mm or (WIDTH_MM if len(motions) == 1 else 150.0 * len(motions))
+    if width_mm is not None and not NARROWEST_MM <= width_mm <= WIDEST_MM:
+        raise Refused(f"--width {width_mm!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
+    small = width / len(motions) < ONE_COLUMN_MM
+    height = 0.6 * WIDTH_MM if small else 0.9 * WIDTH_MM
+    with plt.rc_context({"font.size": SMALL_LETTERS if small else LETTERS}):
+        figure: Figure
+        figure, panels = plt.subplots(
+            len(PANELS), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=(3, 2, 2, 3),
+            figsize=(width / MM, height / MM), layout="constrained",
+        )
+        for column, (motion, caption) in enumerate(zip(motions, captions, strict=True)):
+            title = _title(motion, caption, width / len(motions), small)
+            panels[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
+            for (draw_panel, label), axes in zip(PANELS, panels[:, column], strict=True):
+                draw_panel(axes, motion)
+                shade_contacts(axes, motion)
+                axes.grid(alpha=0.3)
+                axes.set_xlim(*(span or (motion.t[0], motion.t[-1])))
+                if column == 0:
+                    axes.set_ylabel(label)
+            panels[-1, column].set_xlabel("time, s")
+        for row in panels:
+            legend_beside(row[-1])
+        figure.align_ylabels(panels[:, 0])
+        figure.canvas.draw()  # the layout, with the letters of this context
+        return figure
+
+
+def _title(motion: Motion, caption: str, width_mm: float, small: bool) -> str:
+    """Title and caption, filled so that neighbours do not collide."""
+    letters = int(0.8 * width_mm / ((SMALL_LETTERS if small else LETTERS) * 0.2))  # a letter is about 0.2 mm/pt wide
+    title = textwrap.shorten(motion.scene.title, LONGEST_TITLE, placeholder=" ...")
+    return "\n".join(textwrap.fill(text, letters) for text in (title, caption))
+
+
+def legend_beside(axes: Axes) -> None:
+    """A legend to the right of the axes, where it hides nothing."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, fontsize="small", frameon=False)
+
+
+def displacements(axes: Axes, motion: Motion) -> None:
+    """x_l, x_o, x_r, on the paper's axes for its cases."""
     for column, label, color in ((0, "$x_l$", LEFT_COLOR), (2, "$x_o$", OBJECT_COLOR), (4, "$x_r$", RIGHT_COLOR)):
         if not np.isnan(motion.state[:, column]).all():
-            top.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
-    for side, label, color in ((LEFT, "$f_l$", LEFT_COLOR), (RIGHT, "$f_r$", RIGHT_COLOR)):
-        if side in motion.scene.system.laws or motion.command[:, side].any():
-            middle.plot(motion.t, motion.command[:, side], label=label, color=color, linewidth=1.0)
-    top.set_ylabel("displacement, m")
-    middle.set_ylabel("input, N")
+            axes.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
     if motion.scene.values.keys() == PAPER:
-        _limits(top, PAPER_DISPLACEMENT, motion.state[:, 0::2])
-        _limits(middle, PAPER_INPUT, motion.command)
-    _draw_energy(bottom, motion)
-    bottom.set_xlabel("time, s")
-    bottom.set_xlim(motion.t[0], motion.t[-1])
-    for axes in (top, middle, bottom):
-        axes.grid(alpha=0.3)
-        if axes.get_legend_handles_labels()[0]:
-            axes.legend(loc="upper right", ncols=3, fontsize="small")
-    save(figure, path)
+        _widen(axes, PAPER_DISPLACEMENT, motion.state[:, 0::2])
+
+
+def inputs(axes: Axes, motion: Motion) -> None:
+    """f_l, f_r, on the paper's axes for its cases."""
+    for side, letter, color in SIDES:
+        if side in motion.scene.system.laws or motion.command[:, side].any():
+            axes.plot(motion.t, motion.command[:, side], label=f"$f_{letter}$", color=color, linewidth=1.0)
+    if motion.scene.values.keys() == PAPER:
+        _widen(axes, PAPER_INPUT, motion.command)
+        for edge in PAPER_INPUT:  # where the paper's axis ends, if the input goes on
+            if not axes.get_ylim()[0] <= 2.0 * edge <= axes.get_ylim()[1]:
+                continue
+            axes.axhline(edge, color="black", linewidth=0.6, linestyle=":")
+
+
+def impacts(axes: Axes, motion: Motion) -> None:
+    """fw_l upwards and fw_r downwards: the force on the object."""
+    for side, u, d in pairs_of(motion.scene.system, motion.state):
+        force = impact_force(Contact(*motion.scene.system.pairs[side]), u, d)
+        _, letter, color = SIDES[0] if side == LEFT else SIDES[1]
+        sign, text = (1.0, "") if side == LEFT else (-1.0, "-")
+        axes.plot(motion.t, sign * force, label=f"${text}fw_{letter}$", color=color, linewidth=0.9)
+
+
+def energies(axes: Axes, motion: Motion) -> None:
+    """V_c, and the paper's V where it is another one; of the plant alone where nobody knows that of a controller."""
+    level, known = motion.energy, motion.energy_of != PLANT_ALONE
+    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$" if known else f"of {PLANT_ALONE}")
+    if known and not np.array_equal(level.V, level.V_c, equal_nan=True):
+        axes.plot(motion.t, level.V, color=V_COLOR, linewidth=1.0, linestyle="--", label="$V$ of the paper")
+    if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
+        axes.set_yscale("log")
+    elif level.V_c.min() >= 0.0 and axes.get_yscale() == "linear":
+        axes.set_ylim(0.0, max(axes.get_ylim()[1], 1.1 * level.V_c.max() or 1.0))
+
+
+def contact_spans(motion: Motion, side: int) -> list[tuple[float, float]]:
+    """Begin and length of the contacts of one side in s: from the events, or as the output times show them."""
+    if isinstance(motion, Trajectory) and len(motion.event_table):
+        return [(a, b - a) for a, b in contact_intervals(motion, side).tolist()]
+    flag = Mode.LEFT if side == LEFT else Mode.RIGHT
+    touching = np.concatenate([[0], (np.nan_to_num(motion.energy.mode).astype(int) & int(flag)) != 0, [0]])
+    edges = np.flatnonzero(np.diff(touching.astype(int)))
+    last = len(motion.t) - 1
+    return [
+        (float(motion.t[a]), float(motion.t[min(b, last)] - motion.t[a])) for a, b in edges.reshape(-1, 2).tolist()
+    ]
+
+
+def shade_contacts(axes: Axes, motion: Motion) -> None:
+    """Shade the contacts of both sides over the whole height."""
+    for side, _, color in SIDES:
+        spans = contact_spans(motion, side)
+        axes.broken_barh(
+            spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), color=color, alpha=0.13, linewidth=0, zorder=0
+        )
 
 
 def save(figure: Figure, path: Path, dpi: int = 150) -> None:
@@ -121,28 +251,15 @@ def save(figure: Figure, path: Path, dpi: int = 150) -> None:
         plt.close(figure)
 
 
-def _limits(axes: Axes, paper: tuple[float, float], values: Array) -> None:
-    """The paper's axes, widened where the motion leaves them."""
-    axes.set_ylim(min(paper[0], 1.05 * values.min()), max(paper[1], 1.05 * values.max()))
+def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:
+    """The paper's axes, widened where a motion leaves them; of several motions in a row, the widest."""
+    low, high = axes.get_ylim()
+    drawn = len(axes.lines) > 0 and axes.get_shared_y_axes().get_siblings(axes) != [axes]
+    before = (low, high) if drawn and low <= paper[0] and high >= paper[1] else paper
+    axes.set_ylim(min(before[0], 1.05 * values.min()), max(before[1], 1.05 * values.max()))
 
 
-def _draw_energy(axes: Axes, motion: Motion) -> None:
-    level = motion.energy
-    known = motion.energy_of != PLANT_ALONE
-    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$" if known else f"of {PLANT_ALONE}")
-    if known:
-        axes.plot(motion.t, level.V, color="#cc79a7", linewidth=1.0, linestyle="--", label="$V$ of the paper")
-    if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
-        axes.set_yscale("log")
-    elif level.V_c.min() >= 0.0:
-        axes.set_ylim(0.0, 1.3 * level.V_c.max() or 1.0)
-    axes.set_ylabel("twice the energy, J")
-    for flag, low, label, color in (
-        (Mode.LEFT, 0.0, "left contact", LEFT_COLOR),
-        (Mode.RIGHT, 0.04, "right contact", RIGHT_COLOR),
-    ):
-        touching = (level.mode & int(flag)) != 0
-        axes.fill_between(
-            motion.t, low, low + 0.04, where=touching, step="post", color=color, alpha=0.8, linewidth=0,
-            transform=axes.get_xaxis_transform(), label=label,
-        )
+PANELS: tuple[tuple[Callable[[Axes, Motion], None], str], ...] = (
+    (displacements, "displacement, m"), (inputs, "input, N"), (impacts, "impact force, N"),
+    (energies, "twice the energy, J"),
+)

@@ -17,6 +17,7 @@ from grasp_ros.methods.registry import EXACT, METHODS, find
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
@@ -139,6 +140,16 @@ class Trajectory:
         return PLANT_ALONE if self.controllers else PLANT_AND_FEEDBACK
 
     @property
+    def parts(self) -> Parts:
+        """V by parts at the output times: V_l, V_o, V_r of (29), and the contacts."""
+        return parts(self.scene.system, self.state, feedback=not self.controllers)
+
+    @property
+    def epsilon(self) -> Array:
+        """Epsilon of (35), (36): the largest deformation of each pair up to an output time, (n, 2) in m."""
+        return largest_deformation(self.scene.system, self.state)
+
+    @property
     def events(self) -> list[Event]:
         """The events as records."""
         return to_events(self.event_table)
@@ -156,11 +167,12 @@ class Trajectory:
         Refused
             If the file cannot be written.
         """
-        level = self.energy
+        level, parts = self.energy, self.parts
         with replacing(path) as file:
             np.savez_compressed(
                 file, t=self.t, state=self.state, command=self.command, inputs=self.inputs,
-                V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode,
+                V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **parts._asdict(),
+                epsilon=self.epsilon,
                 touch_left=self.times(Transition.TOUCH, LEFT), touch_right=self.times(Transition.TOUCH, RIGHT),
                 release_left=self.times(Transition.RELEASE, LEFT), release_right=self.times(Transition.RELEASE, RIGHT),
                 events=self.event_table, work=self.work,
@@ -177,7 +189,8 @@ _TIMES = {
 }
 _WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene", "energy_of")}
 FIELDS = {
-    **_ROW, "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
+    **_ROW, **dict.fromkeys(Parts._fields, Field("<f8", ("n",))), "epsilon": Field("<f8", ("n", 2)),
+    "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
     "mode": Field("<i8", ("n",)), **_TIMES, "events": Field("<f8", ("events", 5)), "work": Field("<i8", ("work",)),
     "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
     "controllers": Field(TEXT, (2,)),

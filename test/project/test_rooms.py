@@ -28,6 +28,7 @@ BELOW = {  # what the files of a room may import beside their own room
 ROOMS = tuple(BELOW)
 DRAW = (
     "simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py", "studies/map_figures.py",
+    "studies/paper/figures.py", "studies/paper/beyond_figures.py",
 )
 
 
@@ -94,6 +95,8 @@ def test_each_library_has_its_place(name: str) -> None:
         assert "mcap" not in found
     if name not in DRAW:
         assert "matplotlib" not in found
+    if name != "studies/paper/page.py":
+        assert "jinja2" not in found
     if not name.startswith("exact/"):
         assert "numba" not in found
     if not name.startswith("verification/"):

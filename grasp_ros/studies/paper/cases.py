@@ -1,0 +1,120 @@
+"""The paper's eleven cases as scenes, the starts and the readings that the judgement varies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.scene import Scene
+
+Cases = Mapping[int, Scene]  # by the paper's number
+
+
+
+class Start(NamedTuple):
+    """Where a motion begins, at rest, in m."""
+
+    x_l: float
+    x_r: float
+    x_o: float = 0.0
+
+
+STANDARD = 1
+NUMBERS = tuple(range(1, 12))
+PRINTED = Start(-0.3, 0.5)
+SYMMETRIC = Start(-0.5, 0.5)
+LITERAL = Start(0.3, 0.5)  # Table 1 without the minus
+READ_STARTS: Mapping[str, Start] = {
+    "x_l(0) = -0.3, x_r(0) = 0.5 m": PRINTED,
+    "x_l(0) = -0.5, x_r(0) = 0.5 m": SYMMETRIC,
+    "x_l(0) = -0.3, x_r(0) = 0.3 m": Start(-0.3, 0.3),
+    "x_l(0) = -0.5, x_r(0) = 0.3 m": Start(-0.5, 0.3),
+    "x_l(0) = -0.3, x_o(0) = 0.1, x_r(0) = 0.5 m": Start(-0.3, 0.5, 0.1),
+    "x_l(0) = +0.3 as printed, inside the object": LITERAL,
+}
+SEED = 1990
+NEAREST, FARTHEST = 0.1, 0.5  # m, of random starts
+SIDES = ("left", "right")
+KEYS: Mapping[str, tuple[str, ...]] = {  # letters of the paper to keys of a scene, both sides where there are two
+    "m": ("left_arm.mass_kg", "right_arm.mass_kg"),
+    "m_l": ("left_arm.mass_kg",),
+    "m_o": ("object.mass_kg",),
+    "k": ("left_arm.stiffness_N_per_m", "right_arm.stiffness_N_per_m"),
+    "c": ("left_arm.damping_Ns_per_m", "right_arm.damping_Ns_per_m"),
+    "Kp": ("left_feedback.position_gain_N_per_m", "right_feedback.position_gain_N_per_m"),
+    "Kv": ("left_feedback.velocity_gain_Ns_per_m", "right_feedback.velocity_gain_Ns_per_m"),
+    "p": ("left_contact.dissipation_s_per_m", "right_contact.dissipation_s_per_m"),
+    "H": ("left_contact.hertz_N_per_m1_5", "right_contact.hertz_N_per_m1_5"),
+}
+
+
+class Figure(NamedTuple):
+    """One of the paper's figures."""
+
+    number: int
+    case: int
+    change: str  # in the paper's letters; empty: none
+
+    @property
+    def title(self) -> str:
+        """What it shows."""
+        return f"Fig. {self.number}: No. {self.case}, {self.change or 'standard parameters'}"
+
+
+FIGURES = tuple(
+    Figure(number, number - 1, change)
+    for number, change in enumerate(
+        (
+            "",
+            "c = Kv = p = 0",
+            "c = Kv = 0",
+            "p = 1 s/m",
+            "m_l = m_r = 10 kg",
+            "m_l = 10 kg",
+            "k_l = k_r = 100 N/m",
+            "c_l = c_r = 2 N s/m",
+            "Kp_l = Kp_r = 50 N/m",
+            "Kv_l = Kv_r = 5 N s/m",
+            "m_o = 50 kg",
+        ),
+        start=2,
+    )
+)
+
+
+def load_cases() -> dict[int, Scene]:
+    """The eleven scenes of the package."""
+    return {number: scenes.load(f"case_{number:02d}") for number in NUMBERS}
+
+
+def started(scene: Scene, start: Start) -> Scene:
+    """A scene that begins at rest somewhere else."""
+    x_l, x_r, x_o = start
+    return scene.changed({"left_arm.position_m": x_l, "object.position_m": x_o, "right_arm.position_m": x_r})
+
+
+def with_values(scene: Scene, values: Mapping[str, float]) -> Scene:
+    """A scene with other numbers, by the paper's letters."""
+    return scene.changed({key: value for letter, value in values.items() for key in KEYS[letter]})
+
+
+def value_of(scene: Scene, letter: str) -> float:
+    """A number of a scene by the paper's letter; the left one where there are two."""
+    section, key = KEYS[letter][0].split(".")
+    return float(scene.values[section][key])
+
+
+def random_starts(number: int, seed: int = SEED) -> list[Start]:
+    """Starts at rest, x_l in [-0.5, -0.1], x_o = 0, x_r in [0.1, 0.5] m."""
+    rng = np.random.default_rng(seed)
+    draws = rng.uniform(NEAREST, FARTHEST, (number, 2)).tolist()
+    return [Start(-x_l, x_r) for x_l, x_r in draws]
+
+
+def start_of(scene: Scene) -> Start:
+    """Where the arms of a scene begin."""
+    state = scene.initial_state.tolist()
+    return Start(state[0], state[4], state[2])

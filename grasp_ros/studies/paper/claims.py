@@ -1,0 +1,105 @@
+"""From checks to verdicts: one rule for every statement of the paper.
+
+A part of a statement is checked in up to six ways. Its verdict follows from four of them: the paper's cases as printed,
+the same start for both cases, random starts, and a sweep of the parameter behind it.
+
+* *holds*: all of these hold; of random starts, at least 95 % do.
+* *does not hold*: less than half of the random starts hold, or of the paper's own cases where no start is random.
+* *holds within stated limits*: all else; the checks that fail are the limits.
+
+Other readings of the source and other measures of the same word do not enter the verdict: those by which it would come
+out the other way are named beside it. A statement of several parts holds as far as its weakest part does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from typing import NamedTuple
+
+ALMOST_ALL, HALF = 0.95, 0.5  # of the random starts
+
+
+class Verdict(Enum):
+    """What becomes of a statement, from the weakest to the strongest."""
+
+    FAILS = "does not hold"
+    LIMITED = "holds within stated limits"
+    HOLDS = "holds"
+
+
+class Kind(Enum):
+    """How a statement is checked."""
+
+    PRINTED = "the paper's cases"
+    ALIKE = "same start"
+    RANDOM = "random starts"
+    SWEEP = "sweep"
+    READING = "other reading"
+    WORD = "other measure"
+
+
+DECISIVE = (Kind.PRINTED, Kind.ALIKE, Kind.RANDOM, Kind.SWEEP)
+
+
+class Check(NamedTuple):
+    """One check of one part: how, on what, what was found, and in which share it holds."""
+
+    kind: Kind
+    text: str
+    value: str
+    share: float  # of the runs that were looked at, 0 to 1
+    holds: bool
+
+
+class Part(NamedTuple):
+    """One statement with one threshold."""
+
+    statement: str
+    threshold: str
+    why: str  # the physics behind it, a sentence
+    checks: Sequence[Check]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The rule at the head of this file."""
+        if not self.limits:
+            return Verdict.HOLDS
+        drawn = [check.share for check in self.checks if check.kind is Kind.RANDOM]
+        decisive = drawn or [check.share for check in self.checks if check.kind is Kind.PRINTED]
+        return Verdict.FAILS if sum(decisive) < HALF * len(decisive) else Verdict.LIMITED
+
+    @property
+    def limits(self) -> list[Check]:
+        """Checks that fail, of those that decide."""
+        return [check for check in self.checks if check.kind in DECISIVE and not check.holds]
+
+    @property
+    def turned(self) -> list[Check]:
+        """Readings and measures by which the statement would come out the other way."""
+        fails = self.verdict is Verdict.FAILS
+        return [
+            check
+            for check in self.checks
+            if check.kind not in DECISIVE and (check.holds if fails else check.share < HALF)
+        ]
+
+
+class Claim(NamedTuple):
+    """A statement of the paper, restated, with what was found."""
+
+    key: str
+    where: str  # page and number in the paper
+    statement: str
+    parts: Sequence[Part]
+
+    @property
+    def verdict(self) -> Verdict:
+        """That of the weakest part."""
+        order = list(Verdict)
+        return min((part.verdict for part in self.parts), key=order.index)
+
+
+def almost_all(share: float) -> bool:
+    """Whether a share of random starts counts as all."""
+    return share >= ALMOST_ALL

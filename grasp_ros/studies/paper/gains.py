@@ -1,0 +1,104 @@
+"""Observations (9) to (11): the feedback gains."""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.scene import Scene
+from grasp_ros.studies.paper.cases import PRINTED, Cases, Start, started, value_of
+from grasp_ros.studies.paper.compare import Comparison
+from grasp_ros.studies.paper.measures import measure, ratio
+from grasp_ros.studies.paper.properties import SETTLING, tenfold
+from grasp_ros.studies.paper.universal import Found, Share
+
+
+def _damping_ratio(scene: Scene) -> float:
+    C, K, m = (
+        value_of(scene, "c") + value_of(scene, "Kv"),
+        value_of(scene, "k") + value_of(scene, "Kp"),
+        value_of(scene, "m_l"),
+    )
+    return C / (2.0 * math.sqrt(K * m))
+
+
+def _more_damped(number: int, more: bool, cases: Cases, start: Start) -> Found:
+    del start  # the damping ratio does not depend on it
+    share = _damping_ratio(cases[number]) / _damping_ratio(cases[1])
+    return Found(share, share > 1.05 if more else share < 1.0 / 1.05)
+
+
+def _gain_matters(number: int, cases: Cases, start: Start) -> Found:
+    """Largest change of settling time or frequency, as a ratio above 1."""
+    a, b = measure(started(cases[number], start)), measure(started(cases[1], start))
+    changes = [ratio(a.settling, b.settling), ratio(a.frequency, b.frequency)]
+    change = max(max(each, 1.0 / each) for each in changes)
+    return Found(change, change > 1.05)
+
+
+def any_gain() -> tuple[Share, ...]:
+    """Observation (9)."""
+    return tuple(
+        Share(
+            f"No. {number} differs from No. 1 in settling time or frequency.",
+            "by more than 5 %",
+            lambda cases, start, number=number: _gain_matters(number, cases, start),  # type: ignore[misc]
+            "Kp adds to the stiffness of an arm, Kv to its damping.",
+            PRINTED,
+        )
+        for number in (9, 10)
+    )
+
+
+def position_gain() -> tuple[Comparison | Share, ...]:
+    """Observation (10)."""
+    return (
+        Comparison(
+            "The largest input force of No. 9 is above that of No. 1.",
+            "input",
+            9,
+            True,
+            "From rest the largest input is Kp x(0), unless Kv v exceeds it later.",
+            "Kp",
+            tenfold(5.0),
+        ),
+        Comparison(
+            "No. 9 needs longer to settle than No. 1.",
+            "settling",
+            9,
+            True,
+            "The envelope of an arm, exp(-C t / 2m), does not know Kp; more and faster impacts take more.",
+            "Kp",
+            tenfold(5.0),
+            SETTLING,
+        ),
+        Share(
+            "The damping ratio of an arm falls.",
+            "C / (2 sqrt(K m)) of No. 9 over No. 1 below 0.952",
+            lambda cases, start: _more_damped(9, False, cases, start),
+            "K grows and C does not.",
+            PRINTED,
+        ),
+    )
+
+
+def velocity_gain() -> tuple[Comparison | Share, ...]:
+    """Observation (11)."""
+    return (
+        Comparison(
+            "No. 10 settles sooner than No. 1.",
+            "settling",
+            10,
+            False,
+            "Kv adds to c: the envelope of an arm is exp(-C t / 2m) up to critical damping.",
+            "Kv",
+            (1.0, 1.5, 2.5, 5.0, 10.0),
+            SETTLING,
+        ),
+        Share(
+            "The damping ratio of an arm grows.",
+            "C / (2 sqrt(K m)) of No. 10 over No. 1 above 1.05",
+            lambda cases, start: _more_damped(10, True, cases, start),
+            "C grows and K does not.",
+            PRINTED,
+        ),
+    )

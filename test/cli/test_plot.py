@@ -1,0 +1,57 @@
+"""`grasp plot` as people use it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PIL import Image
+
+BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+
+
+@pytest.mark.parametrize("ending", BEGINS)
+def test_scenes_side_by_side_in_every_format(command: Any, tmp_path: Path, ending: str) -> None:
+    result = command("plot", "case_01", "case_03", "--set", "time.duration_s=2", "--from", "0.4", "--to", "0.6",
+                     "--width", "120", "-o", f"out.{ending}")
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / f"out.{ending}").read_bytes().startswith(BEGINS[ending])
+
+
+def test_width_is_that_of_the_page(command: Any, tmp_path: Path) -> None:
+    assert command("plot", "case_02", "--method", "paper", "--step", "1e-2", "--width", "90").returncode == 0
+    with Image.open(tmp_path / "case_02.png") as picture:
+        assert picture.width == pytest.approx(90 / 25.4 * 150, abs=2)
+
+
+def test_sampled_and_files(command: Any, tmp_path: Path) -> None:
+    assert command("simulate", "case_01", "--set", "time.duration_s=1", "--sampled", "-o", "a.npz").returncode == 0
+    assert command("plot", "a.npz", "case_01", "--to", "1", "--sampled").returncode == 2
+    result = command("plot", "a.npz", "case_01", "--to", "1")
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (("--from", "3", "--to", "2"), "--from 3.0, --to 2.0 is not allowed; allowed: --from below --to"),
+        (("--from", "99"), "--from 99.0 is not allowed; allowed: 0 to below 20 s"),
+        (("--to", "21"), "--to 21.0 is not allowed; allowed: up to 20 s"),
+        (("--width", "5"), "--width 5.0 is not allowed; allowed: 60 to 1000 mm"),
+    ],
+)
+def test_what_is_refused_in_a_line(command: Any, words: tuple[str, ...], text: str) -> None:
+    result = command("plot", "case_01", *words)
+    assert result.returncode == 2
+    assert text in result.stderr
+
+
+def test_simulate_prints_settling_forces_and_losses(command: Any) -> None:
+    lines = dict(line.split("  ", 1) for line in command("simulate", "case_01").stdout.splitlines())
+    assert lines["settled to 2%"].strip() == "left 16.61 s, object 16.69 s, right 18.24 s"
+    assert "f_r 2.5 N" in lines["largest forces"]
+    parts = [float(part.split()[-1]) for part in lines["energy lost, J of V"].split(",")]
+    assert sum(parts) == pytest.approx(5.1 - 0.00129, abs=2e-3)
+    assert "watch for" in lines

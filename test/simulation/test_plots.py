@@ -1,0 +1,55 @@
+"""Figures: every panel has its place, nothing is hidden, and what is asked for is shown."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT
+from grasp_ros.simulation import plots, simulate
+from grasp_ros.simulation.plots import compose, contact_spans
+
+
+@pytest.mark.parametrize(
+    ("names", "width"),
+    [(("case_01",), None), (("case_02",), 90.0), (("case_01", "case_09", "v_jump_one_sided"), 180.0)],
+)
+def test_axes_letters_and_legends_do_not_collide(names: tuple[str, ...], width: float | None) -> None:
+    runs = [simulate(scenes.load(name)) for name in names]
+    figure = compose(runs, ["continuous feedback"] * len(runs), width_mm=width)
+    renderer: Any = figure.canvas.get_renderer()
+    boxes = [axes.get_tightbbox(renderer, for_layout_only=True) for axes in figure.axes]
+    for a, b in combinations(boxes, 2):
+        assert min(a.x1, b.x1) - max(a.x0, b.x0) <= 1.0 or min(a.y1, b.y1) - max(a.y0, b.y0) <= 1.0
+    for axes, other in product(figure.axes, figure.axes):
+        if axes.get_legend() is not None:
+            box, data = axes.get_legend().get_window_extent(renderer), other.get_window_extent(renderer)
+            assert not box.overlaps(data)
+    for box in boxes:
+        assert box.x0 >= -1.0
+        assert box.x1 <= figure.bbox.x1 + 1.0
+    plots.plt.close(figure)
+
+
+def test_contacts_of_a_recording_are_those_of_the_events() -> None:
+    run = simulate(scenes.load("case_03"), grid=np.linspace(0.0, 20.0, 20001))
+
+    class Recorded:
+        scene, t, state, command, energy = run.scene, run.t, run.state, run.command, run.energy
+
+    exact, seen = (np.array(contact_spans(motion, LEFT)) for motion in (run, Recorded()))
+    assert exact == pytest.approx(seen, abs=2e-3)
+
+
+def test_what_is_refused(tmp_path: Path) -> None:
+    run = simulate(scenes.load("case_01"))
+    with pytest.raises(Refused, match=r"--width 1.0 is not allowed; allowed: 60 to 1000 mm"):
+        compose([run], [""], width_mm=1.0)
+    with pytest.raises(Refused, match="no output times"):
+        plots.draw(simulate(scenes.load("case_01"), grid=np.zeros(0)), tmp_path / "a.png", "")

@@ -1,0 +1,75 @@
+"""Settling times, contacts and the energy lost by cause, beside what they must add up to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from documents import scene_of
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.quantities import (
+    contact_intervals,
+    impact_forces_of,
+    last_outside,
+    losses,
+    rests_at_zero,
+    running_losses,
+    settling_times,
+)
+
+
+def test_last_time_outside_of_known_motions() -> None:
+    t = np.linspace(0.0, 4.0, 4001)
+    x = np.column_stack([np.exp(-t), 0.001 * np.ones_like(t), np.ones_like(t)])
+    found = last_outside(t, x, 0.1)
+    assert found[0] == pytest.approx(np.log(10.0), abs=1e-6)
+    assert found[1] == 0.0
+    assert found[2] == np.inf
+
+
+def test_settling_time_of_an_arm_alone_follows_its_envelope() -> None:
+    """Between the envelope's time and half a swing before it."""
+    run = simulate(scene_of("case_01", without=("object", "left_contact", "right_contact")),
+                   grid=np.linspace(0.0, 20.0, 20001))
+    slowest = settling_times(run)[[0, 2]].max()
+    envelope = np.log(50.0) / 0.35
+    assert envelope - np.pi / np.sqrt(15.0 - 0.35**2) < slowest < envelope + 0.1
+
+
+@pytest.mark.parametrize("name", ["case_01", "case_02", "case_03", "case_07", "friction", "v_jump_symmetric"])
+def test_what_is_lost_adds_up_to_what_V_c_has_fallen(name: str) -> None:
+    run = simulate(scenes.load(name))
+    level, lost = run.energy.V_c, losses(run)
+    part = 1e-4 if name == "friction" else 1e-6  # |v| of dry friction has a kink where the object turns
+    assert float(lost.total) == pytest.approx(level[0] - level[-1], rel=part, abs=1e-9 * level[0])
+    assert (float(lost.friction) > 0.0) == (name == "friction")
+
+
+def test_running_sums_follow_V_c() -> None:
+    run = simulate(scenes.load("case_03"))
+    t, lost = running_losses(run)
+    V_c = simulate(scenes.load("case_03"), grid=t).energy.V_c
+    assert lost.total == pytest.approx(V_c[0] - V_c, abs=1e-8)
+
+
+def test_what_held_commands_take_is_their_work() -> None:
+    run = simulate(scenes.load("case_01"), sampled=True)
+    level, lost = run.energy.V_c, losses(run)
+    assert float(lost.total) == pytest.approx(level[0] - level[-1], rel=1e-4)
+
+
+def test_contacts_of_case_1() -> None:
+    run = simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 20001))
+    for side in (LEFT, RIGHT):
+        spans = contact_intervals(run, side)
+        inside = ((run.t[:, None] > spans[:, 0]) & (run.t[:, None] < spans[:, 1])).any(axis=1)
+        assert np.array_equal(impact_forces_of(run)[:, side] > 0.0, inside)
+    begun = simulate(scenes.load("case_01", ["left_arm.position_m=0.01"]))
+    assert contact_intervals(begun, LEFT)[0, 0] == 0.0
+
+
+def test_settled_has_a_meaning_only_around_zero() -> None:
+    known = {name: rests_at_zero(scenes.load(name).system) for name in ("case_01", "preload", "pulse", "tilt_hold")}
+    assert known == {"case_01": True, "preload": False, "pulse": False, "tilt_hold": False}

@@ -1,0 +1,198 @@
+"""The paper, reproduced and judged: numbers that are known, and verdicts that flip when a case is broken on purpose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import numpy as np
+import pytest
+
+from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import simulate
+from grasp_ros.studies.paper import arms, beyond
+from grasp_ros.studies.paper.cases import SYMMETRIC, load_cases, random_starts, started, with_values
+from grasp_ros.studies.paper.claims import Check, Claim, Kind, Part, Verdict
+from grasp_ros.studies.paper.equations import equations
+from grasp_ros.studies.paper.judgement import judge
+from grasp_ros.studies.paper.measures import measure
+from grasp_ros.studies.paper.quantities import quantities
+from grasp_ros.studies.paper.replay import COLUMNS, frames
+from grasp_ros.studies.paper.results import doubts
+from grasp_ros.verification.oracles import elastic_period
+
+CASES = load_cases()
+STARTS = random_starts(4)
+HOLDS, LIMITED, FAILS = Verdict.HOLDS, Verdict.LIMITED, Verdict.FAILS
+
+
+@cache
+def claim_of(key: str) -> Claim:
+    return judge(CASES, STARTS, [key])[key]
+
+
+def broken(key: str, number: int, change: Callable[[Scene], Scene]) -> Claim:
+    """The verdict with one of the cases replaced."""
+    return judge({**CASES, number: change(CASES[number])}, STARTS, [key])[key]
+
+
+def test_all_equations_are_there_and_agree() -> None:
+    rows = equations({number: CASES[number] for number in (1, 2, 3)})
+    assert {row.number for row in rows} == {f"({number})" for number in range(1, 38)}
+    assert [row for row in rows if not row.agrees] == []
+
+
+def test_an_equation_that_is_wrong_does_not_agree(monkeypatch: pytest.MonkeyPatch) -> None:
+    from grasp_ros.studies.paper import equations as module
+
+    right = module.acceleration
+    monkeypatch.setattr(module, "acceleration", lambda grasp, state: [1.001 * value for value in right(grasp, state)])
+    rows = module.motion_equations([module.Sample(CASES[1])])
+    assert not any(row.agrees for row in rows)
+
+
+def part(*checks: tuple[Kind, float, bool]) -> Part:
+    return Part("", "", "", [Check(kind, "", "", share, holds) for kind, share, holds in checks])
+
+
+def test_the_rule_of_the_verdict() -> None:
+    yes = [(Kind.PRINTED, 1.0, True), (Kind.ALIKE, 1.0, True), (Kind.RANDOM, 0.97, True), (Kind.SWEEP, 1.0, True)]
+    assert part(*yes).verdict is HOLDS
+    assert part(*yes, (Kind.READING, 0.0, False)).verdict is HOLDS
+    assert len(part(*yes, (Kind.READING, 0.0, False)).turned) == 1
+    assert part((Kind.PRINTED, 0.0, False), *yes[1:]).verdict is LIMITED
+    assert part(*yes[:2], (Kind.RANDOM, 0.7, False)).verdict is LIMITED
+    assert part(*yes[:2], (Kind.RANDOM, 0.4, False)).verdict is FAILS
+    assert part((Kind.PRINTED, 0.0, False)).verdict is FAILS
+    assert Claim("", "", "", [part(*yes), part((Kind.PRINTED, 0.0, False))]).verdict is FAILS
+
+
+@pytest.mark.parametrize(
+    ("key", "number", "values"),
+    [
+        ("C2", 3, {"p": 0.0}),  # lossy impacts without a loss
+        ("O7", 8, {"c": 0.02}),  # "more damping" that is less
+        ("O11", 10, {"Kv": 0.05}),
+        ("C3", 6, {"m_l": 1.0}),  # equal arms
+    ],
+)
+def test_a_claim_that_is_broken_on_purpose_does_not_hold(key: str, number: int, values: dict[str, float]) -> None:
+    assert claim_of(key).verdict is not FAILS
+    assert broken(key, number, lambda scene: with_values(scene, values)).verdict is FAILS
+
+
+def test_claims_that_fail_come_true_when_the_case_is_changed() -> None:
+    """Observation 5 says that heavier arms swing faster, 10 that stiffer feedback settles later."""
+    assert [each.verdict for each in claim_of("O5").parts] == [FAILS, HOLDS]
+    assert broken("O5", 5, lambda scene: with_values(scene, {"m": 0.1})).parts[0].verdict is not FAILS
+    assert claim_of("O10").parts[1].verdict is FAILS
+    assert broken("O10", 9, lambda scene: with_values(scene, {"Kv": 0.0})).parts[1].verdict is not FAILS
+
+
+def test_periodic_only_from_a_symmetric_start() -> None:
+    constant, periodic = claim_of("T12").parts
+    assert (constant.verdict, periodic.verdict) == (HOLDS, FAILS)
+    assert [check.text for check in periodic.turned] == ["x_l(0) = -0.5, x_r(0) = 0.5 m"]
+    even = judge({**CASES, 2: with_values(CASES[2], {"p": 0.5})}, STARTS, ["T12"])["T12"]
+    assert even.parts[0].verdict is FAILS
+
+
+def test_the_printed_V_rises_for_large_p_and_V_c_does_not() -> None:
+    own, any_p, repaired = claim_of("C1").parts
+    assert (own.verdict, any_p.verdict, repaired.verdict) == (HOLDS, LIMITED, HOLDS)
+    assert any(check.text.startswith("p = 30") for check in any_p.limits)
+
+
+def test_settling_is_certain() -> None:
+    """Beside a plain run over a longer time, looked at more closely."""
+    for number in (1, 7, 10):
+        scene = CASES[number].changed({"time.duration_s": 60.0})
+        grid = np.linspace(0.0, 60.0, 60_001)
+        outside = np.flatnonzero(np.abs(simulate(scene, grid=grid).state[:, 0::2]).max(axis=1) > 0.01)
+        assert measure(CASES[number]).settling == pytest.approx(grid[outside[-1]], abs=2e-3)
+    assert measure(CASES[2]).settling == np.inf
+    assert np.isnan(measure(CASES[3], settle=False).settling)
+
+
+def test_the_object_mass_does_not_matter_from_a_symmetric_start() -> None:
+    light, heavy = (measure(started(CASES[number], SYMMETRIC)).settling for number in (1, 11))
+    assert light == pytest.approx(heavy, rel=1e-12)
+
+
+def test_gap_and_repair() -> None:
+    found = beyond.gap(CASES)
+    assert len(found.jumps) >= 3
+    assert min(jump.height for _, jump in found.jumps) > 0.02
+    assert found.V_c_rise < 0.0
+    assert [number for number, p, safe in found.safe if p >= safe] == [4]
+
+
+def test_the_tail_has_its_constant() -> None:
+    found = beyond.tail(CASES[1], 2e4)
+    assert found.kappa == pytest.approx(26921.368, rel=1e-6)
+    assert found.constant == pytest.approx(1.0, abs=0.15)
+    assert found.slope == pytest.approx(-2.5, abs=0.2)
+    assert found.touches_slope == pytest.approx(0.75, abs=0.1)
+
+
+def test_case_2_is_chaos_and_its_symmetric_start_is_not() -> None:
+    """The exponent beside the growth of another perturbation, and the period beside its quadrature."""
+    push = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    exponent = float(beyond.stretching(CASES[2], 100.0, push).mean() / beyond.EVERY)
+    assert 0.25 < exponent < 0.8
+    symmetric = started(CASES[2], SYMMETRIC)
+    period = float(elastic_period(1, 15, 10_000, "0.5"))
+    states = simulate(symmetric, grid=np.array([0.0, 10.0 * period])).state
+    assert states[1] == pytest.approx(states[0], abs=1e-9)
+    assert beyond.nearest_return(CASES[2], 20.0)[1] > 0.1
+    assert beyond.nearest_return(symmetric, 20.0)[1] < 1e-5
+
+
+def test_stiffer_arms_lose_more_in_harder_impacts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(arms, "STIFFNESSES", (10.0, 100.0))
+    soft, stiff = arms.stiffer(CASES, STARTS)
+    assert stiff.share > 2.0 * soft.share
+    assert stiff.speed > 1.5 * soft.speed
+    assert stiff.alone == pytest.approx(soft.alone, rel=0.1)
+
+
+def test_collisions_slow_damped_arms_and_stop_undamped_ones(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(arms, "DAMPINGS", (0.0, 0.7, 5.0))
+    none, some, much = arms.damped(CASES, STARTS[:3])
+    assert none.together < none.alone == np.inf
+    assert some.later == 1.0
+    assert much.together >= much.alone
+
+
+def test_the_papers_own_method_at_plausible_steps() -> None:
+    fine, coarse = arms.stepped({2: CASES[2]})
+    assert -0.01 < fine.drift < -0.001
+    assert -0.6 < coarse.drift < -0.2
+    assert coarse.touches < 1.0
+    assert fine.error > 1e-3
+
+
+def test_doubts_are_computed() -> None:
+    texts = dict(doubts({number: CASES[number] for number in (1, 9, 11)}))
+    assert "-25 N" in texts["Axis of Fig. 10"]
+    assert "1643 N" in texts["Sign of x_l(0)"]
+    assert "9.39 and 9.39 s" in texts["Symmetric starts"]
+
+
+def test_quantities_have_a_column_for_each_case() -> None:
+    heads, rows = quantities({number: CASES[number] for number in (1, 8)})
+    assert heads == ("", "No. 1", "No. 8")
+    amounts = {row[0]: row[1:] for row in rows}
+    assert amounts["contacts left, right"][0] == "22, 22"
+    assert amounts["largest input, N"] == ("2.50", "2.50")
+
+
+def test_frames_are_states_of_the_run() -> None:
+    table = frames(CASES[3])
+    run = simulate(CASES[3], grid=table[:, 0])
+    assert table[:, 1:4].tobytes() == np.ascontiguousarray(run.state[:, 0::2]).tobytes()
+    touching = (run.energy.mode != 0).astype(int)
+    assert np.count_nonzero(touching) > 30 * len(run.times(Transition.TOUCH, LEFT))
+    assert np.diff(table[:, 0]).max() <= 1.0 / 60.0 + 1e-12
+    assert (table[:, COLUMNS.index("fw_r")] > 0.0).any()
