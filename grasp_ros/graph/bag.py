@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,8 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph import running as runnings
+from grasp_ros.graph.running import Running
 from grasp_ros.physics.energy import Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
@@ -33,11 +35,15 @@ from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.scene.files import decoding, writing
 from grasp_ros.scene.topics import (
     CHANGES,
+    CLOCK,
+    DIAGNOSTICS,
     EXTERNAL_FORCES,
     JOINT_STATES,
     LYAPUNOV,
     LYAPUNOV_NAMES,
+    RUN,
     SCENE,
+    TIMING,
     Topic,
     state_of,
 )
@@ -69,6 +75,10 @@ class Recorder:
         Its topics get a connection each.
     versions : mapping of str to str
         Stored in the bag's metadata.
+    names : mapping of Topic to str
+        Full names of the topics in the graph; of those of the scene without a name here, the one without a namespace.
+    running : Running
+        How the plant runs.
 
     Raises
     ------
@@ -76,7 +86,9 @@ class Recorder:
         If the directory exists or cannot be written, now or later.
     """
 
-    def __init__(self, path: Path, scene: scenes.Scene, versions: dict[str, str]) -> None:
+    def __init__(
+        self, path: Path, scene: scenes.Scene, versions: dict[str, str], names: Mapping[Topic, str], running: Running
+    ) -> None:
         self._path = path
         try:
             self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
@@ -87,24 +99,52 @@ class Recorder:
         self._writer.set_custom_data("scene", scene_yaml)
         for name, version in sorted(versions.items()):
             self._writer.set_custom_data(f"version {name}", version)
-        self._connections: dict[str, Connection] = {
-            topic.name: self._writer.add_connection(
-                f"/{topic.name}", topic.type, typestore=_TYPES, offered_qos_profiles=[_qos(topic)]
+        run_yaml = running.to_yaml()
+        self._writer.set_custom_data("run", run_yaml)
+        self._connections: dict[str, Connection] = {}
+        for topic in dict.fromkeys((RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS)):
+            name = names.get(topic, topic.name if topic.name.startswith("/") else f"/{topic.name}")
+            self._writer.set_custom_data(f"topic {topic.name}", name)
+            self._connections[topic.name] = self._writer.add_connection(
+                name, topic.type, typestore=_TYPES, offered_qos_profiles=[_qos(topic)]
             )
-            for topic in (SCENE, *scene.topics, *CHANGES.values())
-        }
-        string = _TYPES.types[SCENE.type](data=scene_yaml)
-        self.write(SCENE, 0, bytes(_TYPES.serialize_cdr(string, SCENE.type)))
+        for topic, text in ((RUN, run_yaml), (SCENE, scene_yaml)):
+            string = _TYPES.types[SCENE.type](data=text)
+            self.write(topic, 0, bytes(_TYPES.serialize_cdr(string, SCENE.type)))
 
     def write(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
         """Append one serialized message with its simulated time."""
         with writing(self._path, BagError):
             self._writer.write(self._connections[topic.name], time_ns, cdr)
 
-    def write_lyapunov(self, time_ns: int, values: Sequence[float]) -> None:
+    def write_tick(
+        self, time_ns: int, stamp_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float]
+    ) -> None:
+        """Append all of one tick, and its /clock.
+
+        Parameters
+        ----------
+        time_ns : int, ns
+            Time in the bag, which goes on where a reset puts simulated time back.
+        stamp_ns : int, ns
+            Simulated time.
+        messages : iterable of Topic and bytes
+            Serialized messages.
+        lyapunov : sequence of float
+            The monitor's own values, see `topics.LYAPUNOV_NAMES`.
+        """
+        seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
+        clock = _TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
+        message = _TYPES.types[CLOCK.type](clock=clock)
+        self.write(CLOCK, time_ns, bytes(_TYPES.serialize_cdr(message, CLOCK.type)))
+        for topic, cdr in messages:
+            self.write(topic, time_ns, cdr)
+        self._write_lyapunov(time_ns, stamp_ns, lyapunov)
+
+    def _write_lyapunov(self, time_ns: int, stamp_ns: int, values: Sequence[float]) -> None:
         """Append the monitor's own values; serialized here, because rclpy pads this type with stray bytes."""
         types = _TYPES.types
-        seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
+        seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
         stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
         header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
         nothing = np.zeros(0)
@@ -140,10 +180,15 @@ class Recording:
         delay; 0 without a controller, NaN where missing.
     outputs : dict of str to array (n,), N
         Impact and external forces by topic; NaN where missing.
-    lyapunov : array (n, 6)
+    lyapunov : array (n, 9)
         What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
     changes : dict of int to dict of str to float
         Numbers that were set while the graph ran, by the tick from which they act.
+    running : Running
+        How the plant ran: in lockstep or with the wall clock, and with which accuracy.
+    starts : int array (k,)
+        Ticks of the bag at which the plant began the scene, again after each reset; the first is 0 in a bag that has
+        the beginning. `tick` and `t` go on where a reset puts simulated time back.
     """
 
     path: Path
@@ -157,6 +202,8 @@ class Recording:
     outputs: dict[str, Array]
     lyapunov: Array
     changes: dict[int, dict[str, float]]
+    running: Running
+    starts: np.ndarray
 
     @property
     def t(self) -> Array:
@@ -180,11 +227,21 @@ class Recording:
         return inputs
 
     @property
+    def closed(self) -> bool:
+        """Whether V belongs to laws that were known and ran, at every tick."""
+        return bool((self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0).all())
+
+    @property
     def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force."""
-        scene, starts = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
+        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force.
+
+        Of the plant alone, without its controllers, unless `closed`.
+        """
+        if not self.closed:
+            return energy(replace(self.scene.system, laws={}), self.state)
+        scene, begins = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
         parts = []
-        for begin, end in pairwise(starts):
+        for begin, end in pairwise(begins):
             scene = scene.changed(self.changes.get(begin, {}))
             parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
         return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
@@ -213,10 +270,13 @@ def read(path: Path) -> Recording:
         metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
         custom = metadata["rosbag2_bagfile_information"]["custom_data"]
         scene = scenes.parse(custom["scene"], path.name, str(path))
+        running = runnings.parse(custom["run"])
+        names = {key.removeprefix("topic "): word for key, word in custom.items() if key.startswith("topic ")}
         with Reader(path) as reader:
-            columns = {topic: _column(reader, topic, scene) for topic in scene.topics}
-            changes = _changes(reader, scene)
+            columns = {topic: _column(reader, names[topic.name], topic, scene) for topic in scene.topics}
+            changes = _changes(reader, names, scene)
     ticks, joints = columns[JOINT_STATES]
+    joints, stamps = joints[:, :8], joints[:, 8]
     if not len(ticks):
         raise BagError(f"{path}: holds no tick")
 
@@ -234,18 +294,19 @@ def read(path: Path) -> Recording:
         path, scene, {k.removeprefix("version "): v for k, v in custom.items() if k.startswith("version ")},
         {topic.name: len(found) for topic, (found, _) in columns.items()}, ticks, joints[:, :6], joints[:, 6:], command,
         {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV), changes,
+        running, ticks[stamps == 0.0],
     )
 
 
-def _messages(reader: Reader, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:
+def _messages(reader: Reader, name: str, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:
     """Tick and message of everything on a topic."""
-    connections = [connection for connection in reader.connections if connection.topic == f"/{topic.name}"]
+    connections = [connection for connection in reader.connections if connection.topic == name]
     for _, time_ns, raw in reader.messages(connections) if connections else ():
         yield time_ns // scene.period_ns, _TYPES.deserialize_cdr(raw, topic.type)
 
 
-def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
-    found = [(tick, _values(topic, message)) for tick, message in _messages(reader, topic, scene)]
+def _column(reader: Reader, name: str, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
+    found = [(tick, _values(topic, message)) for tick, message in _messages(reader, name, topic, scene)]
     rows = np.array([row for _, row in found], dtype=float).reshape(len(found), -1)
     return np.array([tick for tick, _ in found], dtype=np.int64), rows
 
@@ -253,15 +314,19 @@ def _column(reader: Reader, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarr
 def _values(topic: Topic, message: Any) -> Array:
     if topic == JOINT_STATES:
         state, inputs = state_of(message)
-        return np.concatenate([state, inputs[[LEFT, RIGHT]]])
+        stamp = message.header.stamp
+        return np.concatenate([state, inputs[[LEFT, RIGHT]], [stamp.sec * NANOSECONDS + stamp.nanosec]])
     return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
 
 
-def _changes(reader: Reader, scene: scenes.Scene) -> dict[int, dict[str, float]]:
+def _changes(reader: Reader, names: Mapping[str, str], scene: scenes.Scene) -> dict[int, dict[str, float]]:
+    """Numbers that differ from those in force before, by the tick from which they act."""
     changes: dict[int, dict[str, float]] = {}
     for topic in CHANGES.values():
-        for _, message in _messages(reader, topic, scene):
-            stamp = message.header.stamp  # a monitor that came late has recorded it late
-            tick = (stamp.sec * NANOSECONDS + stamp.nanosec) // scene.period_ns
-            changes.setdefault(tick, {}).update(zip(message.name, message.position.tolist(), strict=True))
-    return changes
+        now = {name: scene.values[name.split(".")[0]][name.split(".")[1]] for name in scene.live}
+        for tick, message in _messages(reader, names[topic.name], topic, scene):
+            numbers = dict(zip(message.name, message.position.tolist(), strict=True))
+            if new := {name: number for name, number in numbers.items() if now[name] != number}:
+                changes.setdefault(tick, {}).update(new)
+                now.update(new)
+    return dict(sorted(changes.items()))

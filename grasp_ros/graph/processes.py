@@ -9,10 +9,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 
@@ -40,6 +41,12 @@ class Graph:
         Whether the plant shows a progress bar on the terminal.
     errors : int, optional
         Where the processes' messages go, as in `subprocess.Popen`; default: the terminal.
+    without : sequence of str
+        Controllers that somebody else starts.
+    laws : mapping of str to str
+        Laws of the user's own, "module:object", by controller.
+    plant : mapping of str to str
+        Further parameters of the plant.
 
     """
 
@@ -48,6 +55,9 @@ class Graph:
     accuracy: float
     progress: bool = False
     errors: int | None = None
+    without: Sequence[str] = ()
+    laws: Mapping[str, str] = field(default_factory=dict)
+    plant: Mapping[str, str] = field(default_factory=dict)
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     @property
@@ -61,8 +71,12 @@ class Graph:
         Raises
         ------
         Refused
-            If the directory exists or cannot be written.
+            If the directory exists or cannot be written, or the scene has no such controller.
         """
+        for name in (*self.without, *self.laws):
+            if name not in self.scene.controllers:
+                allowed = ", ".join(self.scene.controllers) or "none, this scene has no controller"
+                raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
         scene_file = self.directory / f"{self.scene.name}.yaml"
         with writing(self.directory):
             self.directory.mkdir(parents=True)
@@ -74,12 +88,16 @@ class Graph:
         }
         settings = {
             "monitor": {"bag": json.dumps(str(self.bag))},
-            **{name: {"wait_for_monitor": "true"} for name in self.scene.controllers},
+            **{
+                name: {"wait_for_monitor": "true", "law": json.dumps(self.laws.get(name, ""))}
+                for name in self.scene.controllers if name not in self.without
+            },
             "plant": {
                 "scene": json.dumps(str(scene_file)),
                 "accuracy": repr(float(self.accuracy)),
                 "wait_for_monitor": "true",
                 "progress": str(self.progress).lower(),
+                **self.plant,
             },
         }
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.

@@ -21,17 +21,21 @@ from grasp_ros.cli.report import compare_recording
 from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT
 from grasp_ros.physics.model import impact_forces
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real processes
 
 
 def content(directory: Path) -> list[tuple[str, int, bytes]]:
+    """What the bag holds of simulated time; /diagnostics comes in wall time."""
     with (directory / "bag" / "bag.mcap").open("rb") as file:
         rows = make_reader(file).iter_messages()
-        return [(channel.topic, message.log_time, message.data) for _, channel, message in rows]
+        return [(channel.topic, message.log_time, message.data) for _, channel, message in rows
+                if channel.topic != "/diagnostics"]
 
 
 def test_graph_bag_and_simulation_are_equal_bit_for_bit(two_runs: tuple[Path, Path]) -> None:
@@ -67,7 +71,7 @@ def test_a_comparison_sees_inputs_that_differ_and_leaves_out_what_the_bag_does_n
 def test_two_runs_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:
     first, second = (content(directory) for directory in two_runs)
     assert first == second
-    assert len(first) == 6 * 3001 + 1
+    assert len(first) == 7 * 3001 + 4  # and the scene, how it runs, two laws
 
 
 def test_bag_holds_every_tick_of_every_topic(two_runs: tuple[Path, Path]) -> None:
@@ -81,6 +85,11 @@ def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Pa
     recording = bag.read(two_runs[0] / "bag")
     level = recording.energy
     assert np.array_equal(recording.lyapunov[:, :4], np.stack([*level[:3], level.mode.astype(float)], axis=1))
+    assert recording.closed
+    alone = energy(replace(recording.scene.system, laws={}), recording.state)
+    assert np.array_equal(recording.lyapunov[:, LYAPUNOV_NAMES.index("V_plant")], alone.V_c)
+    work, rest = (recording.lyapunov[1:, LYAPUNOV_NAMES.index(name)] for name in ("work", "unexplained"))
+    assert np.allclose(np.diff(alone.V_c), work + rest, rtol=0.0, atol=1e-12)
     assert (recording.lyapunov[:, 4] <= 1e-12).all()  # the energy balance closes
     assert recording.lyapunov[:, 4].sum() < -1.0  # what the impacts and dampers have taken
     assert not recording.lyapunov[:, 5].any()
@@ -137,7 +146,8 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
     assert not any(recording.missing.values())
     assert not recording.lyapunov[:, 5].any()
     assert {topic for topic, _, _ in content(tmp_path / "run")} == {
-        "/scene", *(f"/{topic.name}" for topic in recording.scene.topics)
+        "/scene", "/run", "/clock", *(f"/{topic.name}" for topic in recording.scene.topics),
+        *(f"/{name.removesuffix('_controller')}/parameters" for name in recording.scene.controllers),
     }
     assert set(statuses) == {"plant", "monitor", *recording.scene.controllers}
 

@@ -1,0 +1,116 @@
+"""Lockstep: publish state k, wait for the commands stamped k, advance exactly one period with them.
+
+The result does not depend on the load of the machine, nor on who answers first: a command topic has one source.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.physics.model import Array
+from grasp_ros.scene.topics import LYAPUNOV, WINDOW
+
+if TYPE_CHECKING:
+    from grasp_ros.graph.nodes.plant import Plant
+
+UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
+
+
+class Lockstep:
+    """Takes the commands, and advances the plant when all of a tick are there.
+
+    Parameters
+    ----------
+    plant : Plant
+
+    Attributes
+    ----------
+    topics : list of Topic
+        Where the commands come from.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self._plant = plant
+        self._commands: dict[int, float] = {}
+        self._recorded = -1  # last tick that the monitor has complete
+        self._timer: Any = None
+        plant.counters.update({"stale commands": 0, "repeated commands": 0, "refused commands": 0})
+        self.topics = list(plant.scene.controllers.values())
+        self._inputs = {
+            topic: plant.subscribe(topic, partial(self._on_command, side))
+            for side, topic in zip(plant.scene.system.laws, self.topics, strict=True)
+        }
+        if plant.monitored:
+            plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
+
+    def missing(self) -> list[str]:
+        """Command topics that do not have exactly one source, with the names of several."""
+        found = {topic.name: self._plant.sources(topic) for topic in self.topics}
+        return [f"{name} from one source alone, not {' and '.join(nodes)}" if nodes else name
+                for name, nodes in found.items() if len(nodes) != 1]
+
+    def start(self) -> None:
+        """Go on without a command where none will ever come."""
+        if not self.topics:
+            self._timer = self._plant.wall_timer(UNCONTROLLED_SECONDS, self.advance)
+
+    def report(self) -> None:
+        """Nothing beside the counters."""
+
+    def _on_command(self, side: int, message: Any) -> None:
+        force = message.wrench.force.x
+        if messages.to_ns(message.header.stamp) != self._plant.tick * self._plant.scene.period_ns:
+            self._plant.count("stale commands")
+        elif not math.isfinite(force):
+            self._plant.count("refused commands")
+        elif side in self._commands:
+            self._plant.count("repeated commands")
+        else:
+            self._commands[side] = force
+            self.advance()
+
+    def _on_lyapunov(self, cdr: bytes) -> None:
+        self._recorded = messages.raw_stamp_ns(cdr) // self._plant.scene.period_ns
+        self.advance()
+
+    def advance(self) -> None:
+        """Do what is due once the current state has been answered: reset, finish, pause or advance."""
+        plant = self._plant
+        resetting = plant.steering.reset_due
+        if self._timer is not None:  # which would look ten thousand times a second at a plant that stands
+            (self._timer.cancel if plant.steering.stands and not resetting else self._timer.reset)()
+        if not plant.started or plant.finished or len(self._commands) < len(self.topics):
+            return
+        if plant.monitored and plant.tick - self._recorded > (0 if resetting or plant.at_end else WINDOW):
+            return
+        if any(source.get_publisher_count() > 1 for source in self._inputs.values()):
+            self._refuse_sources()
+            return
+        if resetting:
+            self._commands.clear()
+            self._recorded = -1
+            plant.steering.reset_done()
+        elif plant.steering.go_on():
+            if plant.at_end:
+                plant.finish()
+            else:
+                plant.step(self._take_commands())
+
+    def _refuse_sources(self) -> None:
+        several = [
+            f"{topic.name}: {source.get_publisher_count()} sources, {' and '.join(self._plant.sources(topic))}"
+            for topic, source in self._inputs.items() if source.get_publisher_count() > 1
+        ]
+        self._plant.fail(f"{'; '.join(several)}; allowed in lockstep: one, or who answers first would decide")
+
+    def _take_commands(self) -> Array:
+        forces = np.zeros(3)
+        for side, force in self._commands.items():
+            forces[side] = force
+        self._commands.clear()
+        return forces
