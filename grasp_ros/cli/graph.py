@@ -21,10 +21,27 @@ def add_to(commands: Any) -> None:
     add_scene(sub)
     add_accuracy(sub)
     add_output(sub, "DIRECTORY", "new directory for the scene and the bag")
+    sub.add_argument(
+        "--without", action="append", default=[], metavar="CONTROLLER",
+        help="do not start left_controller or right_controller; wait for another one on its topic",
+    )
+    sub.add_argument(
+        "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT", type=_law,
+        help="a law of your own in place of the scene's: called with tick, time, x and v it returns the force",
+    )
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
-    add_accuracy(sub)
+    sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
+    sub.add_argument("bag", type=Path)
+
+
+def _law(words: str) -> tuple[str, str]:
+    """Name of a controller and its law."""
+    side, _, law = words.partition("=")
+    if not side or not law:
+        raise argparse.ArgumentTypeError(f"{words} is not allowed; allowed: left=module:object, right=module:object")
+    return f"{side}_controller", law
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -32,7 +49,9 @@ def _run(options: argparse.Namespace) -> int:
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
     prepare()
-    graph = Graph(scene, directory, options.accuracy, progress=True)
+    graph = Graph(
+        scene, directory, options.accuracy, progress=True, without=options.without, laws=dict(options.laws)
+    )
     begin = time.monotonic()
     try:
         stopped = _live(graph)
@@ -70,7 +89,7 @@ def _report(graph: Graph, stopped: bool, seconds: float) -> int:
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording), True
     if not stopped:
-        comparison = report.compare_recording(recording, graph.accuracy)
+        comparison = report.compare_recording(recording)
         whole = comparison.equal and not recording.alarms and not any(recording.missing.values())
         figure = graph.directory / "figure.png"
         plots.draw(recording, figure, graph.scene.feedback_in_words(sampled=True))
@@ -88,7 +107,21 @@ def _inspect(options: argparse.Namespace) -> int:
     rows, equal = report.describe_recording(recording), True
     if options.replay:
         prepare()
-        comparison = report.compare_recording(recording, options.accuracy)
+        comparison = report.compare_recording(recording)
         rows, equal = rows + comparison.rows, comparison.equal
     print(report.table(rows))
     return 0 if equal else 1
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from grasp_ros.cli import report
+    from grasp_ros.graph import bag
+    from grasp_ros.graph.verify import laws_of, verify
+
+    recording = bag.read(options.bag)
+    prepare()
+    found = verify(recording)
+    laws = [(f"{side} controller", law) for side, law in laws_of(recording).items()]
+    rows = [("bag", str(recording.path)), ("run", recording.running.words), *laws, ("verified", found.words)]
+    print(report.table(rows))
+    return 0 if found.holds else 1

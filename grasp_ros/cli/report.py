@@ -8,11 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.graph.bag import Recording
+from grasp_ros.graph.verify import Verification, laws_of, verify
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory, simulate
 
 Row = tuple[str, str]
@@ -59,11 +61,13 @@ def describe_recording(recording: Recording) -> list[Row]:
     """What is in a bag."""
     scene = recording.scene
     per_topic = ", ".join(f"{name} {count}" for name, count in recording.counts.items())
+    resets = len(recording.starts) - 1
     missing = {name: count for name, count in recording.missing.items() if count}
     rows = [
         ("bag", str(recording.path)),
         ("scene", scene.title),
         ("feedback", scene.feedback_in_words(sampled=True)),
+        ("run", recording.running.words + (f", {resets} resets" if resets > 0 else "")),
         ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
         ("messages", per_topic),
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
@@ -72,13 +76,18 @@ def describe_recording(recording: Recording) -> list[Row]:
     for tick, numbers in recording.changes.items():
         rows.append((f"set at {scene.time_of(tick):g} s", ", ".join(f"{name} {n:g}" for name, n in numbers.items())))
     if len(recording.tick):
-        mode = recording.lyapunov[:, 3]
+        named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
+        mode, level = named["mode"], recording.energy
+        of = "" if recording.closed else " of the plant alone"
         begun = [_beginnings(mode, flag) for flag in (Mode.LEFT, Mode.RIGHT)]
-        rows.insert(5, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
-        rows.insert(6, ("V at both ends", _ends(recording.lyapunov[:, 0])))
-        rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
-        rows.insert(8, ("certificate", scene.certificate_in_words(sampled=True)))
-        rows.insert(9, ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"))
+        rows.insert(6, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
+        rows.insert(7, (f"V{of}", _ends(level.V)))
+        rows.insert(8, (f"V_c{of}", _ends(level.V_c)))
+        rows.insert(9, ("certificate", scene.certificate_in_words(sampled=True) if recording.closed else
+                        "none: the law of a controller is not known"))
+        rows.insert(10, ("work of the held forces", f"{0.5 * float(np.nansum(named['work'])):.6g} J"))
+        alarms = f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"
+        rows.insert(11, ("energy balance", alarms))
     return _with_words(scene, rows)
 
 
@@ -91,13 +100,19 @@ def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
 class Comparison(NamedTuple):
     """A recorded motion beside the same scene without ROS."""
 
-    equal: bool  # to the sampled simulation, bit for bit
+    equal: bool  # every bit is as it should be
+    own: bool  # whether all commands are those of the scene's laws, in lockstep and without a reset
     offset: Array | None  # (6,), largest distance from continuous feedback, m and m/s; None if it has none of its own
+    verification: Verification
+    laws: dict[str, str]  # whose commands these are, by side
 
     @property
     def rows(self) -> list[Row]:
         """For `table`."""
-        rows = [("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL")]
+        rows = [(f"{side} controller", law) for side, law in self.laws.items()]
+        rows.append(("verified", self.verification.words))
+        if self.own:
+            rows.append(("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL"))
         if self.offset is not None:
             far = ", ".join(
                 f"{name} {distance:.3g}"
@@ -108,15 +123,26 @@ class Comparison(NamedTuple):
         return rows
 
 
-def compare_recording(recording: Recording, accuracy: float) -> Comparison:
-    """Simulate a recorded scene without ROS, with commands that are held and with the paper's continuous feedback."""
-    times, scene = recording.t, recording.scene
+def compare_recording(recording: Recording) -> Comparison:
+    """Simulate a recorded scene again: with its recorded inputs, and with the scene's laws if it was these that ran.
+
+    With the scene's laws also under the paper's continuous feedback, to say how far from it the held commands lead.
+    """
+    times, scene, accuracy = recording.t, recording.scene, recording.running.accuracy
+    verification, laws = verify(recording), laws_of(recording)
+    own = recording.running.lockstep and len(recording.starts) <= 1 and not any(map(_foreign, laws.values()))
+    if not own:
+        return Comparison(verification.holds, own, None, verification, laws)
     same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
-    equal = _equal(same, recording)
+    equal = verification.difference is None and _equal(same, recording)
     if scene.sampled or recording.changes:
-        return Comparison(equal, None)
+        return Comparison(equal, own, None, verification, laws)
     ideal = simulate(scene, grid=times, accuracy=accuracy)
-    return Comparison(equal, np.abs(ideal.state - recording.state).max(axis=0))
+    return Comparison(equal, own, np.abs(ideal.state - recording.state).max(axis=0), verification, laws)
+
+
+def _foreign(law: str) -> bool:
+    return law.startswith("foreign")
 
 
 def _equal(same: Trajectory, recording: Recording) -> bool:

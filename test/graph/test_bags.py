@@ -54,18 +54,18 @@ def test_a_comparison_sees_inputs_that_differ_and_leaves_out_what_the_bag_does_n
     two_runs: tuple[Path, Path]
 ) -> None:
     recording = bag.read(two_runs[0] / "bag")
-    assert compare_recording(recording, ACCURACY).equal
+    assert compare_recording(recording).equal
     effort = recording.effort.copy()
     effort[1000, 0] = np.nextafter(effort[1000, 0], np.inf)
-    assert not compare_recording(replace(recording, effort=effort), ACCURACY).equal
+    assert not compare_recording(replace(recording, effort=effort)).equal
     cut = {name: getattr(recording, name)[:500] for name in ("tick", "state", "effort", "command", "lyapunov")}
     begin = replace(recording, **cut)
     assert np.isnan(begin.inputs[-1]).all()
     assert begin.inputs[:-1].tobytes() == recording.inputs[:499].tobytes()
-    assert compare_recording(begin, ACCURACY).equal
+    assert compare_recording(begin).equal
     gap = {name: np.delete(values, 100, axis=0) for name, values in cut.items()}
     assert np.flatnonzero(np.isnan(replace(recording, **gap).inputs[:, 0])).tolist() == [99, 498]
-    assert compare_recording(replace(recording, **gap), ACCURACY).equal
+    assert compare_recording(replace(recording, **gap)).equal
 
 
 def test_two_runs_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:
@@ -136,7 +136,7 @@ def test_a_scene_with_effects_is_the_same_everywhere(tmp_path: Path, name: str) 
         statuses = graph.stop()
     assert set(statuses.values()) == {0}
     recording = bag.read(graph.bag)
-    comparison = compare_recording(recording, ACCURACY)
+    comparison = compare_recording(recording)
     assert comparison.equal
     inputs = simulate(recording.scene, sampled=True).inputs
     assert recording.inputs.tobytes() == inputs.tobytes()
@@ -185,7 +185,7 @@ def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
         graph.stop()
     recording = bag.read(graph.bag)
     assert list(recording.changes.values()) == [{gain: 9.0}]
-    assert compare_recording(recording, ACCURACY).equal
+    assert compare_recording(recording).equal
     tick = next(iter(recording.changes))
     x, v = recording.state[tick, :2]
     assert recording.command[tick, 0] == -9.0 * x - 0.5 * v

@@ -16,6 +16,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.node import GraspNode, run
 from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE
@@ -59,18 +60,18 @@ class Controller(GraspNode):
         self._ready_to_answer = self._listening = False
         self._held: Any = None  # the state that came before this node was ready
         self.counters["answered states"] = 0
+        self.add_on_set_parameters_callback(self._on_set)
         self.subscribe(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
     def _on_scene(self, message: Any) -> None:
         """A plant has come: the first one, or one after another."""
-        first = self._scene is None
+        first, self._scene = not self._listening, None
         try:
             self._take(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
-        except SceneError as error:
-            if first and not self._ready_to_answer:
+        except Refused as error:
+            if first:
                 raise
-            self._scene = self._law = None
             self.state = f"waits for another scene: {error}"
             self.concern = "this scene is not answered"
             self.get_logger().error(self.state)
@@ -87,8 +88,6 @@ class Controller(GraspNode):
         self.forget_scene()
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
-        if self._scene is None:
-            self.add_on_set_parameters_callback(self._on_set)
         self._scene, self._answered, self.concern = scene, -1, ""
         self._law = scene.system.laws[SIDES[self._side]]
 

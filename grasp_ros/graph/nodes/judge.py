@@ -62,6 +62,8 @@ class Judge:
             raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"
                           f" {', '.join(sorted(wanted)) or 'nothing, this scene has no such controller'}")
         self._scene.changed(announcement.numbers)
+        if self._before is None and not self._known:  # what came before is of the run before: topics keep the last one
+            self._waiting[side].clear()
         self._waiting[side].append(announcement)
 
     def restart(self) -> None:

@@ -6,18 +6,22 @@ The result does not depend on the load of the machine, nor on who answers first:
 from __future__ import annotations
 
 import math
+import time
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.node import UNKNOWN
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW
 
 if TYPE_CHECKING:
     from grasp_ros.graph.nodes.plant import Plant
 
+PATIENCE_SECONDS = 5.0
+NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
 
@@ -38,6 +42,8 @@ class Lockstep:
         self._plant = plant
         self._commands: dict[int, float] = {}
         self._recorded = -1  # last tick that the monitor has complete
+        self._refused = False  # a second source has come
+        self._seen = -1  # tick at the last report
         self._timer: Any = None
         plant.counters.update({"stale commands": 0, "repeated commands": 0, "refused commands": 0})
         self.topics = list(plant.scene.controllers.values())
@@ -60,7 +66,16 @@ class Lockstep:
             self._timer = self._plant.wall_timer(UNCONTROLLED_SECONDS, self.advance)
 
     def report(self) -> None:
-        """Nothing beside the counters."""
+        """Say who is waited for, when a tick takes longer than a report."""
+        plant = self._plant
+        waits = plant.started and not plant.finished and plant.tick == self._seen and not plant.steering.stands
+        self._seen = plant.tick
+        silent = [topic.name for topic, side in zip(self.topics, plant.scene.system.laws, strict=True)
+                  if side not in self._commands]
+        monitor = [LYAPUNOV.name] if plant.monitored and not silent else []
+        plant.concern = f"waits for {' and '.join(silent + monitor)} to answer tick {plant.tick}" if waits else ""
+        if waits:
+            plant.get_logger().warning(plant.concern, throttle_duration_sec=PATIENCE_SECONDS)
 
     def _on_command(self, side: int, message: Any) -> None:
         force = message.wrench.force.x
@@ -84,7 +99,7 @@ class Lockstep:
         resetting = plant.steering.reset_due
         if self._timer is not None:  # which would look ten thousand times a second at a plant that stands
             (self._timer.cancel if plant.steering.stands and not resetting else self._timer.reset)()
-        if not plant.started or plant.finished or len(self._commands) < len(self.topics):
+        if self._refused or not plant.started or plant.finished or len(self._commands) < len(self.topics):
             return
         if plant.monitored and plant.tick - self._recorded > (0 if resetting or plant.at_end else WINDOW):
             return
@@ -102,11 +117,22 @@ class Lockstep:
                 plant.step(self._take_commands())
 
     def _refuse_sources(self) -> None:
-        several = [
-            f"{topic.name}: {source.get_publisher_count()} sources, {' and '.join(self._plant.sources(topic))}"
-            for topic, source in self._inputs.items() if source.get_publisher_count() > 1
-        ]
-        self._plant.fail(f"{'; '.join(several)}; allowed in lockstep: one, or who answers first would decide")
+        """End the run, with the names of the sources as soon as discovery has them."""
+        self._refused = True
+        deadline = time.monotonic() + NAMES_SECONDS
+
+        def named() -> bool:
+            late = time.monotonic() > deadline
+            return late or not any(UNKNOWN in name for topic in self.topics for name in self._plant.sources(topic))
+
+        self._plant.when(named, self._name_sources)
+
+    def _name_sources(self) -> None:
+        found = {topic.name: self._plant.sources(topic) for topic in self.topics}
+        words = [f"{name}: {len(nodes)} sources, {' and '.join(nodes)}" for name, nodes in found.items()
+                 if len(nodes) > 1]
+        self._plant.fail(f"{'; '.join(words) or 'a command topic had two sources'};"
+                         " allowed in lockstep: one, or who answers first would decide")
 
     def _take_commands(self) -> Array:
         forces = np.zeros(3)

@@ -40,6 +40,8 @@ from grasp_ros.scene.topics import (
 )
 from grasp_ros.simulation.versions import versions
 
+GIVE_UP_REPORTS = 5  # reports without a new tick after which a message is lost
+
 
 class Monitor(GraspNode):
     """Node `monitor`; parameter bag.
@@ -65,6 +67,8 @@ class Monitor(GraspNode):
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
         self._ticks = Ticks(())
+        self._seen: object = -1  # ticks at the last report
+        self._stuck = 0  # reports in a row without a new tick
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "alarms": 0,
@@ -122,8 +126,21 @@ class Monitor(GraspNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         self._ticks.put(topic, cdr)
+        self._drain()
+
+    def _drain(self) -> None:
         while (tick := self._ticks.take()) is not None:
             self._complete(tick)
+
+    def report(self) -> None:
+        """Publish the counters; go on without a message that does not come although the plant has gone on."""
+        super().report()
+        now = self.counters["ticks"]
+        self._stuck = self._stuck + 1 if now == self._seen else 0
+        self._seen = now
+        if self._stuck >= GIVE_UP_REPORTS and (tick := self._ticks.take(patient=False)) is not None:
+            self._complete(tick)
+            self._drain()
 
     def _complete(self, tick: Tick) -> None:
         assert self._scene is not None

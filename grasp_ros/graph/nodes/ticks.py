@@ -9,7 +9,7 @@ from typing import NamedTuple
 from grasp_ros.graph.nodes import messages
 from grasp_ros.scene.topics import JOINT_STATES, WINDOW, Topic
 
-PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; a plant that waits never is so far ahead
+PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
 
 
 class Tick(NamedTuple):
@@ -43,12 +43,16 @@ class Ticks:
         """Add a serialized message."""
         (self._states if topic == JOINT_STATES else self._others[topic]).append((messages.raw_stamp_ns(cdr), cdr))
 
-    def take(self) -> Tick | None:
-        """The next tick that is complete, or that will not be completed any more; None if that is still open."""
+    def take(self, patient: bool = True) -> Tick | None:
+        """The next tick that is complete, or that will not be completed any more; None if that is still open.
+
+        Without patience a tick is given up as soon as there is a later state, which the plant has made of the answers
+        to it.
+        """
         if not self._states:
             return None
         time_ns, state = self._states[0]
-        given_up = len(self._states) > PATIENCE_TICKS
+        given_up = len(self._states) > (PATIENCE_TICKS if patient else 1)
         places = {}
         for topic, queue in self._others.items():
             place = next((i for i, (stamp, _) in enumerate(queue) if stamp == time_ns), None)
