@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import signal
 import sys
 import time
@@ -10,9 +11,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError
+from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError, become
 
 
 def add_to(commands: Any) -> None:
@@ -32,6 +33,13 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
+    sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
+    sub.add_argument("bag", type=Path)
+    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub = add_command(commands, "ctl", _ctl, "pause, resume, step or reset a running graph, or ask for its status")
+    sub.add_argument("action", choices=("pause", "resume", "step", "reset", "status"))
+    sub.add_argument("steps", type=whole(1), nargs="?", default=1, metavar="N", help="control periods of step")
+    sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
     sub.add_argument("bag", type=Path)
 
@@ -111,6 +119,17 @@ def _inspect(options: argparse.Namespace) -> int:
         rows, equal = rows + comparison.rows, comparison.equal
     print(report.table(rows))
     return 0 if equal else 1
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from grasp_ros.graph import bag
+
+    bag.names(options.bag)  # refuses what is none
+    become("player", {"bag": json.dumps(str(options.bag)), "rate": repr(options.rate)})
+
+
+def _ctl(options: argparse.Namespace) -> int:
+    become("remote", {"action": options.action, "steps": str(options.steps)}, options.namespace)
 
 
 def _verify(options: argparse.Namespace) -> int:

@@ -102,7 +102,7 @@ class Recorder:
         run_yaml = running.to_yaml()
         self._writer.set_custom_data("run", run_yaml)
         self._connections: dict[str, Connection] = {}
-        for topic in dict.fromkeys((RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS)):
+        for topic in _topics(scene):
             name = names.get(topic, topic.name if topic.name.startswith("/") else f"/{topic.name}")
             self._writer.set_custom_data(f"topic {topic.name}", name)
             self._connections[topic.name] = self._writer.add_connection(
@@ -296,6 +296,39 @@ def read(path: Path) -> Recording:
         {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV), changes,
         running, ticks[stamps == 0.0],
     )
+
+
+def names(path: Path) -> dict[str, Topic]:
+    """Topics of a bag by their full names in the graph that it was recorded from.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag.
+    """
+    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError, yaml.YAMLError)):
+        metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
+        custom = metadata["rosbag2_bagfile_information"]["custom_data"]
+        scene = scenes.parse(custom["scene"], path.name, str(path))
+        return {custom[f"topic {topic.name}"]: topic for topic in _topics(scene)}
+
+
+def raw(path: Path) -> Iterator[tuple[str, int, bytes]]:
+    """Full name of the topic, time in ns and serialized message of everything in a bag, in the order of time.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag.
+    """
+    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError)), Reader(path) as reader:
+        for connection, time_ns, cdr in reader.messages():
+            yield connection.topic, time_ns, bytes(cdr)
+
+
+def _topics(scene: scenes.Scene) -> list[Topic]:
+    """What a bag of a scene holds."""
+    return list(dict.fromkeys((RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS)))
 
 
 def _messages(reader: Reader, name: str, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:

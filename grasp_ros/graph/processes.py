@@ -12,6 +12,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -21,6 +22,28 @@ STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
+    """Turn this process into one that runs a node: its signals and its exit status are the node's own.
+
+    Parameters
+    ----------
+    node : str
+        Name of the node, as `graph.nodes.start` knows it.
+    parameters : mapping of str to str
+        Its parameters, as `-p` takes them.
+    namespace : str
+    """
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
+    os.execve(sys.executable, [*_command(node, parameters), "-r", f"__ns:={namespace}"], environment)
+
+
+def _command(node: str, parameters: Mapping[str, str]) -> list[str]:
+    """Command line of a node."""
+    words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    # -P: a checkout in the working directory must not take the place of the package that is running.
+    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", node, "--ros-args", *words]
 
 
 class GraphError(RuntimeError):
@@ -104,11 +127,8 @@ class Graph:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         try:
             for name, parameters in settings.items():
-                words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
-                # -P: a checkout in the working directory must not take the place of the package that is running.
-                command = [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", name, "--ros-args", *words]
                 self.processes[name] = subprocess.Popen(
-                    command, env=environment, start_new_session=True, stderr=self.errors
+                    _command(name, parameters), env=environment, start_new_session=True, stderr=self.errors
                 )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -127,9 +127,15 @@ class GraspNode(Node):
         for parameter in parameter_list:
             if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
                 return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
-            whole = isinstance(parameter.value, int) and not isinstance(parameter.value, bool)
+            whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
             numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
         return super().set_parameters_atomically(numbers)
+
+    def _is_whole(self, name: str) -> bool:
+        """Whether a parameter was declared as an integer for good."""
+        if not self.has_parameter(name) or self.describe_parameter(name).dynamic_typing:
+            return False
+        return bool(self.get_parameter(name).type_ == RosParameter.Type.INTEGER)
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the graph."""
