@@ -14,6 +14,7 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError, become
+from grasp_ros.graph.running import Running
 
 
 def add_to(commands: Any) -> None:
@@ -30,6 +31,11 @@ def add_to(commands: Any) -> None:
         "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT", type=_law,
         help="a law of your own in place of the scene's: called with tick, time, x and v it returns the force",
     )
+    sub.add_argument(
+        "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",
+        help="follow the wall clock, FACTOR simulated seconds in a second (default 1), instead of lockstep",
+    )
+    sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
@@ -57,8 +63,12 @@ def _run(options: argparse.Namespace) -> int:
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
     prepare()
+    plant = {"paused": str(options.paused).lower()}
+    if options.free_running is not None:
+        Running(real_time_factor=options.free_running)  # refuses what is wrong
+        plant.update(free_running="true", real_time_factor=repr(options.free_running))
     graph = Graph(
-        scene, directory, options.accuracy, progress=True, without=options.without, laws=dict(options.laws)
+        scene, directory, options.accuracy, progress=True, without=options.without, laws=dict(options.laws), plant=plant
     )
     begin = time.monotonic()
     try:

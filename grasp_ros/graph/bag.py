@@ -253,9 +253,10 @@ class Recording:
 
     @property
     def missing(self) -> dict[str, int]:
-        """Ticks up to the last one recorded that have no message, by topic."""
+        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run."""
         ticks = int(self.tick.max(initial=-1)) + 1
-        return {name: ticks - count for name, count in self.counts.items()}
+        held = () if self.running.lockstep else [topic.name for topic in self.scene.controllers.values()]
+        return {name: ticks - count for name, count in self.counts.items() if name not in held}
 
 
 def read(path: Path) -> Recording:

@@ -13,6 +13,7 @@ from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.physics.errors import Refused
 
 REACTIONS = ("hold", "zero", "stop")
+LEAST = 1e-6  # real-time factor
 
 
 @dataclass(frozen=True)
@@ -42,12 +43,12 @@ class Running:
     reactions: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        positive = {f"{side}_timeout_s": seconds for side, seconds in self.timeouts.items()}
-        if self.timeouts or self.real_time_factor:
-            positive["real_time_factor"] = self.real_time_factor
-        for name, value in positive.items():
+        for name, value in {f"{side}_timeout_s": seconds for side, seconds in self.timeouts.items()}.items():
             if not 0.0 < value < math.inf:
                 raise Refused(f"{name}: {value!r} is not allowed; allowed: a number > 0")
+        if not (self.real_time_factor == 0.0 or LEAST <= self.real_time_factor <= 1.0 / LEAST):
+            allowed = f"{LEAST:g} to {1.0 / LEAST:g}"
+            raise Refused(f"real_time_factor: {self.real_time_factor!r} is not allowed; allowed: {allowed}")
         for side, reaction in self.reactions.items():
             if reaction not in REACTIONS:
                 raise Refused(f"{side}_on_timeout: {reaction!r} is not allowed; allowed: {', '.join(REACTIONS)}")

@@ -21,6 +21,7 @@ from grasp_ros.graph.nodes.lockstep import Lockstep
 from grasp_ros.graph.nodes.node import GraspNode, run
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.running import Running
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
@@ -83,6 +84,8 @@ class Plant(GraspNode):
         if not free:
             return Running(self._accuracy)
         factor = self.read_only("real_time_factor", 1.0, "simulated seconds in a second")
+        if not factor:
+            raise Refused("real_time_factor: 0.0 is not allowed; allowed: a number > 0, or free_running:=false")
         timeouts, reactions = {}, {}
         for topic in topics:
             side = topic.name.split("/")[0]
