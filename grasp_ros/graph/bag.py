@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -75,10 +75,10 @@ class Recorder:
         Its topics get a connection each.
     versions : mapping of str to str
         Stored in the bag's metadata.
-    names : mapping of Topic to str
-        Full names of the topics in the graph; of those of the scene without a name here, the one without a namespace.
-    running : Running
-        How the plant runs.
+    names : mapping of Topic to str, optional
+        Full names of the topics in the graph; of those without a name here, the one without a namespace.
+    running : Running, optional
+        How the plant runs; default: in lockstep.
 
     Raises
     ------
@@ -87,7 +87,8 @@ class Recorder:
     """
 
     def __init__(
-        self, path: Path, scene: scenes.Scene, versions: dict[str, str], names: Mapping[Topic, str], running: Running
+        self, path: Path, scene: scenes.Scene, versions: dict[str, str], names: Mapping[Topic, str] | None = None,
+        running: Running | None = None,
     ) -> None:
         self._path = path
         try:
@@ -99,7 +100,7 @@ class Recorder:
         self._writer.set_custom_data("scene", scene_yaml)
         for name, version in sorted(versions.items()):
             self._writer.set_custom_data(f"version {name}", version)
-        run_yaml = running.to_yaml()
+        run_yaml, names = (running or Running()).to_yaml(), names or {}
         self._writer.set_custom_data("run", run_yaml)
         self._connections: dict[str, Connection] = {}
         for topic in _topics(scene):
@@ -118,7 +119,8 @@ class Recorder:
             self._writer.write(self._connections[topic.name], time_ns, cdr)
 
     def write_tick(
-        self, time_ns: int, stamp_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float]
+        self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float],
+        stamp_ns: int | None = None,
     ) -> None:
         """Append all of one tick, and its /clock.
 
@@ -126,13 +128,14 @@ class Recorder:
         ----------
         time_ns : int, ns
             Time in the bag, which goes on where a reset puts simulated time back.
-        stamp_ns : int, ns
-            Simulated time.
         messages : iterable of Topic and bytes
             Serialized messages.
         lyapunov : sequence of float
             The monitor's own values, see `topics.LYAPUNOV_NAMES`.
+        stamp_ns : int, ns, optional
+            Simulated time, where it is another one.
         """
+        stamp_ns = time_ns if stamp_ns is None else stamp_ns
         seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
         clock = _TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
         message = _TYPES.types[CLOCK.type](clock=clock)
@@ -238,7 +241,7 @@ class Recording:
         Of the plant alone, without its controllers, unless `closed`.
         """
         if not self.closed:
-            return energy(replace(self.scene.system, laws={}), self.state)
+            return energy(self.scene.system.alone, self.state)
         scene, begins = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
         parts = []
         for begin, end in pairwise(begins):

@@ -7,7 +7,6 @@ impact forces, and what the monitor computed. Which law gave the commands is a q
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -168,7 +167,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
     for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
         if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield _Column(topic, "force", recording.outputs[topic][rows], external[:, body])
-    alone = energy(replace(system, laws={}), states)
+    alone = energy(system.alone, states)
     for name, values in (("V_plant", alone.V_c), ("mode", alone.mode.astype(float))):
         yield _Column(LYAPUNOV.name, name, recording.lyapunov[rows, LYAPUNOV_NAMES.index(name)], values)
 

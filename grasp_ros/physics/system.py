@@ -7,6 +7,7 @@ stiffness of contact, no controller and no force here, and is not simulated.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import copy
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -89,6 +90,13 @@ class System:
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
         return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZIAN] > 0.0]
+
+    @property
+    def alone(self) -> System:
+        """The same without controllers."""
+        system = copy(self)
+        system.laws = {}
+        return system
 
     @property
     def closed_loop(self) -> Array:

@@ -14,7 +14,7 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.graph import bag
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.topics import FORCE, JOINT_STATES, LYAPUNOV
+from grasp_ros.scene.topics import FORCE, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.versions import versions
 
@@ -33,12 +33,12 @@ def recorded(path: Path) -> Path:
         states = types[JOINT_STATES.type](
             header=header, name=["left", "object", "right"], position=zeros, velocity=zeros, effort=zeros
         )
+        tick = []
         for topic in scene.topics:
             message = states if topic == JOINT_STATES else types[FORCE](header=header, wrench=wrench)
-            if topic == LYAPUNOV:
-                recorder.write_lyapunov(time_ns, [0.0] * 6)
-            else:
-                recorder.write(topic, time_ns, bytes(store.serialize_cdr(message, topic.type)))
+            if topic != LYAPUNOV:
+                tick.append((topic, bytes(store.serialize_cdr(message, topic.type))))
+        recorder.write_tick(time_ns, tick, [0.0] * len(LYAPUNOV_NAMES))
     recorder.close()
     return path
 

@@ -14,7 +14,8 @@ from rclpy.parameter import Parameter
 from grasp_ros import scene as scenes
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
-from grasp_ros.graph.nodes.node import GraspNode, run
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene

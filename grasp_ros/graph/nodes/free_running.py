@@ -9,19 +9,18 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.steering import Steering
+from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.nodes.timing import Timing
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import TIMING
-
-if TYPE_CHECKING:
-    from grasp_ros.graph.nodes.plant import Plant
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
 BURST_SECONDS = 0.05  # of catching up at a time, so that commands and services get their turn
@@ -51,7 +50,8 @@ class FreeRunning:
 
     Parameters
     ----------
-    plant : Plant
+    plant : SteppedNode
+    steering : Steering
     running : Running
         Real-time factor, timeouts and reactions.
 
@@ -61,8 +61,8 @@ class FreeRunning:
         None: it waits for no controller.
     """
 
-    def __init__(self, plant: Plant, running: Running) -> None:
-        self._plant, self._running = plant, running
+    def __init__(self, plant: SteppedNode, steering: Steering, running: Running) -> None:
+        self._plant, self._steering, self._running = plant, steering, running
         self.topics: list[Any] = []
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
@@ -109,14 +109,14 @@ class FreeRunning:
         plant = self._plant
         if plant.finished or math.isnan(self._anchor):
             return
-        if plant.steering.reset_due:
+        if self._steering.reset_due:
             self._held = {side: Held() for side in self._sides}
-            plant.steering.reset_done()
+            self._steering.reset_done()
             self._set_anchor()
-        if plant.steering.steps:  # asked for: not with the clock
-            while not plant.finished and plant.steering.steps and plant.steering.go_on():
+        if self._steering.steps:  # asked for: not with the clock
+            while not plant.finished and self._steering.steps and self._steering.go_on():
                 self._step()
-        if plant.steering.stands:
+        if self._steering.stands:
             self._set_anchor()
             return
         self._catch_up()

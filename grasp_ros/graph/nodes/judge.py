@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -37,7 +36,7 @@ class Judge:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._plant = replace(scene.system, laws={})
+        self._plant = scene.system.alone
         self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
         self._acting = dict.fromkeys(SIDES, -1)  # time in ns of the last announcement that acts
         self._known: set[str] = set()

@@ -8,17 +8,16 @@ from __future__ import annotations
 import math
 import time
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import UNKNOWN
+from grasp_ros.graph.nodes.steering import Steering
+from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW
-
-if TYPE_CHECKING:
-    from grasp_ros.graph.nodes.plant import Plant
 
 PATIENCE_SECONDS = 5.0
 NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
@@ -30,7 +29,8 @@ class Lockstep:
 
     Parameters
     ----------
-    plant : Plant
+    plant : SteppedNode
+    steering : Steering
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class Lockstep:
         Where the commands come from.
     """
 
-    def __init__(self, plant: Plant) -> None:
-        self._plant = plant
+    def __init__(self, plant: SteppedNode, steering: Steering) -> None:
+        self._plant, self._steering = plant, steering
         self._commands: dict[int, float] = {}
         self._recorded = -1  # last tick that the monitor has complete
         self._refused = False  # a second source has come
@@ -68,7 +68,7 @@ class Lockstep:
     def report(self) -> None:
         """Say who is waited for, when a tick takes longer than a report."""
         plant = self._plant
-        waits = plant.started and not plant.finished and plant.tick == self._seen and not plant.steering.stands
+        waits = plant.started and not plant.finished and plant.tick == self._seen and not self._steering.stands
         self._seen = plant.tick
         silent = [topic.name for topic, side in zip(self.topics, plant.scene.system.laws, strict=True)
                   if side not in self._commands]
@@ -96,9 +96,9 @@ class Lockstep:
     def advance(self) -> None:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""
         plant = self._plant
-        resetting = plant.steering.reset_due
+        resetting = self._steering.reset_due
         if self._timer is not None:  # which would look ten thousand times a second at a plant that stands
-            (self._timer.cancel if plant.steering.stands and not resetting else self._timer.reset)()
+            (self._timer.cancel if self._steering.stands and not resetting else self._timer.reset)()
         if self._refused or not plant.started or plant.finished or len(self._commands) < len(self.topics):
             return
         if plant.monitored and plant.tick - self._recorded > (0 if resetting or plant.at_end else WINDOW):
@@ -109,8 +109,8 @@ class Lockstep:
         if resetting:
             self._commands.clear()
             self._recorded = -1
-            plant.steering.reset_done()
-        elif plant.steering.go_on():
+            self._steering.reset_done()
+        elif self._steering.go_on():
             if plant.at_end:
                 plant.finish()
             else:

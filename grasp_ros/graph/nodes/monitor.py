@@ -17,7 +17,8 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import Recorder
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.judge import Announcement, Judge
-from grasp_ros.graph.nodes.node import GraspNode, run
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.graph.nodes.ticks import Tick, Ticks
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
@@ -155,7 +156,7 @@ class Monitor(GraspNode):
         self.count("messages without a state", tick.dropped)
         begun = [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)]
         values = self._evaluate(tick)
-        self._recorder.write_tick(self._bag_ns, tick.time_ns, [*begun, *tick.found.items()], values)
+        self._recorder.write_tick(self._bag_ns, [*begun, *tick.found.items()], values, tick.time_ns)
         self._values.publish(messages.lyapunov(tick.time_ns, values))
         self.finished = bool(self.exit_code) or tick.time_ns == self._scene.ticks * self._scene.period_ns
 

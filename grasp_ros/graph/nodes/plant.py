@@ -17,9 +17,10 @@ from grasp_ros.exact.integrator import ACCURACY, Integrator, Status, compile_ker
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.free_running import FreeRunning
+from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.lockstep import Lockstep
-from grasp_ros.graph.nodes.node import GraspNode, run
 from grasp_ros.graph.nodes.steering import Steering
+from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
@@ -27,21 +28,13 @@ from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
 
-class Plant(GraspNode):
+class Plant(SteppedNode):
     """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, those of its loop, and those of the scene.
 
     Parameters
     ----------
     options
         As in `rclpy.node.Node`.
-
-    Attributes
-    ----------
-    scene : Scene
-    monitored : bool
-        Whether it waits for a monitor.
-    resets : int
-        How often time and state were put back.
     """
 
     why_read_only = "it describes what is simulated, which does not change in a run; set it in the scene or with -p"
@@ -53,7 +46,7 @@ class Plant(GraspNode):
         self.monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
         progress = self.read_only("progress", False, "show a progress bar on the terminal")
         free = self.read_only("free_running", False, "follow the wall clock instead of waiting for the commands")
-        self.steering = Steering(self)
+        steering = Steering(self)
         scene = scenes.load(name)
         running = self._read_running(free, list(scene.controllers.values()))
         self.scene = scene.changed(self.declare_scene(scene, "plant"))
@@ -73,7 +66,7 @@ class Plant(GraspNode):
         self._descriptions = [self.publisher(RUN), self.publisher(SCENE)]
         for publisher, text in zip(self._descriptions, (running.to_yaml(), self.scene.to_yaml()), strict=True):
             publisher.publish(messages.text(text))
-        self.loop = FreeRunning(self, running) if free else Lockstep(self)
+        self.loop = FreeRunning(self, steering, running) if free else Lockstep(self, steering)
         self._unwatched = 0  # reports in a row without a monitor
         if progress:
             self.wall_timer(0.1, self._show)
@@ -107,11 +100,6 @@ class Plant(GraspNode):
     def started(self) -> bool:
         """Whether the first state has been published."""
         return not math.isnan(self._begin)
-
-    @property
-    def at_end(self) -> bool:
-        """Whether the horizon of the scene has been reached."""
-        return self._plant.tick == self.scene.ticks
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant and that the monitor is still there."""
@@ -157,6 +145,10 @@ class Plant(GraspNode):
         for publisher, value in self._forces:
             publisher.publish(messages.wrench(time_ns, value(self.scene.system, tick, state)))
         self._states.publish(messages.joint_state(time_ns, self.scene.system.present, state, self._plant.effort))
+
+    def advance(self) -> None:
+        """Do what its loop finds due."""
+        self.loop.advance()
 
     def step(self, forces: Array) -> None:
         """Advance one period with the answers (3,) in N by body to the current state; publish the next."""

@@ -10,7 +10,8 @@ from typing import Any
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.node import GraspNode, run
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 

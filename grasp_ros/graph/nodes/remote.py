@@ -12,7 +12,8 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
-from grasp_ros.graph.nodes.node import GraspNode, run
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import GraspNode
 
 PATIENCE_SECONDS = 5.0
 LOOK_SECONDS = 0.005

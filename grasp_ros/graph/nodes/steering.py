@@ -7,13 +7,11 @@ of std_srvs. A service that finds the plant in the wrong state does nothing and 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from std_srvs.srv import Trigger
 
-if TYPE_CHECKING:
-    from grasp_ros.graph.nodes.plant import Plant
+from grasp_ros.graph.nodes.stepped import SteppedNode
 
 MOST_STEPS = 10**9
 
@@ -23,7 +21,7 @@ class Steering:
 
     Parameters
     ----------
-    plant : Plant
+    plant : SteppedNode
 
     Attributes
     ----------
@@ -33,7 +31,7 @@ class Steering:
         Whether the plant is to be put back once its current state has been answered.
     """
 
-    def __init__(self, plant: Plant) -> None:
+    def __init__(self, plant: SteppedNode) -> None:
         self._plant = plant
         self._paused = plant.read_only("paused", False, "begin paused, at the first state")
         self.steps = 0
@@ -77,7 +75,7 @@ class Steering:
         if self._paused is paused:
             return _answer(response, False, f"already {word} at tick {self._plant.tick}")
         self._paused, self.steps = paused, 0
-        self._plant.loop.advance()
+        self._plant.advance()
         return _answer(response, True, f"{word} at tick {self._plant.tick}")
 
     def _step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -90,7 +88,7 @@ class Steering:
         if wanted > left:
             return _answer(response, False, f"steps: {wanted} is not allowed; allowed: at most {left}")
         self.steps, goal = wanted, plant.tick + wanted
-        plant.loop.advance()
+        plant.advance()
         return _answer(response, True, f"steps to tick {goal}")
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
@@ -98,7 +96,7 @@ class Steering:
             return _answer(response, False, "a reset is already on its way")
         self.reset_due = True
         number = self._plant.resets + 1
-        self._plant.loop.advance()
+        self._plant.advance()
         return _answer(response, True, f"reset number {number}, as soon as tick {self._plant.tick} is answered")
 
     def _status(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
