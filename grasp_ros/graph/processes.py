@@ -36,14 +36,14 @@ def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> No
     namespace : str
     """
     environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
-    os.execve(sys.executable, [*_command(node, parameters), "-r", f"__ns:={namespace}"], environment)
+    os.execve(sys.executable, [*_command([node], parameters), "-r", f"__ns:={namespace}"], environment)
 
 
-def _command(node: str, parameters: Mapping[str, str]) -> list[str]:
-    """Command line of a node."""
+def _command(nodes: Sequence[str], parameters: Mapping[str, str]) -> list[str]:
+    """Command line of a node, or of "together" and the nodes of its process."""
     words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
     # -P: a checkout in the working directory must not take the place of the package that is running.
-    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", node, "--ros-args", *words]
+    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", *nodes, "--ros-args", *words]
 
 
 class GraphError(RuntimeError):
@@ -70,6 +70,8 @@ class Graph:
         Laws of the user's own, "module:object", by controller.
     plant : mapping of str to str
         Further parameters of the plant.
+    one_process : bool
+        Whether all nodes run in one process and one thread.
 
     """
 
@@ -81,6 +83,7 @@ class Graph:
     without: Sequence[str] = ()
     laws: Mapping[str, str] = field(default_factory=dict)
     plant: Mapping[str, str] = field(default_factory=dict)
+    one_process: bool = False
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     @property
@@ -126,12 +129,19 @@ class Graph:
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         try:
-            for name, parameters in settings.items():
+            for name, command in self._commands(settings).items():
                 self.processes[name] = subprocess.Popen(
-                    _command(name, parameters), env=environment, start_new_session=True, stderr=self.errors
+                    command, env=environment, start_new_session=True, stderr=self.errors
                 )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
+        """Command lines by the names of the processes."""
+        if not self.one_process:
+            return {name: _command([name], parameters) for name, parameters in settings.items()}
+        together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
+        return {"graph": _command(["together", *settings], together)}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.
@@ -143,8 +153,9 @@ class Graph:
             together.
         """
         deadline = math.inf
-        while not received and (running := [n for n in ("plant", "monitor") if self.processes[n].poll() is None]):
-            if len(running) == 1:
+        awaited = [name for name in self.processes if not name.endswith("controller")]
+        while not received and (running := [name for name in awaited if self.processes[name].poll() is None]):
+            if len(running) < len(awaited):
                 deadline = min(deadline, time.monotonic() + TOGETHER_SECONDS)
             if time.monotonic() > deadline:
                 raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
