@@ -12,12 +12,13 @@ import pytest
 
 from grasp_ros.cli.main import main
 
-os.environ["ROS_DOMAIN_ID"] = str(1 + os.getpid() % 100)
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))  # each has domains of its own
+os.environ["ROS_DOMAIN_ID"] = str(1 + 50 * (WORKER % 2) + os.getpid() % 50)
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 
 RUN_SECONDS = 90.0
-SECOND_DOMAIN = "124"  # beside those of this test run and of lonely nodes
+SECOND_DOMAIN = str(124 + WORKER)  # beside those of this test run and of lonely nodes
 
 
 def grasp(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

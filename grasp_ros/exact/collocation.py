@@ -16,8 +16,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
+from grasp_ros.exact.elimination import eliminate, subtract
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach
@@ -49,6 +48,7 @@ SUMS = X_NODES + STAGES  # of each side, a row of the object's matrix
 WORKSPACE = int(SUMS + 2 * (STAGES + 1))
 ROW = int(STAGES) + 1  # one polynomial
 CLOSE = 1e-7  # correction after which Newton's next one is below rounding
+SHRINKS = 0.1  # part of a correction that the next one of Newton's has, unless both are rounding
 MAX_CORRECTIONS = 10
 
 
@@ -86,6 +86,19 @@ def motion_of(plant: Plant, state: State, side: Body, h: float) -> Approach:
     return Approach(sign, 1.0, 0.0, d, u, hertzian, 1.0, loss, False)
 
 
+@inlined
+def penetration_at(f: Array, side: Body, pair: Approach, h: float, j: int) -> float:
+    """u of a pair at a node of a step of h s, m."""
+    return pair.u + h * pair.rate * times(INTEGRAL, j, f, E_NODES + side * STAGES, pair.offset)
+
+
+@inlined
+def impact_at(f: Array, side: Body, pair: Approach, h: float, j: int) -> float:
+    """Impact force of a pair at a node, N."""
+    u = max(penetration_at(f, side, pair, h, j), 0.0)
+    return elastic_force(pair.hertzian, u) * (pair.rest + pair.share * f[E_NODES + side * STAGES + j])
+
+
 @kernel
 def linearise_object(f: Array, body: Array, start: Begin) -> None:
     """The object's equation at the nodes without impacts: positions, matrix and right-hand side."""
@@ -109,7 +122,7 @@ def linearise_side(f: Array, side: Body, pair: Approach, body: Array, start: Beg
     for j in range(STAGES):
         at, row = side * STAGES + j, (side * STAGES + j) * WIDTH
         e, v, x = f[E_NODES + at], f[V_NODES + j], f[X_NODES + j]
-        u = pair.u + h * pair.rate * times(INTEGRAL, j, f, e_nodes, pair.offset)
+        u = penetration_at(f, side, pair, h, j)
         root = math.sqrt(max(u, 0.0))
         elastic, factor = pair.hertzian * (max(u, 0.0) * root), pair.rest + pair.share * e
         by_e, by_u = elastic * pair.share, 1.5 * pair.hertzian * root * factor
@@ -125,40 +138,6 @@ def linearise_side(f: Array, side: Body, pair: Approach, body: Array, start: Beg
         f[row + j] += c * pair.rate + by_e
         f[row + STAGES + j] += pair.sign * c
         f[row + 2 * STAGES] = own - elastic * factor
-
-
-@inlined
-def subtract(f: Array, to: int, what: int, factor: float, count: int) -> None:
-    """Take a multiple of neighbouring numbers from others; unsigned indices make it vector instructions."""
-    a, b = np.uint64(to), np.uint64(what)
-    for i in range(np.uint64(count)):
-        f[a + i] -= factor * f[b + i]
-
-
-@kernel
-def eliminate(f: Array, at: int, width: int) -> bool:
-    """Solve STAGES equations in place by Gauss with row pivots; the solutions stand behind the matrix."""
-    for k in range(STAGES):
-        top, pivot = at + k * width, k
-        for j in range(k + 1, STAGES):
-            if abs(f[at + j * width + k]) > abs(f[at + pivot * width + k]):
-                pivot = j
-        other = at + pivot * width
-        if not abs(f[other + k]) > 0.0:
-            return False
-        for i in range(k, width):
-            f[top + i], f[other + i] = f[other + i], f[top + i]
-        for j in range(k + 1, STAGES):
-            row = at + j * width
-            subtract(f, row + k + 1, top + k + 1, f[row + k] / f[top + k], width - k - 1)
-    for k in range(STAGES - 1, -1, -1):
-        top = at + k * width
-        for i in range(STAGES, width):
-            f[top + i] /= f[top + k]
-        for j in range(k):
-            row = at + j * width
-            subtract(f, row + STAGES, top + STAGES, f[row + k], width - STAGES)
-    return True
 
 
 @kernel
@@ -182,17 +161,22 @@ def sum_side(f: Array, side: Body, pair: Approach, body: Array, h: float, j: int
 
 
 @kernel
-def correct_side(f: Array, side: Body, pair: Approach, scale: float) -> float:
-    """Move the nodes of a side by Newton's correction; returns its size, relative."""
-    largest, size = 0.0, 0.0
+def correct_side(f: Array, side: Body, pair: Approach, start: Begin) -> tuple[float, float]:
+    """Move the nodes of a side by Newton's correction; returns its size, relative, and that of what is not linear."""
+    largest, size, bent = 0.0, 0.0, 0.0
     for j in range(STAGES):
-        row = (side * STAGES + j) * WIDTH + STAGES
+        at, row = side * STAGES + j, (side * STAGES + j) * WIDTH + STAGES
         step = f[row + STAGES]
         for i in range(STAGES):
             step -= f[row + i] * f[MATRIX + i * (STAGES + 1) + STAGES]
-        f[E_NODES + side * STAGES + j] += step
-        largest, size = max(largest, abs(f[E_NODES + side * STAGES + j])), size + abs(step)  # a sum keeps nan
-    return size / (largest + CLOSE * (scale / pair.rate) if pair.stiff else scale)
+        f[E_NODES + at] += step
+        largest, size = max(largest, abs(f[E_NODES + at])), size + abs(step)  # a sum keeps nan
+        bent = max(bent, 1.0 / f[U_NODES + at])
+    if pair.hertzian == 0.0:
+        return size / start.scale, 0.0
+    size_of_force = pair.rest + pair.share * largest
+    bent = size * max(start.h * pair.rate * bent, pair.share / size_of_force)
+    return size / (largest + CLOSE * (start.scale / pair.rate) if pair.stiff else start.scale), bent
 
 
 @kernel
@@ -222,6 +206,7 @@ def collocate(f: Array, bodies: Array, left: Approach, right: Approach, start: B
     for j in range(STAGES):
         f[V_NODES + j] = 0.0
         f[E_NODES + j], f[E_NODES + STAGES + j] = first_guess(left, start.h), first_guess(right, start.h)
+    before = math.inf
     for _ in range(MAX_CORRECTIONS):
         linearise_object(f, bodies[OBJECT], start)
         linearise_side(f, LEFT, left, bodies[LEFT], start)
@@ -239,9 +224,12 @@ def collocate(f: Array, bodies: Array, left: Approach, right: Approach, start: B
             step = f[MATRIX + j * (STAGES + 1) + STAGES]
             f[V_NODES + j] += step
             size += abs(step) / start.scale
-        size += correct_side(f, LEFT, left, start.scale) + correct_side(f, RIGHT, right, start.scale)
-        if size <= CLOSE:
+        size_l, bent_l = correct_side(f, LEFT, left, start)
+        size_r, bent_r = correct_side(f, RIGHT, right, start)
+        size, bent = size + (size_l + size_r), bent_l + bent_r
+        if size <= CLOSE and (bent <= CLOSE or bent >= SHRINKS * before):
             return True
+        before = bent
         if not size < math.inf:
             return False
     return False

@@ -10,20 +10,34 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.collocation import E_NODES, SUMS, V_NODES, Approach, Begin, collocate, motion_of
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.collocation import (
+    E_NODES,
+    SUMS,
+    V_NODES,
+    Approach,
+    Begin,
+    collocate,
+    impact_at,
+    motion_of,
+    penetration_at,
+)
+from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, reduced_mass
-from grasp_ros.exact.radau import DERIVATIVE, FIRST, STAGES, TO_LEGENDRE, TO_POWERS, times
-from grasp_ros.exact.records import Output, Plant, Settings, State, Tables
+from grasp_ros.exact.radau import DERIVATIVE, FIRST, INTEGRAL, NODES, STAGES, TO_LEGENDRE, TO_POWERS, times
+from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.scales import STIFF, relaxation
 from grasp_ros.physics.layout import (
     CHECK,
+    DAMPING,
     DISSIPATION,
     EPS,
+    FORCE,
     HERTZIAN,
     LANES,
     LEFT,
+    MASS,
     RIGHT,
+    STIFFNESS,
     TIME,
     U_L,
     V_L,
@@ -75,32 +89,53 @@ def expand_row(tables: Tables) -> tuple[float, float]:
 
 
 @kernel
-def write_lane(tables: Tables, lane: int, begin: float, h: float) -> float:
-    """Write the polynomial of a lane from its derivatives at the nodes, in `tables.row`; returns their error."""
+def write_lane(tables: Tables, lane: int, begin: float, h: float, rate: float) -> float:
+    """Write the polynomial of a lane from its derivatives at the nodes, in `tables.row`; returns their error.
+
+    It is that of the last coefficients, and of the first one beside the rate that the step begins with: a relaxation
+    so fast that no node sees it.
+    """
     c = tables.c
     last, _ = expand_row(tables)
     c[lane] = begin
     for k in range(STAGES):
         c[LANES * (k + 1) + lane] = h / (k + 1) * tables.row[k]
-    return last
+    return max(last, abs(tables.row[0] - rate))
+
+
+@inlined
+def acceleration(f: Array, body: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
+    """Acceleration of an arm at a node, m/s^2.
+
+    It follows from the forces, so that a slow arm keeps digits that v_o and u' do not have; where the pair is stiff,
+    it is the impact force that has none.
+    """
+    h, nodes = start.h, E_NODES + side * STAGES
+    if pair.stiff:
+        return (times(DERIVATIVE, j, f, V_NODES, 0.0) + pair.sign * (
+            pair.rate * times(DERIVATIVE, j, f, nodes, pair.e))) / h
+    v = (start.v + f[V_NODES + j]) + pair.sign * (pair.rate * (f[nodes + j] - pair.offset))
+    x_o = start.x + h * (NODES[j] * start.v + times(INTEGRAL, j, f, V_NODES, 0.0))
+    x = x_o + pair.sign * penetration_at(f, side, pair, h, j)
+    return (body[FORCE] - (body[DAMPING] * v + body[STIFFNESS] * x) - pair.sign * impact_at(f, side, pair, h, j)
+            ) / body[MASS]
 
 
 @kernel
-def write_side(tables: Tables, state: State, side: Body, pair: Approach, start: Begin) -> float:
+def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, start: Begin) -> float:
     """Write the lanes of an arm from the nodes; returns the error of u', relative to what is allowed of 1."""
     f, row, h = tables.f, tables.row, start.h
     nodes, largest = E_NODES + side * STAGES, 0.0
     v = V_L if side == LEFT else V_R
     for j in range(STAGES):
-        row[j] = times(DERIVATIVE, j, f, V_NODES, 0.0) / h + pair.sign * (
-            pair.rate * times(DERIVATIVE, j, f, nodes, pair.e) / h)
-    write_lane(tables, v, state.y[v], h)
+        row[j] = acceleration(f, plant.bodies[side], side, pair, start, j)
+    write_lane(tables, v, state.y[v], h, 0.0)
     for j in range(STAGES):
         row[j] = pair.rate * (f[nodes + j] - pair.offset)
         largest = max(largest, abs(f[nodes + j]))
-    if pair.stiff and not f[nodes] > 0.0:  # it clamps before the first node
+    if pair.hertzian > 0.0 and not pair.rest + pair.share * f[nodes] > 0.0:  # it clamps before the first node
         return math.inf
-    last = write_lane(tables, U_L + side, pair.u, h)
+    last = write_lane(tables, U_L + side, pair.u, h, pair.rate * (pair.e - pair.offset))
     if pair.hertzian == 0.0 or not pair.u > 0.0:
         return last / start.scale
     moving = max(abs(state.y[V_L]), abs(state.y[V_R]), abs(state.y[V_O]))
@@ -109,18 +144,19 @@ def write_side(tables: Tables, state: State, side: Body, pair: Approach, start: 
 
 
 @kernel
-def write_lanes(tables: Tables, state: State, left: Approach, right: Approach, start: Begin) -> float:
+def write_lanes(tables: Tables, plant: Plant, state: State, left: Approach, right: Approach, start: Begin) -> float:
     """Write the polynomials of a step, in t / h, from its nodes; returns their largest error, relative."""
     c, f, row, h = tables.c, tables.f, tables.row, start.h
     for k in range(STAGES + 1):
         c[LANES * k + TIME] = c[LANES * k + CHECK] = 0.0
     for j in range(STAGES):
         row[j] = times(DERIVATIVE, j, f, V_NODES, 0.0) / h
-    write_lane(tables, np.int64(V_O), start.v, h)
+    write_lane(tables, np.int64(V_O), start.v, h, 0.0)
     for j in range(STAGES):
         row[j] = start.v + f[V_NODES + j]
-    error = write_lane(tables, np.int64(X_O), start.x, h) / start.scale
-    return max(error, write_side(tables, state, LEFT, left, start), write_side(tables, state, RIGHT, right, start))
+    error = write_lane(tables, np.int64(X_O), start.x, h, start.v) / start.scale
+    error = max(error, write_side(tables, plant, state, LEFT, left, start))
+    return max(error, write_side(tables, plant, state, RIGHT, right, start))
 
 
 @kernel
@@ -156,7 +192,7 @@ def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings
         left, right = motion_of(plant, state, LEFT, h), motion_of(plant, state, RIGHT, h)
         error = math.inf
         if collocate(tables.f, plant.bodies, left, right, start):
-            error = write_lanes(tables, state, left, right, start) / allowed
+            error = write_lanes(tables, plant, state, left, right, start) / allowed
         if error <= 1.0:
             return h
         out.work[Work.REJECTED_STEPS] += 1

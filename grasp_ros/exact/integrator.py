@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -12,12 +11,12 @@ import numpy as np
 from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
-from grasp_ros.exact.records import Tables
-from grasp_ros.exact.series import new_tables, series_order
+from grasp_ros.exact.records import Loop, new_place
 from grasp_ros.exact.squeezed import creep
+from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import EVENT_TIME, FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Transition, Work
+from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Place, Transition, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -25,7 +24,6 @@ ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes ampl
 FINEST, COARSEST = 1e-16, 1e-3
 MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for about a minute
 BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
-EVENT_ROWS = 1024
 
 
 class Status(Enum):
@@ -74,15 +72,6 @@ _STATUS = {
 }
 
 
-@cache
-def _workspace(accuracy: float) -> tuple[Tables, Array]:
-    """Tables and rows for events that the kernels write to before they read; no call leaves anything there.
-
-    The kernels hold the interpreter's lock, so that integrators may share them.
-    """
-    return new_tables(series_order(accuracy)), np.empty((EVENT_ROWS, 5))
-
-
 class Integrator:
     """Integrates one system from its initial state, over intervals of any length.
 
@@ -118,7 +107,7 @@ class Integrator:
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._accuracy = system, accuracy
         self._max_events, self._max_work = max_events, max_work
-        self._time = 0.0
+        self._time, self._clock = 0.0, np.zeros(3)
         self._given = system.closed_loop if continuous else system.bodies.copy()
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
@@ -127,7 +116,6 @@ class Integrator:
         self._coulomb = float(system.coulomb)
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
-        self._tables, self._event_rows = _workspace(accuracy)
         self._events: list[Array] = []
         self._event_count = 0
 
@@ -193,34 +181,61 @@ class Integrator:
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else np.ascontiguousarray(grid, dtype=float)
-        out = np.empty((len(times), 6))
-        clock, filled = np.zeros(2), np.zeros(len(Filled), dtype=np.int64)
-        door = advance
-        while self.status is Status.DONE:
-            allowed = self._event_rows[: self._max_events - self._event_count + SPARE]
-            outcome = door(
-                *self._tables[:-1], *self._tables.start, self._given, self._bodies, self._pairs, self._coulomb,
-                self._y, self._mode, clock,
-                duration, self._accuracy, min(self._spent + BREATH, self._max_work), times, out, allowed, filled,
-                self.work,
-            )
-            if count := int(filled[_EVENTS]):
-                rows = self._event_rows[:count].copy()
-                rows[:, EVENT_TIME] += start
-                self._events.append(rows)
-                self._event_count += len(rows)
-                filled[_EVENTS] = 0
-            door = creep if outcome == Outcome.SQUEEZED else advance
-            if outcome in _GOES_ON:
-                continue
-            if outcome == Outcome.EVENTS_FULL:
-                if self._event_count > self._max_events:
-                    self.status = Status.EVENT_BUDGET
-            elif outcome != Outcome.WORK_USED or self._spent >= self._max_work:
-                self.status = _STATUS[Outcome(outcome)]
-                break
-        self._time = start + float(clock[0] + clock[1])
+        loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
+        return self.run(loop, times)
+
+    def run(self, loop: Loop, grid: Array) -> Array:
+        """Integrate over the intervals of a loop.
+
+        Parameters
+        ----------
+        loop : Loop
+            What drives the run; `Place.INTERVAL` in its `place` counts the intervals done.
+        grid : array (n,), s
+            Output times, ascending within each interval and counted from its beginning.
+
+        Returns
+        -------
+        array (n, 6)
+            States at the grid; only the rows reached, if `status` is not DONE afterwards, or if a controller gave no
+            number: then the intervals done are not all of them.
+        """
+        out, filled = np.empty((len(grid), 6)), np.zeros(len(Filled), dtype=np.int64)
+        clock, outcome = self._clock, Outcome.GO_ON
+        with workspace(self._accuracy) as (tables, event_rows):
+            while self.status is Status.DONE:
+                allowed = event_rows[: self._max_events - self._event_count + SPARE]
+                most = min(self._spent + BREATH, self._max_work)
+                own = (*tables[:-1], *tables.start, self._given, self._bodies, self._pairs, self._coulomb,
+                       self._y, self._mode, clock)
+                if outcome == Outcome.SQUEEZED:
+                    k = int(loop.place[Place.INTERVAL])
+                    outcome = creep(*own, loop.lengths[k], self._accuracy, most, grid[: loop.bounds[k + 1]], out,
+                                    allowed, filled, self.work)
+                else:
+                    outcome = advance(*own, self._accuracy, most, grid, out, allowed, filled, self.work,
+                                      self._own_forces, *loop)
+                if count := int(filled[_EVENTS]):
+                    self._events.append(event_rows[:count].copy())
+                    self._event_count += count
+                    filled[_EVENTS] = 0
+                if outcome == Outcome.NO_COMMAND or self._ends(outcome):
+                    break
+        self._time = float(clock[2] + (clock[0] + clock[1]))
         return out[: filled[_OUTPUTS]]
+
+    def _ends(self, outcome: int) -> bool:
+        """Whether a run is over, and its status."""
+        if outcome in _GOES_ON:
+            return False
+        if outcome == Outcome.EVENTS_FULL:
+            if self._event_count > self._max_events:
+                self.status = Status.EVENT_BUDGET
+            return False
+        if outcome == Outcome.WORK_USED and self._spent < self._max_work:
+            return False
+        self.status = _STATUS[Outcome(outcome)]
+        return True
 
 
 @with_deep_stack

@@ -86,7 +86,7 @@ def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> An
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
-        return numba.njit(cache=not inline, error_model="numpy", _nrt=counts, forceinline=inline)(function)
+        return numba.njit(cache=not inline, error_model="numpy", nogil=True, _nrt=counts, forceinline=inline)(function)
     finally:
         numba.config.CACHE_DIR = before
 

@@ -30,7 +30,7 @@ def record(state: State, body: Body, kind: Transition, u: float, d: float, out: 
     n = out.filled[Filled.EVENTS]
     out.filled[Filled.EVENTS] = n + 1
     row = out.events[n]
-    row[EVENT_TIME] = state.clock[0] + state.clock[1]
+    row[EVENT_TIME] = (state.clock[0] + state.clock[1]) + state.clock[2]
     row[EVENT_BODY] = body.value
     row[EVENT_KIND] = kind.value
     row[EVENT_U] = u

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.layout import Slide, Transition
+from grasp_ros.physics.control import Column
+from grasp_ros.physics.layout import Place, Slide, Transition
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -34,7 +35,7 @@ class State(NamedTuple):
 
     y: Array  # (8,) x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r; m and m/s
     mode: Integers  # (3,) Pair, Pair, Slide; frozen within a segment
-    clock: Array  # (2,) time since the begin of the interval, and what its roundings left out, s
+    clock: Array  # (3,) time since the begin of the interval, what its roundings left out, and that begin, s
 
 
 class Settings(NamedTuple):
@@ -54,6 +55,29 @@ class Output(NamedTuple):
     events: Array  # (m, 5) time s, body, Transition, u m, u' m/s
     filled: Integers  # (2,) rows in use, see `layout.Filled`
     work: Integers  # (4,) counters, see `layout.Work`
+
+
+class Loop(NamedTuple):
+    """What drives a run through n intervals of constant inputs, and what it was; see `loop`."""
+
+    lengths: Array  # (n,) s
+    begins: Array  # (n,) s, on the clock of the events
+    bounds: Integers  # (n + 1,) output times before each, counted from the first
+    place: Integers  # (4,) see `layout.Place`; updated in place
+    inputs: Array = np.zeros((0, 3))  # (n, 3) forces that acted, N by body; (0, 3): those of the plant act on
+    external: Array = np.zeros((0, 3))  # (n, 3) external forces, N by body; (0, 3): none
+    answers: Array = np.zeros((0, 3))  # (n, 3) commands, N by body; (0, 3): no controllers
+    callee: Integers = np.zeros(2, dtype=np.int64)  # (2,) by side, an `Answer` or the address of a function
+    laws: Array = np.zeros((2, len(Column)))  # (2, k) rows of `control` by side
+    normals: Array = np.zeros((2, 1, 2))  # (2, n, 2) standard normal numbers by side; (2, 1, 2): no noise
+    waiting: Array = np.zeros((0, 3))  # (delay, 3) commands on their way, N by body: a ring; updated in place
+
+
+def new_place(tick: int = 0) -> Integers:
+    """Where a loop begins; the tick is that of its first interval."""
+    place = np.zeros(len(Place), dtype=np.int64)
+    place[Place.TICK] = tick
+    return place
 
 
 class Start(NamedTuple):

@@ -11,18 +11,17 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.clock import tick, until
-from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, motion_of
+from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, motion_of
 from grasp_ros.exact.contact import free_flight, place_free, write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.friction import slide_in_contact, slip_candidate
-from grasp_ros.exact.impact import elastic_force
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import is_clamped, keep_resting
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import values
-from grasp_ros.exact.radau import FIRST, INTEGRAL, STAGES, times
+from grasp_ros.exact.radau import FIRST, STAGES
 from grasp_ros.exact.records import (
     Array,
     Candidate,
@@ -101,14 +100,6 @@ def deliver(tables: Tables, h: float, t: float, flies: tuple[bool, bool], free: 
         place_free(flies[0], flies[1], free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
-
-
-@kernel
-def impact_at(f: Array, side: Body, pair: Approach, h: float, j: int) -> float:
-    """Impact force of a pair at a node, N."""
-    at = E_NODES + side * STAGES
-    u = max(pair.u + h * pair.rate * times(INTEGRAL, j, f, at, pair.offset), 0.0)
-    return elastic_force(pair.hertzian, u) * (pair.rest + pair.share * f[at + j])
 
 
 @kernel

@@ -111,7 +111,7 @@ def is_quiet(start: Start, plant: Plant, state: State, n: int, left: int, right:
             return False
     if mode[OBJECT] == Slide.STUCK:
         total = 0.0
-        for k in range(n, -1, -1):
+        for k in range(n - POWERS, -1, -1):  # of the last orders no force is known
             total = total * h + plant.pairs[LEFT, HERTZIAN] * abs(force_of(start.f, n, k, LEFT, left))
             total += plant.pairs[RIGHT, HERTZIAN] * abs(force_of(start.f, n, k, RIGHT, right))
         return total <= plant.coulomb - abs(plant.given[OBJECT, FORCE])

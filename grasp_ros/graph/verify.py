@@ -7,6 +7,7 @@ impact forces, and what the monitor computed. Which law gave the commands is a q
 from __future__ import annotations
 
 from collections.abc import Iterator
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,9 @@ from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
+from grasp_ros.simulation.sampled_plant import SampledPlant
 
 STATES = ("left position", "left velocity", "object position", "object velocity", "right position", "right velocity")
 
@@ -138,17 +140,16 @@ def _scene_ticks(recording: Recording) -> np.ndarray:
 
 def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:
     """States (k, 6) that follow from the inputs, as far as the integrator comes, and why it stopped."""
-    scene = recording.scene
-    period = scene.period_ns / NANOSECONDS
-    integrator = Integrator(scene.system, continuous=False, accuracy=recording.running.accuracy)
-    inputs, states = recording.inputs[rows], [integrator.state]
-    for tick in range(len(rows) - 1):
-        integrator.set_input(inputs[tick])
-        integrator.advance(period, None, scene.time_of(tick))
-        if integrator.status is not Status.DONE:
-            return np.array(states), integrator.stop
-        states.append(integrator.state)
-    return np.array(states), ""
+    scene, system = recording.scene, copy(recording.scene.system)
+    system.delay = 0  # what is recorded are the forces that acted
+    integrator = Integrator(system, continuous=False, accuracy=recording.running.accuracy)
+    plant = SampledPlant(system, scene.period_ns, integrator)
+    acted = np.zeros((len(rows) - 1, 3))
+    acted[:, [LEFT, RIGHT]] = recording.effort[rows[1:]]
+    states = plant.follow(acted)
+    if plant.status is not Status.DONE:
+        return states, plant.stop
+    return np.concatenate([states, plant.state[None]]), ""
 
 
 def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[_Column]:
@@ -163,7 +164,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
         if (topic := CONTACTS[side].name) in recording.outputs:
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield _Column(topic, "force", recording.outputs[topic][rows], force)
-    external = np.array([system.external_at(tick) for tick in range(len(rows))]) if system.external else None
+    external = system.external_over(np.arange(len(rows))) if system.external else None
     for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
         if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield _Column(topic, "force", recording.outputs[topic][rows], external[:, body])

@@ -1,44 +1,126 @@
 """The law of one controller: from the state of its arm to its command.
 
-What a scene adds to the paper's feedback, (4), (5), is a stage before it (sensing) or after it (actuation); without
-stages the law is the paper's.
+A law is a row of numbers, `Column`, and three functions of it: what is measured, what the paper's feedback (4), (5)
+answers, and what the actuator makes of that. Every effect of a scene fills in its columns; those that none has named
+do nothing. `exact.control` compiles the same source for the kernels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import lru_cache
+from typing import Any
 
-Sense = Callable[[int, float, float], tuple[float, float]]  # tick, x in m, v in m/s to what is measured
-Actuate = Callable[[float], float]  # command in N to command in N
+import numpy as np
+
+from grasp_ros.physics.layout import BLOCK
+from grasp_ros.physics.model import Array
+
+NO_NOISE = np.zeros(2)
+WHOLE = 2.0**53  # from here on every number is a whole one
 
 
-@dataclass
+class Column(IntEnum):
+    """Columns of a law."""
+
+    POSITION_GAIN = 0  # Kp, N/m
+    VELOCITY_GAIN = 1  # Kv, N s/m
+    SET_POINT = 2  # m
+    FEED_FORWARD = 3  # N
+    POSITION_NOISE = 4  # standard deviation of the measured position, m
+    VELOCITY_NOISE = 5  # m/s
+    POSITION_STEP = 6  # resolution of the measured position, m; 0: measured exactly
+    VELOCITY_STEP = 7  # m/s
+    LIMIT = 8  # largest force of the actuator, N; inf: none
+
+
+def measured(row: Any, normals: Any, x: float, v: float) -> tuple[float, float]:
+    """What the sensor makes of x and v: noise, from two standard normal numbers, then the nearest step.
+
+    A number whose own rounding is wider than the step stays as it is.
+    """
+    noise_x, noise_v = row[Column.POSITION_NOISE], row[Column.VELOCITY_NOISE]
+    step_x, step_v = row[Column.POSITION_STEP], row[Column.VELOCITY_STEP]
+    if noise_x != 0.0 or noise_v != 0.0:
+        x, v = x + noise_x * normals[0], v + noise_v * normals[1]
+    if step_x != 0.0 and abs(x / step_x) < WHOLE:  # neither infinity nor NaN is
+        x = step_x * round(x / step_x)
+    if step_v != 0.0 and abs(v / step_v) < WHOLE:
+        v = step_v * round(v / step_v)
+    return x, v
+
+
+def feedback(row: Any, x: Any, v: Any) -> Any:
+    """Linear state feedback around a set-point, (4), (5), in N; of floats or arrays."""
+    force = -row[Column.POSITION_GAIN] * (x - row[Column.SET_POINT]) - row[Column.VELOCITY_GAIN] * v
+    if row[Column.FEED_FORWARD] != 0.0:  # adding 0.0 would turn a command of -0.0 into another bit pattern
+        force = force + row[Column.FEED_FORWARD]
+    return force
+
+
+def limited(row: Any, force: float) -> Any:
+    """What the actuator can do of a command in N."""
+    limit = row[Column.LIMIT]
+    if force < -limit:
+        return -limit
+    return limit if force > limit else force
+
+
+@lru_cache(maxsize=16)
+def normals(seed: int, side: int, block: int) -> Array:
+    """Standard normal numbers (BLOCK, 2) of one block of ticks: the same for whoever asks, in whatever order."""
+    return np.random.default_rng([seed, side, block]).standard_normal((BLOCK, 2))
+
+
 class ControlLaw:
-    """Linear state feedback around a set-point.
+    """Linear state feedback around a set-point, with the sensor and the actuator of its arm.
 
-    Attributes
+    Parameters
     ----------
     position_gain : float, N/m
     velocity_gain : float, N s/m
     set_point, feed_forward : float, m and N
-    sensing, actuation : lists of stages, in the order in which they act
+
+    Attributes
+    ----------
+    row : array, see `Column`
+        All numbers of the law.
+    seed : tuple of int, or None
+        What its noise is drawn from, seed and side; None: none is.
     """
 
-    position_gain: float
-    velocity_gain: float
-    set_point: float = 0.0
-    feed_forward: float = 0.0
-    sensing: list[Sense] = field(default_factory=list)
-    actuation: list[Actuate] = field(default_factory=list)
+    def __init__(self, position_gain: float, velocity_gain: float, set_point: float = 0.0, feed_forward: float = 0.0
+                 ) -> None:
+        self.row: Array = np.zeros(len(Column))
+        self.row[:4] = position_gain, velocity_gain, set_point, feed_forward
+        self.row[Column.LIMIT] = np.inf
+        self.seed: tuple[int, int] | None = None
+
+    @property
+    def position_gain(self) -> float:
+        """Kp, N/m."""
+        return float(self.row[Column.POSITION_GAIN])
+
+    @property
+    def velocity_gain(self) -> float:
+        """Kv, N s/m."""
+        return float(self.row[Column.VELOCITY_GAIN])
+
+    @property
+    def set_point(self) -> float:
+        """Where the feedback aims at, m."""
+        return float(self.row[Column.SET_POINT])
+
+    @property
+    def feed_forward(self) -> float:
+        """Constant force, N."""
+        return float(self.row[Column.FEED_FORWARD])
+
+    def noise(self, tick: int) -> Array:
+        """Standard normal numbers (2,) of a tick; 0 without noise."""
+        return NO_NOISE if self.seed is None else normals(*self.seed, tick // BLOCK)[tick % BLOCK]
 
     def command(self, tick: int, x: float, v: float) -> float:
         """Command in N that answers the state (x, v) of a tick."""
-        for sense in self.sensing:
-            x, v = sense(tick, x, v)
-        force = -self.position_gain * (x - self.set_point) - self.velocity_gain * v
-        if self.feed_forward:  # adding 0.0 would turn a command of -0.0 into another bit pattern
-            force += self.feed_forward
-        for actuate in self.actuation:
-            force = actuate(force)
-        return force
+        row = self.row.tolist()  # plain floats overflow without a warning
+        return float(limited(row, feedback(row, *measured(row, self.noise(tick).tolist(), x, v))))

@@ -8,6 +8,7 @@ pairs are rows LEFT, RIGHT of an array (2, 2).
 from enum import IntEnum
 
 EPS = 2.220446049250313e-16  # distance from 1.0 to the next double
+BLOCK = 1024  # ticks that a sampled run makes at once, and whose noise is drawn at once
 
 
 class Body(IntEnum):
@@ -73,6 +74,23 @@ class Outcome(IntEnum):
     SQUEEZED = 6  # a contact is stiff: an implicit step is cheaper
     ENERGY_FALLS = 7
     PENETRATES = 8
+    NO_COMMAND = 9  # a controller gave no finite number
+
+
+class Answer(IntEnum):
+    """Where the command of a side comes from, if not from a function at this address."""
+
+    GIVEN = 0  # from outside; 0 without a controller
+    LAW = 1  # the row of the side, see `control`
+
+
+class Place(IntEnum):
+    """Where a loop stands."""
+
+    INTERVAL = 0  # done so far in this call
+    BEGUN = 1  # whether the inputs of the next one act already
+    TICK = 2  # at which the first one begins
+    FAILED = 3  # side whose controller gave no number
 
 
 class Filled(IntEnum):

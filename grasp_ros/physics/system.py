@@ -6,14 +6,16 @@ stiffness of contact, no controller and no force here, and is not simulated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.control import ControlLaw, feedback
 from grasp_ros.physics.layout import DAMPING, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, Grasp
 
@@ -27,7 +29,15 @@ class ExternalForce(NamedTuple):
 
     body: int
     at: Callable[[int], float]  # tick to N
-    changes: Callable[[int], Iterable[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n
+    changes: Callable[[int], Sequence[int]]  # ascending ticks of the run, in (0, n), at which it may change, from n
+
+    def over(self, ticks: NDArray[np.int64]) -> Array:
+        """Values (n,) in N from each of the ascending ticks (n,) on, asked for only where it may change."""
+        first, last = int(ticks[0]), int(ticks[-1])
+        changes = self.changes(last + 1)
+        at = [first, *changes[bisect_right(changes, first) : bisect_right(changes, last)]]
+        values = np.array([self.at(tick) for tick in at])
+        return values[np.searchsorted(at, ticks, side="right") - 1]
 
 
 @dataclass
@@ -115,19 +125,29 @@ class System:
             forces[force.body] += force.at(tick)
         return forces
 
+    def external_over(self, ticks: NDArray[np.int64]) -> Array:
+        """External forces (n, 3) in N, by body, from each of the ascending ticks (n,) to the next."""
+        forces = np.zeros((len(ticks), 3))
+        for force in self.external:
+            forces[:, force.body] += force.over(ticks)
+        return forces
+
     def commands(self, tick: int, state: Array) -> Array:
         """What the controllers answer to the state of a tick, in N by body; 0 without a controller.
 
         Parameters
         ----------
         tick : int
-        state : array (6,) or (6, n)
-
-        Returns
-        -------
-        array (3,) or (3, n)
+        state : array (6,)
         """
-        forces = np.zeros((3, *np.shape(state)[1:]))
+        forces = np.zeros(3)
         for side, law in self.laws.items():
-            forces[side] = law.command(tick, state[COLUMN[side]], state[COLUMN[side] + 1])
+            forces[side] = law.command(tick, *state[COLUMN[side] : COLUMN[side] + 2].tolist())
+        return forces
+
+    def feedback(self, state: Array) -> Array:
+        """Continuous feedback (n, 2) of the left and the right arm in N, (4), (5), for states (n, 6)."""
+        forces = np.zeros((len(state), 2))
+        for side, law in self.laws.items():
+            forces[:, side] = feedback(law.row, state[:, COLUMN[side]], state[:, COLUMN[side] + 1])
         return forces

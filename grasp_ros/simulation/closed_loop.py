@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping
 from heapq import merge
-from itertools import groupby, islice, pairwise
+from itertools import groupby, islice
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.records import Loop as KernelLoop
+from grasp_ros.exact.records import new_place
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import BLOCK, LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.trajectory import Loop, tick_of
+from grasp_ros.simulation.sampled_plant import NO_INTERVAL, Outputs, Record, SampledPlant
+from grasp_ros.simulation.trajectory import Loop
 
 Progress = Callable[[float], object] | None
+PATIENCE = 0.1  # s that a block of ticks may take
+SHORTEST = 16  # ticks of the first block
 Changes = Mapping[int, Mapping[str, float]]
-BLOCK = 4096  # intervals whose output times are found at once
 
 
 def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
@@ -57,77 +63,89 @@ class SampledLoop:
 
     def __init__(self, scene: Scene, grid: Array, changes: Changes, progress: Progress) -> None:
         self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
-        self._laws = scene.system
-        self._answers: list[Array] = []  # (3,) for each tick
-        self._inputs: list[Array] = []
+        self._records: list[Record] = []  # at the output times
 
     def drive(self, integrator: Integrator) -> Array:
         """States (n, 6) at the output times; only the rows reached, if the integrator stops. To be called once."""
         scene = self._scene
         plant = SampledPlant(scene.system, scene.period_ns, integrator)
-        rows = []
-        with np.errstate(over="ignore", invalid="ignore"):  # a state that overflows ends the run with its status
-            for _, _, within in _intervals(self._grid, range(scene.ticks + 1), scene.period_ns):
-                rows.append(plant.step(self._answer(plant), within))
-                self._inputs.append(plant.inputs)
-                if plant.status is not Status.DONE:
-                    return np.concatenate(rows)
-            self._answer(plant)
-            self._inputs.append(np.full(3, np.nan))  # nothing has acted yet
-        return np.concatenate([*rows, _rest(self._grid, scene.ticks, scene.period_ns, plant.state)])
+        for ticks in self._blocks():
+            if plant.tick in self._changes:
+                self._scene = self._scene.changed(self._changes[plant.tick])
+            outputs, interval = _outputs(self._grid, ticks, scene.period_ns)
+            record = plant.run(self._scene.system.laws, outputs)
+            reached = interval[: len(record.states)]
+            self._records.append(Record(record.states, record.answers[reached], record.inputs[reached]))
+            if plant.status is not Status.DONE:
+                break
+            if self._progress is not None:
+                self._progress(plant.time)
+        else:
+            self._end(plant)
+        return np.concatenate([record.states for record in self._records])
 
-    def _answer(self, plant: SampledPlant) -> Array:
-        """Commands (3,) in N by body, from the laws as they are now."""
-        tick = plant.tick
-        if tick in self._changes:
-            self._scene = self._scene.changed(self._changes[tick])
-            self._laws = self._scene.system
-        answers = self._laws.commands(tick, plant.state)
-        self._answers.append(answers)
-        if self._progress is not None and tick % 100 == 0:
-            self._progress(plant.time)
-        return answers
+    def _blocks(self) -> Iterator[NDArray[np.int64]]:
+        """Ticks of the run, ascending, in blocks that end where a law changes, and with the block of the noise.
 
-    def record(self, rows: int) -> Loop:
-        """What was answered and what acted, at the first output times."""
-        ticks = tick_of(self._scene, self._grid[:rows])
-        return Loop(np.array(self._answers)[ticks][:, [LEFT, RIGHT]], np.array(self._inputs)[ticks])
+        Between them the progress shows and Ctrl-C acts: a run whose ticks are slow has shorter ones.
+        """
+        last, first, size = self._scene.ticks, 0, SHORTEST
+        changes = sorted({*self._changes, last})
+        while first < last:
+            end = min(first + size, first - first % BLOCK + BLOCK, changes[bisect_right(changes, first)])
+            begin = time.monotonic()
+            yield np.arange(first, end + 1)
+            first = end
+            size = min(2 * size, BLOCK) if time.monotonic() - begin < PATIENCE else max(size // 2, 1)
+
+    def _end(self, plant: SampledPlant) -> None:
+        """The output times of the last tick and later; nothing acts there."""
+        if plant.tick in self._changes:
+            self._scene = self._scene.changed(self._changes[plant.tick])
+        record = plant.run(self._scene.system.laws, NO_INTERVAL)
+        states = _rest(self._grid, plant.tick, self._scene.period_ns, plant.state)
+        shape = (len(states), 3)
+        self._records.append(Record(states, np.broadcast_to(record.answers, shape), np.full(shape, np.nan)))
+
+    def record(self) -> Loop:
+        """What was answered and what acted, at the output times that were reached."""
+        answers, inputs = (np.concatenate([record[part] for record in self._records]) for part in (1, 2))
+        return Loop(answers[:, [LEFT, RIGHT]], inputs)
 
 
 def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     """States (n, 6) under continuous feedback and external forces; only the rows reached, if the integrator stops.
 
-    An interval lasts until a force changes: cutting it at every tick would only cost time.
+    An interval lasts until a force changes: cutting it at every tick would only cost time. The ticks of a run may be
+    more than memory holds: they are taken in blocks.
     """
     system = scene.system
     changes = (force.changes(scene.ticks) for force in system.external)
-    ticks = (tick for tick, _ in groupby(merge([0], *changes, [scene.ticks])))
-    rows = []
-    for begin, end, within in _intervals(grid, ticks, scene.period_ns):
-        integrator.set_input(system.external_at(begin))
-        rows.append(integrator.advance((end - begin) * scene.period_ns / NANOSECONDS, within, scene.time_of(begin)))
+    following = (tick for tick, _ in groupby(merge([0], *changes, [scene.ticks])))
+    rows, block = [], list(islice(following, BLOCK + 1))
+    while len(block) > 1:
+        ticks = np.array(block)
+        outputs, _ = _outputs(grid, ticks, scene.period_ns)
+        loop = KernelLoop(
+            np.diff(ticks) * scene.period_ns / NANOSECONDS, ticks * scene.period_ns / NANOSECONDS, outputs.bounds,
+            new_place(), np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]),
+        )
+        rows.append(integrator.run(loop, outputs.offsets))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
+        block = [block[-1], *islice(following, BLOCK)]
     return np.concatenate([*rows, _rest(grid, scene.ticks, scene.period_ns, integrator.state)])
 
 
-def _intervals(grid: Array, ticks: Iterable[int], period_ns: int) -> Iterator[tuple[int, int, Array | None]]:
-    """Intervals [t, t') between ascending ticks, and the output times in each from its beginning; None without any.
-
-    The ticks of a run may be more than memory holds: they are taken in blocks.
-    """
-    following = iter(ticks)
-    block = list(islice(following, BLOCK))
-    while len(block) > 1:
-        times = np.asarray(block) * period_ns / NANOSECONDS
-        lengths = np.diff(block) * period_ns / NANOSECONDS
-        bounds = np.searchsorted(grid, times, side="left")
-        first, last = int(bounds[0]), int(bounds[-1])
-        interval = np.searchsorted(times, grid[first:last], side="right") - 1
-        offsets = np.clip(grid[first:last] - times[interval], 0.0, lengths[interval])
-        for (begin, end), (low, high) in zip(pairwise(block), pairwise((bounds - first).tolist()), strict=True):
-            yield begin, end, offsets[low:high] if low < high else None
-        block = [block[-1], *islice(following, BLOCK)]
+def _outputs(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tuple[Outputs, NDArray[np.int64]]:
+    """Output times within the intervals [t, t') between ascending ticks, and the interval of each."""
+    times = ticks * period_ns / NANOSECONDS
+    bounds = np.searchsorted(grid, times, side="left")
+    within = grid[bounds[0] : bounds[-1]]
+    interval = np.searchsorted(times, within, side="right") - 1
+    lengths = np.diff(ticks) * period_ns / NANOSECONDS
+    offsets = np.clip(within - times[interval], 0.0, lengths[interval])
+    return Outputs(offsets, bounds - bounds[0]), interval
 
 
 def _rest(grid: Array, tick: int, period_ns: int, state: Array) -> Array:

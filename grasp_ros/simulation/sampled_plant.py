@@ -2,21 +2,58 @@
 
 from __future__ import annotations
 
-from collections import deque
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.records import Loop, new_place
+from grasp_ros.physics.control import ControlLaw, normals
+from grasp_ros.physics.layout import BLOCK, Answer, Place
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import NANOSECONDS
+
+NO_TIMES = np.zeros(0)
+_DEFAULT: dict[str, Array] = Loop._field_defaults
+
+
+class Outputs(NamedTuple):
+    """Output times within consecutive intervals."""
+
+    offsets: Array  # (m,) s, ascending within each interval, from its beginning
+    bounds: NDArray[np.int64]  # (n + 1,) how many of them come before each interval, and in all
+
+
+NO_INTERVAL = Outputs(NO_TIMES, np.zeros(1, dtype=np.int64))
+
+
+class KernelLaw(NamedTuple):
+    """What answers at the ticks of a block."""
+
+    rows: Array  # (2, k), rows of `physics.control` by side
+    callee: NDArray[np.int64]  # (2,) by side, an `Answer` or the address of a function
+    normals: Array  # (2, n, 2) standard normal numbers of each tick
+
+
+GIVEN = KernelLaw(_DEFAULT["laws"], np.zeros(2, dtype=np.int64), _DEFAULT["normals"])
+
+
+class Record(NamedTuple):
+    """What a sampled run was over k control periods."""
+
+    states: Array  # (m, 6) at the output times
+    answers: Array  # (k, 3) commands of the controllers, N by body
+    inputs: Array  # (k, 3) forces that acted, N by body
 
 
 class SampledPlant:
     """Bodies and contacts under commands that are held over control periods, with delay and external forces.
 
-    The controllers are not in it: whoever steps it computes the commands. Their numbers may change from tick to tick;
-    the plant does not.
+    `step` takes the commands from outside, for one period, `follow` for many; `run` lets the controllers of a system
+    answer.
 
     Parameters
     ----------
@@ -43,7 +80,7 @@ class SampledPlant:
         self.inputs: Array = np.zeros(3)
         self._system, self._period_ns, self._period = system, period_ns, period_ns / NANOSECONDS
         self._integrator = Integrator(system, continuous=False) if integrator is None else integrator
-        self._waiting = deque([np.zeros(3)] * system.delay)  # until the first command arrives nothing acts
+        self._waiting = np.zeros((system.delay, 3))  # until the first command arrives nothing acts
 
     @property
     def time(self) -> float:
@@ -71,7 +108,7 @@ class SampledPlant:
         Parameters
         ----------
         commands : array (3,), N by body
-            What the controllers answer to the state of the current tick. It is kept: pass a new array each time.
+            What the controllers answer to the state of the current tick.
         offsets : array (n,), s, optional
             Ascending output times within the period, from its beginning.
 
@@ -80,14 +117,62 @@ class SampledPlant:
         array (n, 6)
             States at the offsets; only the rows reached, and the tick stays, if `status` is not DONE afterwards.
         """
-        integrator, system = self._integrator, self._system
-        self._waiting.append(commands)
-        self.effort = inputs = self._waiting.popleft()
-        if system.external:
-            inputs = inputs + system.external_at(self.tick)
-        self.inputs = inputs
-        integrator.set_input(inputs)
-        states = integrator.advance(self._period, offsets, self.time)
-        if integrator.status is Status.DONE:
-            self.tick += 1
-        return states
+        times = NO_TIMES if offsets is None else np.ascontiguousarray(offsets, dtype=float)
+        waits = len(self._waiting)
+        self.effort = self._waiting[self.tick % waits].copy() if waits else np.array(commands, dtype=float)
+        record = self._go(Outputs(times, np.array([0, len(times)])), np.array([commands], dtype=float))
+        self.inputs = record.inputs[0]
+        return record.states
+
+    def follow(self, answers: Array) -> Array:
+        """Advance by one control period for each row of answers that are known beforehand.
+
+        Parameters
+        ----------
+        answers : array (k, 3), N by body
+
+        Returns
+        -------
+        array (k, 6)
+            States at the begin of each period; only those reached, if `status` is not DONE afterwards.
+        """
+        count = len(answers)
+        outputs = Outputs(np.zeros(count), np.arange(count + 1))
+        return self._go(outputs, np.ascontiguousarray(answers, dtype=float)).states
+
+    def run(self, laws: Mapping[int, ControlLaw], outputs: Outputs) -> Record:
+        """Advance by one control period for each interval of the outputs, all within one block of ticks.
+
+        Without intervals the controllers answer the state of the current tick, and nothing acts.
+
+        Parameters
+        ----------
+        laws : mapping of int to ControlLaw
+            What answers at every tick, by side.
+        outputs : Outputs
+        """
+        count = max(len(outputs.bounds) - 1, 1)
+        law = KernelLaw(_DEFAULT["laws"].copy(), np.zeros(2, dtype=np.int64), _DEFAULT["normals"])
+        for side, own in laws.items():
+            law.rows[side], law.callee[side] = own.row, Answer.LAW
+            if own.seed:
+                if law.normals is _DEFAULT["normals"]:
+                    law = law._replace(normals=np.zeros((2, count, 2)))
+                block, first = divmod(self.tick, BLOCK)
+                law.normals[side] = normals(*own.seed, block)[first : first + count]
+        return self._go(outputs, np.zeros((count, 3)), law)
+
+    def _go(self, outputs: Outputs, answers: Array, law: KernelLaw = GIVEN) -> Record:
+        """Advance under answers that are given, or those of a law."""
+        count = len(outputs.bounds) - 1
+        ticks = np.arange(self.tick, self.tick + len(answers))
+        external = self._system.external_over(ticks) if self._system.external else _DEFAULT["external"]
+        loop = Loop(
+            np.full(count, self._period), ticks * self._period_ns / NANOSECONDS, outputs.bounds, new_place(self.tick),
+            np.empty((count, 3)), external, answers, law.callee, law.rows, law.normals, self._waiting,
+        )
+        states = self._integrator.run(loop, outputs.offsets)
+        done = int(loop.place[Place.INTERVAL])
+        self.tick += done
+        begun = done + int(loop.place[Place.BEGUN])
+        return Record(states, answers[: begun if count else 1], loop.inputs[:begun])

@@ -83,7 +83,7 @@ def simulate(
     for body in scene.system.absent:
         found.state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     reached = len(found.state)
-    record = None if loop is None else loop.record(reached)
+    record = None if loop is None else loop.record()
     return Trajectory(
         scene, grid[:reached], found.state, record, found.event_table, found.work, found.status, method, setting,
         found.stop,

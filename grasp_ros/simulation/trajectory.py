@@ -97,8 +97,7 @@ class Trajectory:
         """
         if self.loop is not None:
             return self.loop.command
-        answers: Array = self.scene.system.commands(0, self.state.T)[:2].T
-        return answers
+        return self.scene.system.feedback(self.state)
 
     @property
     def inputs(self) -> Array:

@@ -98,7 +98,7 @@ def bench(
     out = Output(np.zeros(0), np.zeros((0, 6)), np.zeros((SPARE, 5)), np.zeros(len(Filled), dtype=np.int64),
                  np.zeros(len(Work), dtype=np.int64))
     settings = Settings(TOLERANCE, ORDER, TOLERANCE ** (1.0 / (ORDER + 1)), rate_bound(given))
-    return Bench(plant, State(y, modes, np.array([time, 0.0])), settings, out)
+    return Bench(plant, State(y, modes, np.array([time, 0.0, 0.0])), settings, out)
 
 
 def bits(values: Array) -> bytes:

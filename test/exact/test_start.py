@@ -121,7 +121,7 @@ def test_a_start_against_40_digits(name: str, side: Body) -> None:
         places = max(moved[lane] + abs(expected[lane]) for lane in (X_L, X_O, X_R))
         for lane in (X_L, X_O, X_R):
             assert abs(mpfr(float(b.state.y[lane])) - expected[lane]) <= 1e-15 * places, lane
-    assert b.state.clock.tolist() == [t, 0.0]
+    assert b.state.clock.tolist() == [t, 0.0, 0.0]
 
 
 @SIDES

@@ -11,7 +11,10 @@ import pytest
 from documents import case_of, scene_of
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact import control as compiled
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics import control
+from grasp_ros.physics.control import NO_NOISE
 from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Array, feedback
@@ -193,12 +196,13 @@ def test_noise_is_seeded_and_as_large_as_it_says() -> None:
 def test_a_sensor_leaves_a_number_as_it_is_whose_own_rounding_is_wider_than_its_step() -> None:
     scene = scene_of("arm_alone", "loop={}", "left_sensor.noise_seed=0", "left_sensor.position_step_m=1e-12",
                      "left_sensor.velocity_step_m_per_s=0.001")
-    (sense,) = scene.system.laws[LEFT].sensing
-    for x in (2.0**53 * 1e-12 * 1.01, 1e300, -1e300, np.inf, -np.inf):
-        assert sense(0, x, 0.0) == (x, 0.0)
-    assert np.isnan(sense(0, np.nan, np.nan)).all()
-    below = 2.0**53 * 1e-12 * 0.99
-    assert sense(0, below, -0.0016) == (1e-12 * round(below / 1e-12), 0.001 * round(-1.6))
+    law = scene.system.laws[LEFT]
+    for sense, row in ((control.measured, law.row.tolist()), (compiled.measured, law.row)):
+        for x in (2.0**53 * 1e-12 * 1.01, 1e300, -1e300, np.inf, -np.inf):
+            assert sense(row, NO_NOISE, x, 0.0) == (x, 0.0)
+        assert np.isnan(sense(row, NO_NOISE, np.nan, np.nan)).all()
+        below = 2.0**53 * 1e-12 * 0.99
+        assert sense(row, NO_NOISE, below, -0.0016) == (1e-12 * round(below / 1e-12), 0.001 * round(-1.6))
 
 
 def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:

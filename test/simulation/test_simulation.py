@@ -55,7 +55,7 @@ def test_commands_follow_4_and_5() -> None:
 
 def test_progress_is_reported() -> None:
     seen: list[float] = []
-    simulate(case_of(duration=1.0), sampled=True, progress=seen.append)
+    simulate(case_of(duration=10.0), sampled=True, progress=seen.append)
     assert seen == sorted(seen)
     assert len(seen) >= 10
 

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.control import ControlLaw, limited, measured
 from grasp_ros.physics.errors import Refused
 
 Law = Callable[[int, float, float, float], float]  # tick, time in s, x in m, v in m/s as measured, to a command in N
@@ -57,9 +57,6 @@ class OwnLaw:
 
     def command(self, stages: ControlLaw, tick: int, time: float, x: float, v: float) -> float:
         """Command in N that answers the state of a tick, through the stages of the scene."""
-        for sense in stages.sensing:
-            x, v = sense(tick, x, v)
-        force = float(self._law(tick, time, x, v))
-        for actuate in stages.actuation:
-            force = actuate(force)
-        return force
+        row = stages.row.tolist()
+        x, v = measured(row, stages.noise(tick).tolist(), x, v)
+        return float(limited(row, float(self._law(tick, time, x, v))))

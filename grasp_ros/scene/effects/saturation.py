@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -12,12 +13,8 @@ from grasp_ros.scene.parameter import Parameter
 PARAMETERS = (Parameter("limit_N", 0.0, 1e12, "largest force of the actuator in both directions", live=True),)
 
 
-def _limit(limit: float, force: float) -> float:
-    return min(max(force, -limit), limit)
-
-
 def _build(side: str, sections: Sections, system: System) -> None:
-    system.laws[SIDES[side]].actuation.append(partial(_limit, sections[f"{side}_actuator"]["limit_N"]))
+    system.laws[SIDES[side]].row[Column.LIMIT] = sections[f"{side}_actuator"]["limit_N"]
     system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache, partial
+from functools import partial
 
-import numpy as np
-
-from grasp_ros.physics.model import Array
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -19,45 +17,20 @@ PARAMETERS = (
     Parameter("position_step_m", 1e-12, 1e3, "resolution of the measured position", optional=True),
     Parameter("velocity_step_m_per_s", 1e-12, 1e3, "resolution of the measured velocity", optional=True),
 )
-WHOLE = 2.0**53  # from here on every number is a whole one
-BLOCK = 1024  # ticks whose noise is drawn at once
-
-
-@lru_cache(maxsize=16)
-def _noise(seed: int, side: int, block: int) -> Array:
-    """Standard normal numbers (BLOCK, 2) of one block of ticks: the same for whoever asks, in whatever order."""
-    return np.random.default_rng([seed, side, block]).standard_normal((BLOCK, 2))
-
-
-def _add_noise(seed: int, side: int, deviations: tuple[float, float], tick: int, x: float, v: float) -> tuple[
-    float, float
-]:
-    block, row = divmod(tick, BLOCK)
-    draw = _noise(seed, side, block)[row]
-    return float(x + deviations[0] * draw[0]), float(v + deviations[1] * draw[1])
-
-
-def _to_step(step: float, x: float) -> float:
-    """The nearest multiple of a step; x itself without a step, or where its own rounding is wider than the step."""
-    if step and abs(x / step) < WHOLE:  # neither infinity nor NaN is
-        return step * round(x / step)
-    return x
-
-
-def _round(steps: tuple[float, float], _: int, x: float, v: float) -> tuple[float, float]:
-    return _to_step(steps[0], x), _to_step(steps[1], v)
+COLUMNS = (  # of the law, and the numbers of the scene that stand in them
+    (Column.POSITION_NOISE, "position_noise_m"), (Column.VELOCITY_NOISE, "velocity_noise_m_per_s"),
+    (Column.POSITION_STEP, "position_step_m"), (Column.VELOCITY_STEP, "velocity_step_m_per_s"),
+)
 
 
 def _build(side: str, sections: Sections, system: System) -> None:
-    numbers = sections[f"{side}_sensor"]
-    stages = system.laws[SIDES[side]].sensing
-    deviations = numbers.get("position_noise_m", 0.0), numbers.get("velocity_noise_m_per_s", 0.0)
-    steps = numbers.get("position_step_m", 0.0), numbers.get("velocity_step_m_per_s", 0.0)
-    if any(deviations):
-        stages.append(partial(_add_noise, numbers["noise_seed"], int(SIDES[side]), deviations))
+    numbers, law = sections[f"{side}_sensor"], system.laws[SIDES[side]]
+    for column, key in COLUMNS:
+        law.row[column] = numbers.get(key, 0.0)
+    if law.row[[Column.POSITION_NOISE, Column.VELOCITY_NOISE]].any():
+        law.seed = numbers["noise_seed"], int(SIDES[side])
         system.caveats.append(f"the {side} arm is measured with noise")
-    if any(steps):
-        stages.append(partial(_round, steps))
+    if law.row[[Column.POSITION_STEP, Column.VELOCITY_STEP]].any():
         system.caveats.append(f"the {side} arm is measured in steps")
 
 

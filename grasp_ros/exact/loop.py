@@ -1,0 +1,99 @@
+"""The intervals of a run: what acts in each of them, and the controllers that answer at its begin.
+
+Inputs are constant within an interval. In a sampled loop it is a control period: each controller measures its arm,
+answers, and the command waits for the periods of the delay. Under continuous feedback an interval lasts until an
+external force changes; without one it is the whole run.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from grasp_ros.exact.control import feedback, limited, measured
+from grasp_ros.exact.foreign import call
+from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.kinematics import arm_of
+from grasp_ros.exact.modes import begin_interval
+from grasp_ros.exact.records import Array, Integers, Loop, Output, Plant, State
+from grasp_ros.physics.layout import FORCE, LEFT, OBJECT, RIGHT, Answer, Filled, Outcome, Place
+
+
+@kernel
+def answer(state: State, loop: Loop, k: int) -> bool:
+    """Write what the controllers answer to the state at the begin of interval k; whether all of it is a number.
+
+    What a scene's own law makes of a state that overflows is not refused here: it ends the run with its status.
+    """
+    for side in (LEFT, RIGHT):
+        callee, row = loop.callee[side], loop.laws[side]
+        if callee == Answer.GIVEN:
+            continue
+        x, v, _ = arm_of(state.y, side)
+        x, v = measured(row, loop.normals[side, min(k, loop.normals.shape[1] - 1)], x, v)
+        if callee == Answer.LAW:
+            force = feedback(row, x, v)
+        else:
+            force = call(callee, loop.place[Place.TICK] + k, state.clock[2], x, v)
+            if not math.isfinite(force):
+                loop.place[Place.FAILED] = side
+                return False
+        loop.answers[k, side] = limited(row, force)
+    return True
+
+
+@kernel
+def set_inputs(plant: Plant, own: Array, loop: Loop, k: int) -> None:
+    """Let the commands that arrive at the begin of interval k act, and the external forces."""
+    held, pushed, delay = loop.answers.shape[0] > 0, loop.external.shape[0] > 0, loop.waiting.shape[0]
+    slot = (loop.place[Place.TICK] + k) % delay if delay > 0 else 0
+    for body in (LEFT, RIGHT, OBJECT):
+        force = loop.answers[k, body] if held else 0.0
+        if delay > 0:
+            force, loop.waiting[slot, body] = loop.waiting[slot, body], force
+        if pushed:  # -0.0 + 0.0 is another bit pattern
+            force = force + loop.external[k, body] if held else loop.external[k, body]
+        loop.inputs[k, body] = force
+        plant.given[body, FORCE] = own[body] + force
+
+
+@inlined
+def open_interval(plant: Plant, state: State, own: Array, loop: Loop, filled: Integers) -> bool:
+    """Begin the next interval, unless it has begun; False if a controller gives no number."""
+    if loop.place[Place.BEGUN]:
+        return True
+    k = loop.place[Place.INTERVAL]
+    state.clock[0], state.clock[1], state.clock[2] = 0.0, 0.0, loop.begins[k]
+    filled[Filled.WAIT], filled[Filled.PENALTY] = 0, 0
+    if loop.inputs.shape[0] > 0:
+        if loop.answers.shape[0] > 0 and not answer(state, loop, k):
+            return False
+        set_inputs(plant, own, loop, k)
+    loop.place[Place.BEGUN] = 1
+    return True
+
+
+@inlined
+def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Array) -> Output:
+    """Modes under the inputs of an interval that begins or goes on; what it writes: the output times up to its end."""
+    end = loop.bounds[loop.place[Place.INTERVAL] + 1]
+    out = Output(grid[:end], out.rows, out.events, out.filled, out.work)
+    begin_interval(plant, state, out)
+    return out
+
+
+@inlined
+def close_interval(loop: Loop) -> bool:
+    """End an interval; whether another one follows."""
+    loop.place[Place.INTERVAL] += 1
+    loop.place[Place.BEGUN] = 0
+    following: bool = loop.place[Place.INTERVAL] < loop.lengths.shape[0]
+    return following
+
+
+@inlined
+def answer_end(state: State, loop: Loop) -> Outcome:
+    """Answers to the last state of a run, which nothing follows: what a loop without intervals is for."""
+    state.clock[0], state.clock[1], state.clock[2] = 0.0, 0.0, loop.begins[0]
+    return Outcome.DONE if answer(state, loop, np.int64(0)) else Outcome.NO_COMMAND
