@@ -43,6 +43,10 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub = add_command(commands, "watch", _watch, "watch a running graph, or a bag, in the terminal")
+    sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
+    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     sub = add_command(commands, "ctl", _ctl, "pause, resume, step or reset a running graph, or ask for its status")
     sub.add_argument("action", choices=("pause", "resume", "step", "reset", "status"))
     sub.add_argument("steps", type=whole(1), nargs="?", default=1, metavar="N", help="control periods of step")
@@ -138,6 +142,16 @@ def _replay(options: argparse.Namespace) -> int:
 
     bag.names(options.bag)  # refuses what is none
     become("player", {"bag": json.dumps(str(options.bag)), "rate": repr(options.rate)})
+
+
+def _watch(options: argparse.Namespace) -> int:
+    if options.bag is None:
+        become("watch", {}, options.namespace)
+    from grasp_ros.cli.watch import play
+    from grasp_ros.graph import bag
+
+    play(bag.read(options.bag), options.rate)
+    return 0
 
 
 def _ctl(options: argparse.Namespace) -> int:

@@ -18,6 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -30,6 +31,7 @@ TYPES = {
     "std_msgs/msg/String": String,
     "rosgraph_msgs/msg/Clock": Clock,
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+    "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
 _STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
 _CDR_HEADER = 4

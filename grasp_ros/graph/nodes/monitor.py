@@ -19,6 +19,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.judge import Announcement, Judge
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.nodes.ticks import Tick, Ticks
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
@@ -96,7 +97,7 @@ class Monitor(GraspNode):
         scene, running = self._scene, self._running
         beside = [TIMING] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
-        self._judge = Judge(scene)
+        self._judge, self._picture = Judge(scene), Picture(self, scene)
         self._ticks = Ticks([topic for topic in per_tick if topic != JOINT_STATES])
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
@@ -167,6 +168,7 @@ class Monitor(GraspNode):
             side: deserialize_message(tick.found[topic], WrenchStamped).wrench.force.x
             for side, topic in COMMANDS.items() if topic in tick.found
         }
+        self._picture.show(tick.time_ns, state)
         values = self._judge.judge(tick.time_ns, state, inputs, commands)
         named = dict(zip(LYAPUNOV_NAMES, values, strict=True))
         if not named["closed"]:
