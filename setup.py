@@ -26,6 +26,7 @@ setup(
         "ros-jazzy-common-interfaces",
         "numpy",
         "rosbags",
+        "mcap",
         "numba",
         "matplotlib",
         "tqdm",
@@ -34,7 +35,7 @@ setup(
     ],
     extras_require={
         "test": [
-            "pytest", "hypothesis", "gmpy2", "mpmath", "mcap", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
+            "pytest", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
             "types-tqdm", "colcon-common-extensions", "scipy",
         ],
         "study": ["gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],

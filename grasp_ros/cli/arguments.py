@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import errno
+import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,6 +17,7 @@ from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST, compile_kerne
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
 
 Command = Callable[[argparse.Namespace], int]
 STUDY_DIRECTORY = Path("runs") / "studies"
@@ -66,6 +69,31 @@ def add_accuracy(sub: argparse.ArgumentParser) -> None:
 def add_output(sub: argparse.ArgumentParser, metavar: str, text: str, default: Path | None = None) -> None:
     """A file or a directory to write."""
     sub.add_argument("-o", "--output", type=Path, default=default, metavar=metavar, help=text)
+
+
+def add_force(sub: argparse.ArgumentParser) -> None:
+    """Whether a file that is there may be replaced."""
+    sub.add_argument("--force", action="store_true", help="replace the output file if it is there")
+
+
+def check_output(output: Path, force: bool, inputs: Sequence[str] = ()) -> None:
+    """Refuse to write over what is there, before the work; over an input in any case.
+
+    Raises
+    ------
+    Refused
+        Names the file.
+    """
+    with writing(output):
+        if not (output.is_file() or output.is_dir()):
+            return  # new, a device or a pipe
+        if output.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        for given in map(Path, inputs):
+            if given.exists() and (given.samefile(output) or output.resolve().is_relative_to(given.resolve())):
+                raise Refused(f"-o {output}: is the input; allowed: another file")
+        if not force:
+            raise Refused(f"{output}: is there; allowed: a new file, or --force to replace it")
 
 
 def add_study_directory(sub: argparse.ArgumentParser) -> None:

@@ -37,6 +37,9 @@ def add_to(commands: Any) -> None:
     )
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
+    sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
+    sub.add_argument("bag", type=Path)
+    add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
@@ -120,6 +123,17 @@ def _report(graph: Graph, stopped: bool, seconds: float) -> int:
         rows += [*comparison.rows, ("figure", str(figure))]
     print(report.table([*rows, ("wall time", f"{seconds:.1f} s with start and stop")]))
     return 0 if whole else 1
+
+
+def _recover(options: argparse.Namespace) -> int:
+    from grasp_ros.graph.recover import recover
+
+    new = options.output or options.bag.parent / f"{options.bag.stem}_recovered"
+    found = recover(options.bag, new)
+    for offset, size, why in found.left_out:
+        print(f"left out: {size} bytes from byte {offset} on: {why}")
+    print(f"{found.ticks} ticks written to {new}")
+    return 0
 
 
 def _inspect(options: argparse.Namespace) -> int:

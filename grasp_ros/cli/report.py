@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.graph.bag import Recording
+from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.verify import Verification, laws_of, verify
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
@@ -71,6 +71,7 @@ def describe_recording(recording: Recording) -> list[Row]:
         ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
         ("messages", per_topic),
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
+        ("end", recording.lost["end"]),
         ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items())),
     ]
     for tick, numbers in recording.changes.items():

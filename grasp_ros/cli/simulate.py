@@ -12,9 +12,11 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import (
     add_accuracy,
     add_command,
+    add_force,
     add_output,
     add_scene,
     check_memory,
+    check_output,
     load_scene,
     prepare,
     whole,
@@ -45,6 +47,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N",
                      help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
     add_output(sub, "FILE.npz", "write states, events, V and counters")
+    add_force(sub)
 
 
 def _scenes(_: argparse.Namespace) -> int:
@@ -66,6 +69,8 @@ def _simulate(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene, options.settings)
     setting = _setting(options)
     check_memory(scene, options.sampled, options.grid)
+    if options.output is not None:
+        check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
     quick = not (options.sampled or scene.sampled)

@@ -14,7 +14,7 @@ PACKAGES = ("gmpy2", "heyoka", "mpmath", "scipy", "sksundae")  # names of module
 STUDIES = (
     study_accuracy.add_accuracy, study_accuracy.add_advise, study_costs.add_loop, study_accuracy.add_prediction,
     study_accuracy.add_page, study_accuracy.add_speed, study_costs.add_effects, study_proofs.add_certificate,
-    study_proofs.add_hard, study_proofs.add_fuzz, study_costs.add_graph,
+    study_proofs.add_hard, study_proofs.add_fuzz, study_costs.add_graph, study_costs.add_recorder,
 )
 
 

@@ -1,11 +1,19 @@
-"""The studies of what a loop, an effect and a graph cost: `loop`, `effects` and `graph`."""
+"""The studies of what a loop, an effect, a graph and a bag cost: `loop`, `effects`, `graph` and `recorder`."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_study_directory, load_scene, prepare
+from grasp_ros.cli.arguments import (
+    add_command,
+    add_output,
+    add_scene,
+    add_study_directory,
+    load_scene,
+    prepare,
+    whole,
+)
 
 Parser = argparse.ArgumentParser
 
@@ -69,3 +77,20 @@ def _graph(options: argparse.Namespace) -> int:
     prepare()
     graph.run(scene)
     return 0
+
+
+def add_recorder(commands: Any) -> Parser:
+    """`grasp study recorder`."""
+    sub = add_command(commands, "recorder", _recorder, "bytes and time per tick of a bag; recordings that are killed")
+    add_scene(sub)
+    sub.add_argument("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)")
+    sub.add_argument("--seed", type=whole(0), default=0, help="another seed kills at other moments (default 0)")
+    return sub
+
+
+def _recorder(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import recorder
+
+    scene = load_scene(options.scene, options.settings)
+    prepare()
+    return 0 if recorder.run(scene, options.kills, options.seed) else 1

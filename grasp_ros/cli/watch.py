@@ -7,7 +7,7 @@ import time
 import numpy as np
 from rich.live import Live
 
-from grasp_ros.graph.bag import Recording
+from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.view import Moment, View, named
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES

@@ -7,6 +7,7 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -86,9 +87,22 @@ def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> An
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
     try:
-        return numba.njit(cache=not inline, error_model="numpy", nogil=True, _nrt=counts, forceinline=inline)(function)
+        options = {"error_model": "numpy", "nogil": True, "_nrt": counts, "forceinline": inline}
+        compiled = numba.njit(cache=not inline, **options)(function)
     finally:
         numba.config.CACHE_DIR = before
+    if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
+        compiled._cache.save_overload = _where_there_is_room(compiled._cache.save_overload)
+    return compiled
+
+
+def _where_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
+    """Keeping machine code is a help, no need: a disk that is full only means to compile again."""
+    def attempt(*arguments: Any) -> None:
+        with suppress(OSError):
+            save(*arguments)
+
+    return attempt
 
 
 def kernels_on_disk() -> bool:

@@ -1,1 +1,1 @@
-"""The graph: processes, nodes and bags. Only `nodes` imports rclpy, only `bag` rosbags."""
+"""The graph: processes, nodes and bags. Only `nodes` imports rclpy, only the files of bags mcap and rosbags."""

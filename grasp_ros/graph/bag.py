@@ -1,305 +1,69 @@
-"""Recording and reading bags: rosbag2 directories with MCAP storage, stamped in simulated time."""
+"""Reading bags: rosbag2 directories with MCAP storage, stamped in simulated time.
+
+`recorder` writes them, `storage` knows their records, `recover` makes a new bag of one that is damaged.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import pairwise
+from array import array
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
-from rosbags.interfaces import (
-    Connection,
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
 from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
+from grasp_ros.graph.recorder import LOST_RECORD, OWN_RECORD, Recorder
+from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.rosbag2 import INFORMATION, METADATA_KEY, METADATA_RECORD, BagError, decode, names_of
 from grasp_ros.graph.running import Running
-from grasp_ros.physics.energy import Energy, energy
-from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.graph.storage import Storage, Stored
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.effects.force import SECTIONS
-from grasp_ros.scene.files import decoding, writing
-from grasp_ros.scene.topics import (
-    CHANGES,
-    CLOCK,
-    DIAGNOSTICS,
-    EXTERNAL_FORCES,
-    JOINT_STATES,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    RUN,
-    SCENE,
-    TIMING,
-    Topic,
-    state_of,
-)
+from grasp_ros.scene.files import decoding, read_text
+from grasp_ros.scene.strict_yaml import load as load_yaml
+from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 
-_TYPES = get_typestore(Stores.ROS2_JAZZY)
-_NO_LIMIT = QosTime(9223372036, 854775807)  # what Fast DDS reports for an infinite duration
+__all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
+KIND = "a bag of this package"
+VERSION = "version "  # how the keys of versions begin
+WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
-class BagError(Refused):
-    """A bag that cannot be written or read: names the path and the reason."""
-
-
-def _qos(topic: Topic) -> Qos:
-    return Qos(
-        QosHistory.KEEP_LAST, topic.depth, QosReliability.RELIABLE,
-        QosDurability.TRANSIENT_LOCAL if topic.latched else QosDurability.VOLATILE, _NO_LIMIT, _NO_LIMIT,
-        QosLiveliness.AUTOMATIC, _NO_LIMIT, False,
-    )
-
-
-class Recorder:
-    """Writes one bag: the scene and the versions first, then ticks.
-
-    Parameters
-    ----------
-    path : Path
-        Directory that does not exist yet.
-    scene : Scene
-        Its topics get a connection each.
-    versions : mapping of str to str
-        Stored in the bag's metadata.
-    names : mapping of Topic to str, optional
-        Full names of the topics in the graph; of those without a name here, the one without a namespace.
-    running : Running, optional
-        How the plant runs; default: in lockstep.
+def open_storage(path: Path, salvage: bool = False) -> Storage:
+    """The storage file of a bag, or of a directory that holds one.
 
     Raises
     ------
     BagError
-        If the directory exists or cannot be written, now or later.
+        If there is none, or more than one.
     """
-
-    def __init__(
-        self, path: Path, scene: scenes.Scene, versions: dict[str, str], names: Mapping[Topic, str] | None = None,
-        running: Running | None = None,
-    ) -> None:
-        self._path = path
-        try:
-            self._writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-            self._writer.open()
-        except (WriterError, OSError) as error:
-            raise BagError(f"{path}: cannot be written: {error}") from None
-        scene_yaml = scene.to_yaml()
-        self._writer.set_custom_data("scene", scene_yaml)
-        for name, version in sorted(versions.items()):
-            self._writer.set_custom_data(f"version {name}", version)
-        run_yaml, names = (running or Running()).to_yaml(), names or {}
-        self._writer.set_custom_data("run", run_yaml)
-        self._connections: dict[str, Connection] = {}
-        for topic in _topics(scene):
-            name = names.get(topic, topic.name if topic.name.startswith("/") else f"/{topic.name}")
-            self._writer.set_custom_data(f"topic {topic.name}", name)
-            self._connections[topic.name] = self._writer.add_connection(
-                name, topic.type, typestore=_TYPES, offered_qos_profiles=[_qos(topic)]
-            )
-        for topic, text in ((RUN, run_yaml), (SCENE, scene_yaml)):
-            string = _TYPES.types[SCENE.type](data=text)
-            self.write(topic, 0, bytes(_TYPES.serialize_cdr(string, SCENE.type)))
-
-    def write(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
-        """Append one serialized message with its simulated time."""
-        with writing(self._path, BagError):
-            self._writer.write(self._connections[topic.name], time_ns, cdr)
-
-    def write_tick(
-        self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float],
-        stamp_ns: int | None = None,
-    ) -> None:
-        """Append all of one tick, and its /clock.
-
-        Parameters
-        ----------
-        time_ns : int, ns
-            Time in the bag, which goes on where a reset puts simulated time back.
-        messages : iterable of Topic and bytes
-            Serialized messages.
-        lyapunov : sequence of float
-            The monitor's own values, see `topics.LYAPUNOV_NAMES`.
-        stamp_ns : int, ns, optional
-            Simulated time, where it is another one.
-        """
-        stamp_ns = time_ns if stamp_ns is None else stamp_ns
-        seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
-        clock = _TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-        message = _TYPES.types[CLOCK.type](clock=clock)
-        self.write(CLOCK, time_ns, bytes(_TYPES.serialize_cdr(message, CLOCK.type)))
-        for topic, cdr in messages:
-            self.write(topic, time_ns, cdr)
-        self._write_lyapunov(time_ns, stamp_ns, lyapunov)
-
-    def _write_lyapunov(self, time_ns: int, stamp_ns: int, values: Sequence[float]) -> None:
-        """Append the monitor's own values; serialized here, because rclpy pads this type with stray bytes."""
-        types = _TYPES.types
-        seconds, nanoseconds = divmod(stamp_ns, NANOSECONDS)
-        stamp = types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-        header = types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
-        nothing = np.zeros(0)
-        message = types[LYAPUNOV.type](
-            header=header, name=LYAPUNOV_NAMES, position=np.array(values), velocity=nothing, effort=nothing
-        )
-        self.write(LYAPUNOV, time_ns, bytes(_TYPES.serialize_cdr(message, LYAPUNOV.type)))
-
-    def close(self) -> None:
-        """Finish the bag; only now it has its metadata."""
-        with writing(self._path, BagError):
-            self._writer.close()
+    with decoding(path, KIND, BagError):
+        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        if len(files) != 1:
+            raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
+        return Storage(files[0], salvage)
 
 
-@dataclass(frozen=True)
-class Recording:
-    """What is in a bag.
-
-    Attributes
-    ----------
-    path : Path
-    scene : Scene
-    versions : dict of str to str
-        What the recording process ran with.
-    counts : dict of str to int
-        Messages by topic, of those that have one per tick.
-    tick : int array (n,)
-        Ticks whose state is in the bag.
-    state : array (n, 6), m and m/s
-        NaN for a body that is not there.
-    effort, command : arrays (n, 2), N
-        Forces of the controllers that acted until the tick, commands answered to it, which act later if there is a
-        delay; 0 without a controller, NaN where missing.
-    outputs : dict of str to array (n,), N
-        Impact and external forces by topic; NaN where missing.
-    lyapunov : array (n, 9)
-        What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
-    changes : dict of int to dict of str to float
-        Numbers that were set while the graph ran, by the tick from which they act.
-    running : Running
-        How the plant ran: in lockstep or with the wall clock, and with which accuracy.
-    starts : int array (k,)
-        Ticks of the bag at which the plant began the scene, again after each reset; the first is 0 in a bag that has
-        the beginning. `tick` and `t` go on where a reset puts simulated time back.
-    """
-
-    path: Path
-    scene: scenes.Scene
-    versions: dict[str, str]
-    counts: dict[str, int]
-    tick: np.ndarray
-    state: Array
-    effort: Array
-    command: Array
-    outputs: dict[str, Array]
-    lyapunov: Array
-    changes: dict[int, dict[str, float]]
-    running: Running
-    starts: np.ndarray
-
-    @property
-    def t(self) -> Array:
-        """Times in s."""
-        return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
-
-    @property
-    def inputs(self) -> Array:
-        """What acted on the bodies from each tick to the next: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
-
-        The commands that had arrived, which the next tick names as its effort, and the external forces. NaN where the
-        bag does not hold the next tick: at its end, and before a gap. `simulation.Trajectory.inputs` is the same.
-        """
-        inputs = np.zeros((len(self.tick), 3))
-        inputs[:-1, [LEFT, RIGHT]] = self.effort[1:]
-        external = {body: EXTERNAL_FORCES[name].name for name, body in SECTIONS.items()}
-        if any(topic in self.outputs for topic in external.values()):
-            nothing = np.zeros(len(self.tick))
-            inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
-        inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
-        return inputs
-
-    @property
-    def closed(self) -> bool:
-        """Whether V belongs to laws that were known and ran, at every tick."""
-        return bool((self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0).all())
-
-    @property
-    def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force.
-
-        Of the plant alone, without its controllers, unless `closed`.
-        """
-        if not self.closed:
-            return energy(self.scene.system.alone, self.state)
-        scene, begins = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
-        parts = []
-        for begin, end in pairwise(begins):
-            scene = scene.changed(self.changes.get(begin, {}))
-            parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
-        return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-    @property
-    def alarms(self) -> int:
-        """Ticks at which the monitor found energy that the held forces do not explain."""
-        return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
-
-    @property
-    def missing(self) -> dict[str, int]:
-        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run."""
-        ticks = int(self.tick.max(initial=-1)) + 1
-        held = () if self.running.lockstep else [topic.name for topic in self.scene.controllers.values()]
-        return {name: ticks - count for name, count in self.counts.items() if name not in held}
-
-
-def read(path: Path) -> Recording:
-    """Read a bag that the monitor recorded, with the rosbags reader.
+def scene_of(storage: Storage, path: Path) -> scenes.Scene:
+    """The scene of a bag, once its first record has been read.
 
     Raises
     ------
     BagError
-        If the path is not such a bag.
+        If the bag has none.
     """
-    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError, yaml.YAMLError)):
-        metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
-        custom = metadata["rosbag2_bagfile_information"]["custom_data"]
-        scene = scenes.parse(custom["scene"], path.name, str(path))
-        running = runnings.parse(custom["run"])
-        names = {key.removeprefix("topic "): word for key, word in custom.items() if key.startswith("topic ")}
-        with Reader(path) as reader:
-            columns = {topic: _column(reader, names[topic.name], topic, scene) for topic in scene.topics}
-            changes = _changes(reader, names, scene)
-    ticks, joints = columns[JOINT_STATES]
-    joints, stamps = joints[:, :8], joints[:, 8]
-    if not len(ticks):
-        raise BagError(f"{path}: holds no tick")
+    if OWN_RECORD not in storage.records:
+        raise BagError(f"{path}: not {KIND}: its scene is missing")
+    return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))
 
-    def aligned(topic: Topic) -> Array:
-        found, values = columns[topic]
-        result = np.full((len(ticks), values.shape[1]), np.nan)
-        _, here, there = np.intersect1d(ticks, found, return_indices=True)
-        result[here] = values[there]
-        return result
 
-    command = np.zeros((len(ticks), 2))
-    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-        command[:, side] = aligned(topic)[:, 0]
-    return Recording(
-        path, scene, {k.removeprefix("version "): v for k, v in custom.items() if k.startswith("version ")},
-        {topic.name: len(found) for topic, (found, _) in columns.items()}, ticks, joints[:, :6], joints[:, 6:], command,
-        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV), changes,
-        running, ticks[stamps == 0.0],
-    )
+def running_of(storage: Storage) -> Running:
+    """How the plant of a bag ran, once its first record has been read."""
+    return runnings.parse(storage.records[OWN_RECORD]["run"])
 
 
 def names(path: Path) -> dict[str, Topic]:
@@ -310,42 +74,112 @@ def names(path: Path) -> dict[str, Topic]:
     BagError
         If the path is not such a bag.
     """
-    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError, yaml.YAMLError)):
-        metadata = yaml.safe_load((path / "metadata.yaml").read_text(encoding="utf-8"))
-        custom = metadata["rosbag2_bagfile_information"]["custom_data"]
-        scene = scenes.parse(custom["scene"], path.name, str(path))
-        return {custom[f"topic {topic.name}"]: topic for topic in _topics(scene)}
+    storage = open_storage(path)
+    with decoding(path, KIND, BagError, (SerdeError,)):
+        next(storage.messages())
+        scene = scene_of(storage, path)
+        return {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
 
 
-def raw(path: Path) -> Iterator[tuple[str, int, bytes]]:
-    """Full name of the topic, time in ns and serialized message of everything in a bag, in the order of time.
+def raw(path: Path) -> Iterator[Stored]:
+    """Everything in a bag, in the order of time, as it lies in the file.
 
     Raises
     ------
     BagError
-        If the path is not such a bag.
+        If the path is not such a bag, or if it is damaged.
     """
-    with decoding(path, "a bag of this package", BagError, (ReaderError, SerdeError)), Reader(path) as reader:
-        for connection, time_ns, cdr in reader.messages():
-            yield connection.topic, time_ns, bytes(cdr)
+    with decoding(path, KIND, BagError):
+        yield from open_storage(path).messages()
 
 
-def _topics(scene: scenes.Scene) -> list[Topic]:
-    """What a bag of a scene holds."""
-    return list(dict.fromkeys((RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS)))
+def read(path: Path) -> Recording:
+    """Read a bag that the monitor recorded, also one that was not closed.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag, or if it is damaged.
+    """
+    storage = open_storage(path)
+    with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
+        columns, changes, scene = _Columns(), _Changes(), None
+        for stored in storage.messages():
+            if scene is None:
+                scene = scene_of(storage, path)
+                known = {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
+                held = () if running_of(storage).lockstep else scene.controllers.values()
+            topic = known.get(stored.topic)
+            if topic is None or topic.type != stored.type:
+                raise BagError(f"{path}: {stored.topic}: {stored.type} is not a topic of its scene")
+            if topic in CHANGES.values():
+                changes.add(topic, stored, scene)
+            elif topic in held:  # as they came, not one for each tick
+                columns.held[topic] = columns.held.get(topic, 0) + 1
+            elif topic in scene.topics:
+                columns.add(topic, stored, scene)
+        if scene is None or not columns.ticks.get(JOINT_STATES):
+            raise BagError(f"{path}: holds no tick")
+        _check_metadata(path, storage)
+        return _recording(path, scene, columns, changes, storage)
 
 
-def _messages(reader: Reader, name: str, topic: Topic, scene: scenes.Scene) -> Iterator[tuple[int, Any]]:
-    """Tick and message of everything on a topic."""
-    connections = [connection for connection in reader.connections if connection.topic == name]
-    for _, time_ns, raw in reader.messages(connections) if connections else ():
-        yield time_ns // scene.period_ns, _TYPES.deserialize_cdr(raw, topic.type)
+def _check_metadata(path: Path, storage: Storage) -> None:
+    """Refuse a metadata.yaml that says something else than the copy of it within the closed file."""
+    file = path / "metadata.yaml"
+    if storage.closed and path.is_dir() and file.exists():
+        inside = load_yaml(storage.records[METADATA_RECORD][METADATA_KEY])
+        if load_yaml(read_text(file)) != {INFORMATION: inside}:
+            raise BagError(f"{file}: does not describe this bag; `grasp recover` makes a new one")
 
 
-def _column(reader: Reader, name: str, topic: Topic, scene: scenes.Scene) -> tuple[np.ndarray, Array]:
-    found = [(tick, _values(topic, message)) for tick, message in _messages(reader, name, topic, scene)]
-    rows = np.array([row for _, row in found], dtype=float).reshape(len(found), -1)
-    return np.array([tick for tick, _ in found], dtype=np.int64), rows
+class _Columns:
+    """Ticks and numbers by topic, as they come."""
+
+    def __init__(self) -> None:
+        self.ticks: dict[Topic, array[int]] = {}
+        self.values: dict[Topic, array[float]] = {}
+        self.held: dict[Topic, int] = {}  # numbers of messages
+
+    def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
+        tick, rest = divmod(stored.time_ns, scene.period_ns)
+        ticks = self.ticks.setdefault(topic, array("q"))
+        row = _values(topic, decode(topic, stored.cdr))
+        if row.shape != (WIDTH.get(topic, 1),):
+            raise BagError(f"{stored.topic}: {row.size} numbers; allowed: {WIDTH.get(topic, 1)}")
+        beyond = topic == JOINT_STATES and row[-1] > scene.ticks * scene.period_ns
+        if rest or beyond or (ticks and ticks[-1] >= tick):
+            raise BagError(f"{stored.topic}: {stored.time_ns} ns; allowed: ticks of the scene in their order")
+        ticks.append(tick)
+        self.values.setdefault(topic, array("d")).extend(row.tolist())
+
+    def count(self, topic: Topic) -> int:
+        """Messages of a topic."""
+        return self.held.get(topic, len(self.ticks.get(topic, ())))
+
+    def of(self, topic: Topic) -> tuple[np.ndarray, Array]:
+        """Ticks (n,) and rows (n, k) of a topic."""
+        width = WIDTH.get(topic, 1)
+        found = np.array(self.ticks.get(topic, ()), dtype=np.int64)
+        return found, np.array(self.values.get(topic, ()), dtype=float).reshape(-1, width)
+
+
+class _Changes(dict[int, dict[str, float]]):
+    """Numbers that differ from those in force before, by the tick of the bag from which they act."""
+
+    def __init__(self) -> None:
+        self._now: dict[str, float] = {}
+
+    def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
+        message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
+        numbers = dict(zip(message.name, message.position.tolist(), strict=True))
+        known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
+        if not numbers.keys() <= known.keys():
+            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(known)}")
+        now = {**known, **self._now}
+        if new := {name: number for name, number in numbers.items() if now[name] != number}:
+            self.setdefault(tick, {}).update(new)
+            self._now.update(new)
 
 
 def _values(topic: Topic, message: Any) -> Array:
@@ -356,14 +190,32 @@ def _values(topic: Topic, message: Any) -> Array:
     return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
 
 
-def _changes(reader: Reader, names: Mapping[str, str], scene: scenes.Scene) -> dict[int, dict[str, float]]:
-    """Numbers that differ from those in force before, by the tick from which they act."""
-    changes: dict[int, dict[str, float]] = {}
-    for topic in CHANGES.values():
-        now = {name: scene.values[name.split(".")[0]][name.split(".")[1]] for name in scene.live}
-        for tick, message in _messages(reader, names[topic.name], topic, scene):
-            numbers = dict(zip(message.name, message.position.tolist(), strict=True))
-            if new := {name: number for name, number in numbers.items() if now[name] != number}:
-                changes.setdefault(tick, {}).update(new)
-                now.update(new)
-    return dict(sorted(changes.items()))
+def _recording(path: Path, scene: scenes.Scene, columns: _Columns, changes: _Changes, storage: Storage) -> Recording:
+    ticks, joints = columns.of(JOINT_STATES)
+    joints, stamps = joints[:, :8], joints[:, 8]
+
+    def aligned(topic: Topic) -> Array:
+        found, values = columns.of(topic)
+        result = np.full((len(ticks), values.shape[1]), np.nan)
+        _, here, there = np.intersect1d(ticks, found, return_indices=True)
+        result[here] = values[there]
+        return result
+
+    command = np.zeros((len(ticks), 2))
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        command[:, side] = aligned(topic)[:, 0]
+    own = storage.records[OWN_RECORD]
+    return Recording(
+        path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
+        {topic.name: columns.count(topic) for topic in scene.topics}, ticks, joints[:, :6], joints[:, 6:], command,
+        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
+        dict(changes), running_of(storage), ticks[stamps == 0.0], _lost(storage),
+    )
+
+
+def _lost(storage: Storage) -> dict[str, str]:
+    """What the bag says about its end; in place of a word that it does not have, what its reader has seen."""
+    if storage.closed:
+        return storage.records[LOST_RECORD]
+    left_out = sum(size for _, size, _ in storage.left_out)
+    return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}

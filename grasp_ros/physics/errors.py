@@ -2,6 +2,13 @@
 
 from __future__ import annotations
 
+LONGEST = 4000  # characters of a sentence
+
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package
-    """Input that is refused: names what, its value and what is allowed."""
+    """Input that is refused: names what, its value and what is allowed; the middle of a very long value is left out."""
+
+    def __init__(self, sentence: str) -> None:
+        if len(sentence) > LONGEST:
+            sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
+        super().__init__(sentence)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
 from zipfile import BadZipFile
 
 from grasp_ros.physics.errors import Refused
 
+TEXT_BYTES = 2**20  # of a scene or of the metadata of a bag
 DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that were damaged at random
     OSError, EOFError, MemoryError, ValueError, TypeError, LookupError, OverflowError, RuntimeError, struct.error,
     zlib.error, BadZipFile,
@@ -33,6 +37,22 @@ def reading(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
         raise refusal(f"{path}: {error}; allowed: UTF-8 text") from None
 
 
+def read_text(path: Path, refusal: type[Refused] = Refused, most: int = TEXT_BYTES) -> str:
+    """All of a text file that is not larger than such files are.
+
+    Raises
+    ------
+    Refused
+        Of the given type, if the file cannot be read, is larger, or is not UTF-8.
+    """
+    with reading(path, refusal):
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+        if len(content) > most:
+            raise refusal(f"{path}: larger than {most} bytes; allowed: at most that")
+        return content.decode("utf-8")
+
+
 @contextmanager
 def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
     """Refuse a path that the system does not let us write.
@@ -50,6 +70,29 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
         raise
     except OSError as error:
         raise refusal(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """A file to write that takes the place of what was there only when it is whole.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written; what was there is still there.
+    """
+    with writing(path):
+        if path.exists() and not path.is_file():  # a device, a pipe; a directory refuses by itself
+            with path.open("wb") as file:
+                yield file
+            return
+        part = path.with_name(f".{path.name[:200]}.{os.getpid()}.part")
+        try:
+            with part.open("xb") as file:
+                yield file
+            part.replace(path.resolve())
+        finally:
+            part.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -74,5 +117,7 @@ def decoding(path: object, kind: str, refusal: type[Refused] = Refused, also: tu
     try:
         yield
     except DAMAGE + also as error:
+        if isinstance(error, Refused) and str(error).startswith(str(path)):  # a door behind this one has said it all
+            raise refusal(str(error)) from None
         reason = " ".join(str(error).split()) or type(error).__name__
         raise refusal(f"{path}: not {kind}: {reason}") from None

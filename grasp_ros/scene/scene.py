@@ -20,12 +20,12 @@ from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
-from grasp_ros.scene.files import reading
+from grasp_ros.scene.files import read_text, reading
 from grasp_ros.scene.settings import apply
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
-from grasp_ros.scene.validation import SceneError, check_keys, check_together, read_sections
+from grasp_ros.scene.validation import SceneError, check_keys, check_together, is_text, read_sections
 
 TEXTS = ("title", "readings", "watch")
 PAPER = frozenset(  # the sections of the paper's grasp
@@ -225,7 +225,7 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
         with reading(reference, SceneError):
             if not path.is_file():
                 raise SceneError(f"{reference}: no such file")
-            text = path.read_text(encoding="utf-8")
+        text = read_text(path, SceneError)
         return parse(text, path.stem, str(path), settings)
     if reference not in names():
         known = ", ".join(names())
@@ -284,10 +284,10 @@ def _read(document: Mapping[Any, Any], name: str, source: str) -> Scene:
     check_keys(source, "", document, (*TEXTS, *BY_SECTION), ("title", "readings", "time"))
     title, readings, watch = document["title"], document["readings"], document.get("watch", "")
     for key, value in (("title", title), ("watch", watch)):
-        if not isinstance(value, str):
-            raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text")
-    if not isinstance(readings, (list, tuple)) or not all(isinstance(reading, str) for reading in readings):
-        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of texts")
+        if not is_text(value):
+            raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text without control characters")
+    if not isinstance(readings, (list, tuple)) or not all(is_text(reading) for reading in readings):
+        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of such texts")
     values = read_sections(source, {key: numbers for key, numbers in document.items() if key in BY_SECTION})
     check_together(source, values)
     return Scene(name, title, tuple(readings), watch, values)

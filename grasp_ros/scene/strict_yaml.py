@@ -9,16 +9,49 @@ from typing import Any
 import yaml
 
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import TEXT_BYTES
 
 _FLOAT = re.compile(r"^[-+]?(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$")
 _INT = re.compile(r"^[-+]?(0|[1-9]\d*)$")
 _RULES = (("float", _FLOAT), ("int", _INT))
+MOST_DEPTH, MOST_NODES = 20, 50_000
+LONG = 60  # characters that a refusal shows of a name
 MISFITS = (ValueError, LookupError, AttributeError)  # what PyYAML raises for 2001-13-45, `!!bool x`, `!!timestamp x`
 _NUMERIC = {f"tag:yaml.org,2002:{kind}" for kind, _ in _RULES}
 
 
 class _Loader(yaml.SafeLoader):
-    """SafeLoader with the numbers of YAML 1.2 and unique keys."""
+    """SafeLoader with the numbers of YAML 1.2 and unique keys; without tags, anchors and directives.
+
+    They say nothing that a scene could need, and cost what a stranger wants: a list of lists of aliases is larger than
+    any memory.
+    """
+
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = self._nodes = 0
+
+    def compose_document(self) -> Any:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        if event.version or event.tags:
+            raise Refused(f"line {event.start_mark.line + 1}: a directive; allowed: none")
+        return super().compose_document()
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        event = self.peek_event()  # type: ignore[no-untyped-call]
+        self._depth, self._nodes = self._depth + 1, self._nodes + 1
+        where = f"line {event.start_mark.line + 1}: "
+        if event.anchor is not None:
+            raise Refused(f"{where}an anchor or alias, {event.anchor[:LONG]}; allowed: none")
+        if event.tag is not None:
+            raise Refused(f"{where}a tag, {event.tag[:LONG]}; allowed: none")
+        if self._depth > MOST_DEPTH:
+            raise Refused(f"{where}nested too deeply; allowed: {MOST_DEPTH} levels")
+        if self._nodes > MOST_NODES:
+            raise Refused(f"{where}more than {MOST_NODES} keys and values; allowed: at most that")
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
 
 class _Dumper(yaml.SafeDumper):
@@ -55,8 +88,11 @@ def load(text: str) -> Any:
     Raises
     ------
     Refused
-        If the text is not YAML, a key stands twice, or a key is a list or a mapping.
+        If the text is not YAML or too large, a key stands twice or is a list or a mapping, or there is a tag, an
+        anchor, an alias or a directive.
     """
+    if len(text) > TEXT_BYTES:
+        raise Refused(f"larger than {TEXT_BYTES} characters; allowed: at most that")
     try:
         return yaml.load(text, _Loader)
     except Refused:
@@ -65,8 +101,6 @@ def load(text: str) -> Any:
         raise Refused(" ".join(str(error).split())) from None
     except MISFITS as error:
         raise Refused(f"a value cannot be read: {error}") from None
-    except RecursionError:
-        raise Refused("nested too deeply") from None
 
 
 def dump(document: Any) -> str:

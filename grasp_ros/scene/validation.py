@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,6 +16,13 @@ SOMETHING = frozenset(("left_arm", "object", "right_arm"))
 
 class SceneError(Refused):
     """A scene that cannot be run as written: names the file, the key, the value and what is allowed."""
+
+
+def is_text(value: Any) -> bool:
+    """Whether a value is a text that a terminal and a file can take: no controls but line breaks."""
+    return isinstance(value, str) and not any(
+        unicodedata.category(character) in ("Cc", "Cs") and character != "\n" for character in value
+    )
 
 
 def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str], needed: Sequence[str]

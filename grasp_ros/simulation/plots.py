@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import shorten
 from typing import Protocol
 
 import matplotlib
@@ -18,9 +19,10 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import PAPER, Scene
-from grasp_ros.scene.files import writing
+from grasp_ros.scene.files import replacing
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
+LONGEST_TITLE = 200  # characters
 PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
 PAPER_INPUT = (-10.0, 10.0)  # N
 
@@ -70,7 +72,8 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
     figure, (top, middle, bottom) = plt.subplots(
         3, 1, sharex=True, figsize=(9.0, 9.0), height_ratios=(3, 2, 3), layout="constrained"
     )
-    figure.suptitle(f"{motion.scene.title}\n{caption}", fontsize="medium")
+    title = shorten(motion.scene.title, LONGEST_TITLE, placeholder=" ...")
+    figure.suptitle(f"{title}\n{caption}", fontsize="medium", parse_math=False)  # a $ of a title is a $
     for column, label, color in ((0, "$x_l$", LEFT_COLOR), (2, "$x_o$", OBJECT_COLOR), (4, "$x_r$", RIGHT_COLOR)):
         if not np.isnan(motion.state[:, column]).all():
             top.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
@@ -106,8 +109,8 @@ def save(figure: Figure, path: Path, dpi: int = 150) -> None:
             raise Refused(f"{path}: no ending; allowed: one of {', '.join(sorted(known))}")
         if ending not in known:
             raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
-        with writing(path):
-            figure.savefig(path, dpi=dpi)
+        with replacing(path) as file:
+            figure.savefig(file, format=ending, dpi=dpi)
     except RuntimeError as error:  # a .pgf where there is no TeX
         raise Refused(f"{path}: {error}") from None
     finally:

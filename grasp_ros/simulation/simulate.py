@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from operator import length_hint
 from types import MappingProxyType
 
 import numpy as np
@@ -76,6 +77,7 @@ def simulate(
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
     grid = np.asarray(grid, dtype=float)
     _check_grid(scene, grid)
+    _check_ticks(scene, sampled, max_work)
     loop = SampledLoop(scene, grid, changes, progress) if sampled else None
     drive = loop.drive if loop else partial(drive_external, scene, grid) if scene.system.external else None
     problem = Problem(scene.system, scene.duration, grid, setting, max_events, max_work, sampled, drive)
@@ -88,6 +90,14 @@ def simulate(
         scene, grid[:reached], found.state, record, found.event_table, found.work, found.status, method, setting,
         found.stop,
     )
+
+
+def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:
+    """Refuse more control periods, each of which costs a piece of work at least, than the budget lets a run do."""
+    changes = [length_hint(force.changes(scene.ticks)) for force in scene.system.external]
+    ticks, most = scene.ticks if sampled else max(changes, default=0), max(MAX_WORK, max_work)
+    if ticks > most:
+        raise Refused(f"{scene.name}: {ticks} control periods with an input each; allowed: max_work, {most}")
 
 
 def _check_grid(scene: Scene, grid: Array) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -17,9 +16,11 @@ from grasp_ros.physics.energy import Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.files import decoding, writing
+from grasp_ros.scene.files import decoding, replacing
+from grasp_ros.scene.npz import TEXT, Field, read_npz
 
 
 def tick_times(scene: Scene) -> Array:
@@ -142,7 +143,7 @@ class Trajectory:
             If the file cannot be written.
         """
         level = self.energy
-        with writing(path), path.open("wb") as file:
+        with replacing(path) as file:
             np.savez_compressed(
                 file, t=self.t, state=self.state, command=self.command, inputs=self.inputs,
                 V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode,
@@ -155,6 +156,18 @@ class Trajectory:
             )
 
 
+_ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate")}
+_TIMES = {
+    f"{kind}_{side}": Field("<f8", (f"{kind} {side}",)) for kind in ("touch", "release") for side in ("left", "right")
+}
+_WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene")}
+FIELDS = {
+    **_ROW, "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
+    "mode": Field("<i8", ("n",)), **_TIMES, "events": Field("<f8", ("events", 5)), "work": Field("<i8", ("work",)),
+    "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
+}
+
+
 def load(path: Path) -> Trajectory:
     """Read what `Trajectory.save` wrote.
 
@@ -163,21 +176,49 @@ def load(path: Path) -> Trajectory:
     Refused
         If the file is not such a file.
     """
-    kind = "a file of `grasp simulate`"
-    with decoding(path, kind), path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-        scene = scenes.parse(str(data["scene"]), str(data["scene_name"]), str(path))
-        method, rows, events = find(str(data["method"])), len(data["t"]), len(data["events"])
-        loop = Loop(_numbers(data, "command", rows, 2), _numbers(data, "inputs", rows, 3))
-        return Trajectory(
-            scene, _numbers(data, "t", rows), _numbers(data, "state", rows, 6), loop if data["sampled"] else None,
-            _numbers(data, "events", events, 5), _numbers(data, "work", len(method.counters)),
-            Status[str(data["status"])], method.name, float(data["setting"]), str(data["stop"]),
+    with decoding(path, "a file of `grasp simulate`"):
+        data = read_npz(path, FIELDS)
+        words = {name: str(data[name]) for name in _WORDS}
+        scene, method = scenes.parse(words["scene"], words["scene_name"], str(path)), find(words["method"])
+        if data["work_names"].tolist() != [counter.name.lower() for counter in method.counters]:
+            raise Refused(f"work_names: {data['work_names'].tolist()}; allowed: the counters of {method.name}")
+        loop = Loop(data["command"], data["inputs"]) if data["sampled"] else None
+        found = Trajectory(
+            scene, data["t"], data["state"], loop, data["events"], data["work"], Status[words["status"]], method.name,
+            float(data["setting"]), words["stop"],
         )
+        _check(found)
+        for side, name in ((LEFT, "left"), (RIGHT, "right")):
+            for kind in (Transition.TOUCH, Transition.RELEASE):
+                key = f"{kind.name.lower()}_{name}"
+                if data[key].tolist() != found.times(kind, side).tolist():
+                    raise Refused(f"{key}: not those of the events")
+        return found
 
 
-def _numbers(data: Mapping[str, np.ndarray], name: str, *shape: int) -> np.ndarray:
-    """An array of a file, if it has the shape that the others ask for."""
-    found = data[name]
-    if found.shape != shape or found.dtype.kind not in "fi":
-        raise Refused(f"{name}: {found.dtype} of shape {found.shape} is not allowed; allowed: numbers of shape {shape}")
-    return found
+def _check(found: Trajectory) -> None:
+    """Refuse numbers that no run has."""
+    events, end, done = found.event_table, found.scene.duration, found.status is Status.DONE
+    there = [body for body in COLUMN if body not in found.scene.system.absent]
+    columns = [COLUMN[body] + k for body in there for k in (0, 1)]
+    absent = np.delete(found.state, columns, axis=1)
+    acted = found.scene.ticks if found.sampled else 0
+    for name, good, allowed in (
+        ("t", _ascending(found.t, end), "ascending times within the horizon"),
+        ("state", not done or np.isfinite(found.state[:, columns]).all(), "finite numbers"),
+        ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
+        ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
+        ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
+        ("events", _ascending(events[:, 0], end), "ascending times within the horizon"),
+        ("events", np.isfinite(events).all() and np.isin(events[:, 1], list(COLUMN)).all(), "events of this scene"),
+        ("events", np.isin(events[:, 2], list(Transition)).all(), "events of this scene"),
+        ("work", (found.work >= 0).all(), "numbers >= 0"),
+        ("setting", np.isfinite(found.setting) and found.setting > 0.0, "a number > 0"),
+    ):
+        if not good:
+            raise Refused(f"{name}: not allowed; allowed: {allowed}")
+
+
+def _ascending(times: Array, end: float) -> bool:
+    """Whether times ascend within [0, end]."""
+    return bool((times[1:] >= times[:-1]).all() and (times >= 0.0).all() and (times <= end).all())

@@ -20,7 +20,7 @@ from grasp_ros.studies import measure
 from grasp_ros.studies.contenders import OURS, all_contenders
 from grasp_ros.studies.measure import Effort
 from grasp_ros.studies.peers import Contender
-from grasp_ros.studies.records import Journal, Record, describe_machine, metric, origin, scene_key, to_record, write_csv
+from grasp_ros.studies.records import Journal, Record, describe_machine, metric, origin, scene_key, write_csv
 
 STANDARD = ("case_01", "case_02", "case_03", "case_04")
 STIFF = ("case_01", 1e8)  # ten thousand times the paper's Hertz coefficient
@@ -72,12 +72,12 @@ def climb(
     made_by = origin(contender.family)
     for setting in ladder:
         key = f"{scene_key(scene)} {made_by} {contender.name} {setting!r} {effort.budget}"
-        value = journal.get(key)
-        if value is None:
+        kept = journal.get(key, Record)
+        if kept is None:
             record, _ = measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
-            journal.put(key, record._asdict())
+            journal.put(key, record)
         else:
-            record = to_record(value)._replace(scene=scene.name)
+            record = kept._replace(scene=scene.name)
         records.append(record)
         if measure.given_up(record, effort):
             break

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -57,11 +57,11 @@ def run(directory: Path, seconds: float = SECONDS, methods: dict[str, float] | N
     for name, setting in (bar := tqdm(chosen.items(), unit="method", file=sys.stderr)):
         bar.set_description(f"energy drift {name}")
         key = f"drift {scene_key(scene)} {origin(contenders[name].family)} {name} {setting!r}"
-        value: Any = journal.get(key)
-        if value is None:
-            value = _measure(contenders[name], scene, setting)._asdict()
-            journal.put(key, value)
-        results.append(Drift(**value))
+        drift = journal.get(key, Drift)
+        if drift is None:
+            drift = _measure(contenders[name], scene, setting)
+            journal.put(key, drift)
+        results.append(drift)
     return results
 
 

@@ -52,11 +52,11 @@ def run(scene: Scene, directory: Path, graph_periods: tuple[float, ...] = GRAPH_
     for period in (bar := tqdm(PERIODS_MS, unit="period", file=sys.stderr)):
         bar.set_description(f"control period {period:g} ms")
         key = f"loop {scene_key(scene)} {origin('grasp_ros')} {period!r} {period in graph_periods}"
-        value: Any = journal.get(key)
-        if value is None:
-            value = _measure(scene, period, grid, ideal, period in graph_periods)._asdict()
-            journal.put(key, value)
-        points.append(Point(**value))
+        point = journal.get(key, Point)
+        if point is None:
+            point = _measure(scene, period, grid, ideal, period in graph_periods)
+            journal.put(key, point)
+        points.append(point)
     return points
 
 

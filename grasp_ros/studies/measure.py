@@ -13,7 +13,8 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import decoding, writing
+from grasp_ros.scene.files import decoding, replacing
+from grasp_ros.scene.npz import Field, read_npz
 from grasp_ros.studies.peers import Answer, Contender, Solve
 from grasp_ros.studies.records import Journal, Record, scene_key
 from grasp_ros.verification import reference
@@ -28,6 +29,9 @@ class Truth(NamedTuple):
     grid: Array  # (n,), s
     state: Array  # (n, 6), m and m/s
     touches: tuple[int, int]
+
+
+TRUTH = {"grid": Field("<f8", ("n",)), "state": Field("<f8", ("n", 6)), "touches": Field("<i8", (2,))}
 
 
 class Effort(NamedTuple):
@@ -69,13 +73,14 @@ def truth(scene: Scene, journal: Journal) -> Truth:
     """
     path = journal.directory / f"reference_{scene_key(scene)}.npz"
     if path.exists():
-        with decoding(path, "a reference of a study"), np.load(path) as data:
+        with decoding(path, "a reference of a study"):
+            data = read_npz(path, TRUTH)
             return Truth(data["grid"], data["state"], (int(data["touches"][0]), int(data["touches"][1])))
     grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
     exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid.tolist(), digits=DIGITS)
     result = Truth(grid, exact.as_array(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
-    with writing(path):
-        np.savez_compressed(path, **result._asdict())
+    with replacing(path) as file:
+        np.savez_compressed(file, **result._asdict())
     return result
 
 

@@ -11,13 +11,17 @@ import platform
 from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from grasp_ros import methods
 from grasp_ros.exact.jit import sources_digest
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import decoding, reading, writing
+from grasp_ros.scene.files import decoding, read_text, writing
 
+KIND = "the journal of a study"
+MOST_BYTES = 2**26  # of a journal
+T = TypeVar("T")
 PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "heyoka")
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
 
@@ -120,33 +124,62 @@ class Journal:
             self._read()
 
     def _read(self) -> None:
-        with reading(self._path):
-            text = self._path.read_text(encoding="utf-8")
+        text = read_text(self._path, most=MOST_BYTES)
         whole = text[: text.rfind("\n") + 1]
         if whole != text:  # the last line of a run that was killed
             with writing(self._path):
                 self._path.write_text(whole, encoding="utf-8")
-        for line in whole.splitlines():
-            with decoding(self._path, "the journal of a study"):
+        for number, line in enumerate(whole.splitlines(), 1):
+            with decoding(self._path, KIND):
                 entry = json.loads(line)
+                if entry["sum"] != digest(entry["key"], json.dumps(entry["value"])):
+                    raise Refused(f"line {number}: its checksum is wrong; delete it, and its part is measured again")
                 self._lines[entry["key"]] = entry["value"]
 
-    def get(self, key: str) -> Any:
-        """What was noted under a key; None if nothing was."""
-        return self._lines.get(key)
+    def get(self, key: str, kind: type[T]) -> T | None:
+        """What was noted under a key; None if nothing was.
+
+        Raises
+        ------
+        Refused
+            If it is no record of this kind.
+        """
+        if key not in self._lines:
+            return None
+        hints = get_type_hints(kind)
+        with decoding(self._path, KIND):
+            line = self._lines[key]
+            value = {name: _restored(line[name], hint) for name, hint in hints.items()}
+            wrong = [name for name, hint in hints.items() if not _fits(value[name], hint)]
+            if wrong or len(line) != len(hints):
+                raise Refused(f"{', '.join(wrong) or ', '.join(line)}: not what a study writes")
+            return kind(**value)
 
     def put(self, key: str, value: Any) -> None:
-        """Note something at once."""
-        self._lines[key] = value
+        """Note a record at once."""
+        content = value._asdict()
+        self._lines[key] = content
+        entry = {"key": key, "value": content, "sum": digest(key, json.dumps(content))}
         with writing(self._path), self._path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"key": key, "value": value}) + "\n")
+            file.write(json.dumps(entry) + "\n")
 
 
-def to_record(value: dict[str, Any]) -> Record:
-    """A record from the journal."""
-    found = value["found"]
-    pairs = {"found": None if found is None else tuple(found), "there_are": tuple(value["there_are"])}
-    return Record(**{**value, **pairs})
+def _restored(value: Any, hint: Any) -> Any:
+    """A value from a journal, whose pairs are lists."""
+    pair = tuple in (get_origin(hint), *map(get_origin, get_args(hint)))
+    return tuple(value) if pair and isinstance(value, list) else value
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value from a journal is of the type that its field says."""
+    inner = get_args(hint)
+    if get_origin(hint) is tuple:
+        return isinstance(value, tuple) and len(value) == len(inner) and all(map(_fits, value, inner))
+    if get_origin(hint) is list:
+        return isinstance(value, list) and all(_fits(one, inner[0]) for one in value)
+    if inner:
+        return any(_fits(value, one) for one in inner)
+    return isinstance(value, (int, float) if hint is float else hint) and (hint is bool or not isinstance(value, bool))
 
 
 def scene_key(scene: Scene) -> str:

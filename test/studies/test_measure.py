@@ -15,7 +15,7 @@ from grasp_ros.studies import accuracy, figures, measure
 from grasp_ros.studies.contenders import own_contenders
 from grasp_ros.studies.measure import Truth
 from grasp_ros.studies.peers import Answer, Contender
-from grasp_ros.studies.records import Journal, to_record
+from grasp_ros.studies.records import Journal, Record
 
 SHORT = "time.duration_s=2"
 QUICK = measure.QUICK._replace(stride=1)
@@ -103,7 +103,7 @@ def test_a_study_resumes_and_survives_a_line_cut_short(tmp_path: Path) -> None:
     assert second[:2] == first
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     assert len(lines) == 3
-    assert to_record(lines[-1]["value"]) == second[2]
+    assert Journal(tmp_path).get(lines[-1]["key"], Record) == second[2]
 
 
 def test_a_ladder_ends_where_a_run_takes_too_long(tmp_path: Path) -> None:

@@ -115,7 +115,7 @@ class Monitor(GraspNode):
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one."""
         if self._recorder is not None and self.counters["ticks"]:
-            self._recorder.write(topic, self._bag_ns, cdr)
+            self._recorder.write(topic, cdr)
 
     def _on_announcement(self, side: str, cdr: bytes) -> None:
         message = deserialize_message(cdr, JointState)
@@ -188,7 +188,7 @@ class Monitor(GraspNode):
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
-            self._recorder.close()
+            self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._values)
 

@@ -46,9 +46,8 @@ class Player(GraspNode):
 
     def _play(self) -> None:
         now = (time.monotonic() - self._begin) * self._rate
-        while self._next is not None and self._next[1] / NANOSECONDS <= now:
-            name, _, cdr = self._next
-            self._outputs[name].publish(cdr)
+        while self._next is not None and self._next.time_ns / NANOSECONDS <= now:
+            self._outputs[self._next.topic].publish(self._next.cdr)
             self.count("messages")
             self._next = next(self._rows, None)
         if self._next is None:

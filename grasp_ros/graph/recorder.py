@@ -1,0 +1,257 @@
+"""The recorder: a bag that can be read whenever and however its recording ends.
+
+Ticks are collected in a compressed chunk with a checksum. A thread ends the chunk and hands it to the disk every
+FLUSH_SECONDS, whether or not more ticks come. A reserve on the disk is there for the index: when the disk is full, the
+bag is closed, not cut off.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import resource
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+from mcap.writer import CompressionType, IndexType, Writer
+
+from grasp_ros.graph import rosbag2
+from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Reserve, Sink
+from grasp_ros.graph.rosbag2 import BagError
+from grasp_ros.graph.running import Running
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.files import writing
+from grasp_ros.scene.strict_yaml import dump
+from grasp_ros.scene.topics import CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, Topic
+
+FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
+INDEX_BYTES = 256  # at most what the index holds of one chunk
+OWN_RECORD, LOST_RECORD, DIGEST = "grasp_ros", "grasp_ros/lost", "digest"
+
+
+def signed(record: Mapping[str, str]) -> dict[str, str]:
+    """A metadata record with its checksum: MCAP itself has none before the file is closed."""
+    content = {key: value for key, value in record.items() if key != DIGEST}
+    return {**content, DIGEST: hashlib.sha256(repr(sorted(content.items())).encode()).hexdigest()}
+
+
+def ranges(ticks: Iterable[tuple[int, int]]) -> str:
+    """First and last ticks as text."""
+    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in ticks) or "none"
+
+
+class Recorder:
+    """Writes one bag: the scene and the versions first, then ticks.
+
+    Parameters
+    ----------
+    path : Path
+        Directory that does not exist yet.
+    scene : Scene
+        Its topics get a connection each.
+    versions : mapping of str to str
+        Stored in the bag's metadata.
+    names : mapping of Topic to str, optional
+        Full names of the topics in the graph; of those without a name here, the one without a namespace.
+    running : Running, optional
+        How the plant runs; default: in lockstep.
+
+    Raises
+    ------
+    BagError
+        If the directory exists or cannot be written, now or later. When the disk, or the size that the system allows a
+        file, has come to its end, the bag has been closed and is whole up to the last tick.
+    """
+
+    def __init__(
+        self, path: Path, scene: Scene, versions: Mapping[str, str], names: Mapping[Topic, str] | None = None,
+        running: Running | None = None,
+    ) -> None:
+        self._path, self._period_ns = path, scene.period_ns
+        self._counts = dict.fromkeys(rosbag2.topics_of(scene), 0)
+        self._last_ns = self._next = 0
+        self._gaps: list[tuple[int, int]] = []
+        self._waiting = self._chunks = 0
+        self._closed, self._error = False, ""
+        self._lock, self._stop = threading.Lock(), threading.Event()
+        words = {f"version {name}": word for name, word in sorted(versions.items())}
+        topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
+        self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
+        self._names = rosbag2.names_of(scene, self._custom)
+        with writing(path, BagError):
+            path.mkdir(parents=True)
+            self._reserve = Reserve(path / ".reserve")
+            self._sink = Sink(path / f"{path.name}.mcap", self._reserve)
+            self._begin()
+        if self._error:
+            raise BagError(self._error)
+        self._thread = threading.Thread(target=self._flush_regularly, name="recorder", daemon=True)
+        self._thread.start()
+
+    def _begin(self) -> None:
+        """All that a reader needs to know before the first tick, on the disk."""
+        self._writer = Writer(
+            self._sink, chunk_size=2**62, compression=CompressionType.ZSTD, index_types=IndexType.ALL,  # type: ignore[arg-type]
+            enable_data_crcs=True,
+        )
+        self._writer.start(rosbag2.PROFILE, f"grasp_ros-{version('grasp_ros')}")
+        self._writer.add_metadata(OWN_RECORD, signed(self._custom))
+        schemas = {
+            kind: self._writer.register_schema(kind, rosbag2.SCHEMA_ENCODING, rosbag2.definition(kind))
+            for kind in dict.fromkeys(topic.type for topic in self._counts)
+        }
+        self._channels = {
+            topic: self._writer.register_channel(
+                self._names[topic], rosbag2.ENCODING, schemas[topic.type],
+                {"offered_qos_profiles": dump(rosbag2.qos_profiles(topic)).strip()},
+            )
+            for topic in self._counts
+        }
+        for topic, key in ((SCENE, "scene"), (RUN, "run")):
+            self._add(topic, 0, rosbag2.text_message(self._custom[key]))
+        self._flush()
+        directory = os.open(self._path, os.O_RDONLY)
+        try:
+            os.fsync(directory)
+        finally:
+            os.close(directory)
+
+    def write_tick(
+        self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float],
+        stamp_ns: int | None = None,
+    ) -> None:
+        """Append all of one tick, and its /clock: it is in the bag as a whole, or not at all.
+
+        Parameters
+        ----------
+        time_ns : int, ns
+            Time in the bag, not before that of the last tick; goes on where a reset puts simulated time back.
+        messages : iterable of Topic and bytes
+            Serialized messages.
+        lyapunov : sequence of float
+            The monitor's own values, see `topics.LYAPUNOV_NAMES`.
+        stamp_ns : int, ns, optional
+            Simulated time, where it is another one.
+
+        Raises
+        ------
+        BagError
+            If the bag could not be written up to here, or ends with this tick.
+        """
+        stamp_ns = time_ns if stamp_ns is None else stamp_ns
+        own = rosbag2.list_message(stamp_ns, LYAPUNOV_NAMES, np.array(lyapunov, dtype=float))
+        clock = rosbag2.clock_message(stamp_ns)
+        with self._lock, writing(self._path, BagError):
+            if self._closed:
+                raise BagError(self._error or f"{self._path}: is closed")
+            self._add(CLOCK, time_ns, clock)
+            for topic, cdr in messages:
+                self._add(topic, time_ns, cdr)
+            self._add(LYAPUNOV, time_ns, own)
+            tick = time_ns // self._period_ns
+            if tick > self._next:
+                self._gaps.append((self._next, tick - 1))
+            self._last_ns, self._next = time_ns, tick + 1
+            if self._waiting > CHUNK_BYTES:
+                self._flush()
+        if self._error:
+            raise BagError(self._error)
+
+    def write(self, topic: Topic, cdr: bytes) -> None:
+        """Append what does not come with every tick, at the time of the last one; nothing once the bag is closed."""
+        with self._lock, writing(self._path, BagError):
+            if not self._closed:
+                self._add(topic, self._last_ns, cdr)
+
+    def _add(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
+        self._writer.add_message(self._channels[topic], time_ns, cdr, time_ns, self._counts[topic])
+        self._counts[topic] += 1
+        self._waiting += len(cdr)
+
+    def _flush(self) -> None:
+        """End the chunk; close the bag while there is room for its end."""
+        if not self._waiting:
+            return
+        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._waiting, self._chunks = 0, self._chunks + 1
+        index = INDEX_BYTES * self._chunks
+        try:
+            if not self._sink.full:
+                self._reserve.hold(RESERVE_BYTES + 2 * index)
+        except OSError as error:
+            if error.errno not in FULL:
+                raise
+            self._sink.full = True
+        limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
+        room = limit - self._sink.tell() if limit != resource.RLIM_INFINITY else RESERVE_BYTES + index
+        if self._sink.full or room < RESERVE_BYTES + index:
+            why = "no space is left on the disk" if self._sink.full else "files may not be larger"
+            end = f"the recording ends at {self._last_ns / NANOSECONDS} s"
+            self._error = f"{self._path}: {end}: {why}; the bag is closed, and whole up to there"
+            self._finish(why, {})
+
+    def _flush_regularly(self) -> None:
+        while not self._stop.wait(FLUSH_SECONDS):
+            try:
+                with writing(self._path, BagError):
+                    with self._lock:
+                        self._flush()
+                    if self._closed:
+                        return
+                    if not os.fstat(self._sink.file).st_nlink:
+                        raise BagError(f"{self._path}: was deleted during the recording")
+                    os.fdatasync(self._sink.file)
+            except BagError as error:  # for whoever writes or closes next
+                self._error, self._closed = str(error), True
+                return
+
+    def close(self, counters: Mapping[str, object] | None = None) -> None:
+        """Finish the bag; only now it has its metadata. Does nothing the second time.
+
+        Parameters
+        ----------
+        counters : mapping of str to object, optional
+            What else was lost or dropped, to be kept in the bag.
+
+        Raises
+        ------
+        BagError
+            If it cannot be written, or if that was already so before.
+        """
+        self._stop.set()
+        self._thread.join()
+        try:
+            with writing(self._path, BagError):
+                if not self._closed:
+                    self._flush()
+                if not self._closed:
+                    self._finish("closed", {name: str(value) for name, value in (counters or {}).items()})
+        finally:
+            self._closed = True
+            self._reserve.release()
+            self._sink.close()
+        if self._error:
+            raise BagError(self._error)
+
+    def _finish(self, why: str, counters: Mapping[str, str]) -> None:
+        """Write what was lost, the index, and the metadata."""
+        self._closed = True
+        self._reserve.release()
+        lost = {"end": why, "ticks that are missing": ranges(self._gaps), **counters}
+        document = rosbag2.metadata(
+            f"{self._path.name}.mcap", self._counts, self._names, self._last_ns, self._custom
+        )
+        self._writer.add_metadata(LOST_RECORD, signed(lost))
+        self._writer.add_metadata(rosbag2.METADATA_RECORD, {
+            rosbag2.METADATA_KEY: dump(document[rosbag2.INFORMATION]).strip()
+        })
+        self._writer.finish()  # type: ignore[no-untyped-call]
+        os.fsync(self._sink.file)
+        whole = self._path / "metadata.yaml"
+        part = whole.with_suffix(".part")
+        part.write_text(dump(document), encoding="utf-8")
+        part.replace(whole)

@@ -1,0 +1,95 @@
+"""`grasp recover`: a new bag, with index and metadata, from one that was cut off or damaged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, groupby
+from pathlib import Path
+from typing import NamedTuple
+
+from rosbags.serde import SerdeError
+
+from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
+from grasp_ros.graph import running as runnings
+from grasp_ros.graph.recorder import OWN_RECORD, Recorder
+from grasp_ros.graph.rosbag2 import BagError, decode, names_of
+from grasp_ros.graph.running import Running
+from grasp_ros.graph.storage import Storage, Stored
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.files import decoding
+from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
+
+
+class Recovery(NamedTuple):
+    """What has been saved, and what has not."""
+
+    ticks: int
+    left_out: list[tuple[int, int, str]]  # offset, size in bytes, and reason
+
+
+def recover(path: Path, new: Path) -> Recovery:
+    """Write all complete ticks of a bag into a new one; the old one is only read.
+
+    Parameters
+    ----------
+    path : Path
+        Directory of a bag, or its storage file; closed or not, damaged or not.
+    new : Path
+        Directory that does not exist yet.
+
+    Raises
+    ------
+    BagError
+        If nothing can be saved, or if the new bag cannot be written.
+    """
+    storage = bag.open_storage(path, salvage=True)
+    with decoding(path, bag.KIND, BagError, (SerdeError,)):
+        messages = storage.messages()
+        first = next(messages, None)
+        if first is None:
+            raise BagError(f"{path}: nothing can be recovered: it holds no whole chunk")
+        custom = storage.records.get(OWN_RECORD) or {"scene": decode(SCENE, first.cdr).data}
+        scene = scenes.parse(custom["scene"], path.name, str(path))
+    ticks = _ticks(storage, first, messages, scene)
+    begin = next(ticks, None)
+    if begin is None:
+        raise BagError(f"{path}: nothing can be recovered: it holds no complete tick")
+    running = runnings.parse(custom["run"]) if "run" in custom else Running()
+    versions = {key.removeprefix(bag.VERSION): word for key, word in custom.items() if key.startswith(bag.VERSION)}
+    recorder, written = Recorder(new, scene, versions, names_of(scene, custom), running), 0
+    try:
+        for time_ns, tick, beside in chain([begin], ticks):
+            own = decode(LYAPUNOV, tick.pop(LYAPUNOV))
+            stamp_ns = own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec
+            recorder.write_tick(time_ns, tick.items(), own.position.tolist(), stamp_ns)
+            for topic, cdr in beside:
+                recorder.write(topic, cdr)
+            written += 1
+    finally:
+        places = "; ".join(f"{size} at {offset}: {why}" for offset, size, why in storage.left_out)
+        recorder.close({"recovered from": str(path), "bytes that were left out": places or "none"})
+    return Recovery(written, storage.left_out)
+
+
+def _ticks(storage: Storage, first: Stored, following: Iterator[Stored], scene: scenes.Scene
+           ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
+    """Time, messages by topic, and what lies beside them, of every tick of which all are there, in ascending order."""
+    custom = storage.records.get(OWN_RECORD, {})
+    known = {(name, topic.type): topic for topic, name in names_of(scene, custom).items()}
+    lockstep = "run" not in custom or runnings.parse(custom["run"]).lockstep
+    wanted = {topic for topic in scene.topics if lockstep or topic not in scene.controllers.values()}
+    before = -1
+    with decoding(storage.path, bag.KIND, BagError, (SerdeError,)):
+        for time_ns, group in groupby(chain([first], following), lambda stored: stored.time_ns):
+            tick: dict[Topic, bytes] = {}
+            beside = []
+            for stored in group:
+                topic = known.get(stored[:2], SCENE)
+                if topic in wanted or topic in CHANGES.values():
+                    tick[topic] = stored.cdr
+                elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
+                    beside.append((topic, stored.cdr))
+            if time_ns % scene.period_ns == 0 and before < time_ns and tick.keys() >= wanted:
+                before = time_ns
+                yield time_ns, tick, beside

@@ -1,0 +1,141 @@
+"""What rosbag2 wants to know of a bag: message definitions, QoS profiles, and the metadata of the directory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+from rosbags.typesys import Stores, get_typestore
+
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.topics import CHANGES, CLOCK, DIAGNOSTICS, FORCE, NAMED_LIST, RUN, SCENE, TIMING, Topic
+
+VERSION = 9  # of the metadata
+PROFILE, ENCODING, SCHEMA_ENCODING = "ros2", "cdr", "ros2msg"
+METADATA_RECORD, METADATA_KEY = "rosbag2", "serialized_metadata"  # where rosbag2 looks within an MCAP file
+TOPIC = "topic "  # how the keys of topics' full names begin
+INFORMATION = "rosbag2_bagfile_information"
+_TYPES = get_typestore(Stores.ROS2_JAZZY)
+NOTHING = np.zeros(0)
+_NO_LIMIT = {"sec": 9223372036, "nsec": 854775807}  # what Fast DDS reports for an infinite duration
+
+
+class BagError(Refused):
+    """A bag that cannot be written or read: names the path and the reason."""
+
+
+def topics_of(scene: Scene) -> list[Topic]:
+    """Topics of a bag, in the order of their connections."""
+    return [SCENE, RUN, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS]
+
+
+def names_of(scene: Scene, custom: Mapping[str, str]) -> dict[Topic, str]:
+    """Full names of the topics of a bag; where it says nothing of one, without a namespace."""
+    return {topic: custom.get(f"{TOPIC}{topic.name}", f"/{topic.name.lstrip('/')}") for topic in topics_of(scene)}
+
+
+def qos_profiles(topic: Topic) -> list[dict[str, Any]]:
+    """What the publisher of a topic offers."""
+    return [{
+        "history": "keep_last", "depth": topic.depth, "reliability": "reliable",
+        "durability": "transient_local" if topic.latched else "volatile", "deadline": _NO_LIMIT.copy(),
+        "lifespan": _NO_LIMIT.copy(), "liveliness": "automatic", "liveliness_lease_duration": _NO_LIMIT.copy(),
+        "avoid_ros_namespace_conventions": False,
+    }]
+
+
+@cache
+def definition(kind: str) -> bytes:
+    """Definition of a message type with all types that it uses."""
+    return _TYPES.generate_msgdef(kind, ros_version=2)[0].encode()
+
+
+def metadata(
+    file: str, counts: Mapping[Topic, int], names: Mapping[Topic, str], last_ns: int, custom: Mapping[str, str]
+) -> dict[str, Any]:
+    """Document of metadata.yaml.
+
+    Parameters
+    ----------
+    file : str
+        Name of the storage file.
+    counts : mapping of Topic to int
+        Messages by topic.
+    names : mapping of Topic to str
+        Full names.
+    last_ns : int, ns
+        Last time; the first is 0.
+    custom : mapping of str to str
+        What rosbag2 carries along.
+    """
+    start, duration = {"nanoseconds_since_epoch": 0}, {"nanoseconds": last_ns}
+    total = sum(counts.values())
+    return {INFORMATION: {
+        "version": VERSION, "storage_identifier": "mcap", "duration": duration, "starting_time": start,
+        "message_count": total,
+        "topics_with_message_count": [
+            {
+                "topic_metadata": {
+                    "name": names[topic], "type": topic.type, "serialization_format": ENCODING,
+                    "offered_qos_profiles": qos_profiles(topic),
+                    "type_description_hash": _TYPES.hash_rihs01(topic.type),
+                },
+                "message_count": count,
+            }
+            for topic, count in counts.items()
+        ],
+        "compression_format": "", "compression_mode": "", "relative_file_paths": [file],
+        "files": [
+            {"path": file, "starting_time": dict(start), "duration": dict(duration), "message_count": total}
+        ],
+        "custom_data": dict(custom), "ros_distro": "jazzy",
+    }}
+
+
+def text_message(text: str) -> bytes:
+    """A text, serialized."""
+    return bytes(_TYPES.serialize_cdr(_TYPES.types[SCENE.type](data=text), SCENE.type))
+
+
+def list_message(
+    time_ns: int, names: Sequence[str], position: Array, velocity: Array = NOTHING, effort: Array = NOTHING
+) -> bytes:
+    """A stamped list of numbers with names, serialized; rclpy would pad it with stray bytes."""
+    return bytes(_TYPES.serialize_cdr(_TYPES.types[NAMED_LIST](
+        header=_header(time_ns), name=list(names), position=position, velocity=velocity, effort=effort
+    ), NAMED_LIST))
+
+
+def force_message(time_ns: int, force: float) -> bytes:
+    """A stamped force along the line in N, serialized."""
+    kind = _TYPES.types
+    vector = partial(kind["geometry_msgs/msg/Vector3"], y=0.0, z=0.0)
+    wrench = kind["geometry_msgs/msg/Wrench"](force=vector(x=float(force)), torque=vector(x=0.0))
+    return bytes(_TYPES.serialize_cdr(kind[FORCE](header=_header(time_ns), wrench=wrench), FORCE))
+
+
+def clock_message(time_ns: int) -> bytes:
+    """Simulated time, serialized."""
+    return bytes(_TYPES.serialize_cdr(_TYPES.types[CLOCK.type](clock=_header(time_ns).stamp), CLOCK.type))
+
+
+def _header(time_ns: int) -> Any:
+    seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
+    stamp = _TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
+    return _TYPES.types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+
+
+def decode(topic: Topic, cdr: bytes) -> Any:
+    """A serialized message of a topic.
+
+    Raises
+    ------
+    rosbags.serde.SerdeError, or what `scene.files.DAMAGE` lists
+        If it is none.
+    """
+    return _TYPES.deserialize_cdr(cdr, topic.type)

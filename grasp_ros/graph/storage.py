@@ -1,0 +1,233 @@
+"""The records of an MCAP file, whole, cut off or damaged.
+
+Every byte that a message depends on is under a checksum: of its chunk, and in a closed file of all data and of the
+index as well. The library's own reader would stop at the first byte that is wrong, or not notice it.
+"""
+
+from __future__ import annotations
+
+import mmap
+import struct
+import zlib
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Footer, Header, Message, Metadata, Schema
+
+from grasp_ros.graph.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
+from grasp_ros.graph.rosbag2 import PROFILE, BagError
+
+MAGIC = b"\x89MCAP0\r\n"
+HEAD = struct.Struct("<BQ")  # opcode and length of every record
+SUM = struct.Struct("<I")
+DATA_END_BYTES = HEAD.size + SUM.size
+FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
+CHUNK_MARK, CHUNK_MARK_AT = b"\x04\x00\x00\x00zstd", HEAD.size + 28  # how a chunk of the recorder is found again
+RECORD_BYTES = 2**23  # no record of a bag is larger, packed or unpacked
+RATIO = 200  # nor does any chunk of a bag pack better; only a bomb does
+DAMAGE = (McapError, zstandard.ZstdError, struct.error, UnicodeDecodeError, EOFError, OverflowError)
+
+
+class Stored(NamedTuple):
+    """One message as it lies in the file."""
+
+    topic: str
+    type: str
+    time_ns: int
+    cdr: bytes
+
+
+class Storage:
+    """One MCAP file, read once from its beginning.
+
+    Parameters
+    ----------
+    path : Path
+    salvage : bool
+        Whether to go on behind what is damaged. Otherwise it is refused; a file that was cut off is read to there.
+
+    Attributes
+    ----------
+    closed : bool
+        Whether the file has its end.
+    left_out : list of tuple of int, int, str
+        Offset, size and reason of what was not read; complete when all messages have been taken.
+    records : dict of str to dict of str to str
+        Metadata records by name, the same.
+    """
+
+    def __init__(self, path: Path, salvage: bool = False) -> None:
+        self.path, self._salvage = path, salvage
+        self.left_out: list[tuple[int, int, str]] = []
+        self.records: dict[str, dict[str, str]] = {}
+        self._channels: dict[int, Channel] = {}
+        self._schemas: dict[int, Schema] = {}
+        with path.open("rb") as file:
+            size = file.seek(0, 2)
+            self._data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
+        self.closed = len(self._data) > FOOTER_BYTES and self._data[-len(MAGIC) :] == MAGIC
+
+    def messages(self) -> Iterator[Stored]:
+        """All messages in the order of the file.
+
+        Raises
+        ------
+        BagError
+            If the file is no MCAP file of ROS 2, or damaged.
+        """
+        data = self._data
+        if data[: len(MAGIC)] != MAGIC:
+            raise BagError(f"{self.path}: not a bag of this package: no MCAP file")
+        if self.closed and not self._salvage:
+            self._check_sums()
+        offset = len(MAGIC)
+        while offset < len(data):
+            end = self._end_of(offset)
+            try:
+                if end is None:
+                    raise EOFError("the rest of a record is missing")
+                opcode, body = data[offset], data[offset + HEAD.size : end]
+                if opcode == Opcode.DATA_END:
+                    self._check_end(offset, end)
+                    return
+                yield from self._read(opcode, body)
+                offset = end
+            except DAMAGE as error:
+                offset = self._behind_damage(offset, " ".join(str(error).split()) or type(error).__name__)
+        if self.closed and not self._salvage:
+            self._refuse("its data have no end")
+
+    def _end_of(self, offset: int) -> int | None:
+        """Where a record ends; None if it is not all there."""
+        if offset + HEAD.size > len(self._data):
+            return None
+        _, length = HEAD.unpack_from(self._data, offset)
+        end = offset + HEAD.size + length
+        return int(end) if length <= RECORD_BYTES and end <= len(self._data) else None
+
+    def _read(self, opcode: int, body: bytes) -> Iterator[Stored]:
+        stream = ReadDataStream(BytesIO(body))
+        if opcode == Opcode.HEADER and Header.read(stream).profile != PROFILE:
+            raise BagError(f"{self.path}: not a bag of this package: no file of ROS 2")
+        if opcode == Opcode.METADATA:
+            found = Metadata.read(stream)
+            if found.name in (OWN_RECORD, LOST_RECORD) and found.metadata != signed(found.metadata):
+                raise McapError("the checksum of the metadata is wrong")
+            self.records[found.name] = {key: text for key, text in found.metadata.items() if key != DIGEST}
+        elif opcode == Opcode.CHUNK:
+            yield from self._unpack(Chunk.read(stream))
+        elif opcode == Opcode.MESSAGE_INDEX:
+            stream.read2()
+            if len(body) != 6 + stream.read4():
+                raise McapError("an index that is not as long as it claims")
+        elif opcode != Opcode.HEADER:
+            raise McapError(f"record {opcode} is not one of a bag")
+
+    def _unpack(self, chunk: Chunk) -> Iterator[Stored]:
+        """Messages of a chunk, after its checksum."""
+        data = decompress(chunk)
+        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+            raise McapError("the checksum of a chunk is wrong")
+        offset, found = 0, []
+        while offset < len(data):
+            opcode, length = HEAD.unpack_from(data, offset)
+            body = data[offset + HEAD.size : offset + HEAD.size + length]
+            if len(body) != length:
+                raise McapError("a record does not fit into its chunk")
+            stream = ReadDataStream(BytesIO(body))
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                self._schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream)
+                self._channels[channel.id] = channel
+            elif opcode == Opcode.MESSAGE:
+                found.append(self._stored(Message.read(stream, length)))
+            else:
+                raise McapError(f"record {opcode} is not one of a chunk")
+            offset += HEAD.size + length
+        yield from found
+
+    def _stored(self, message: Message) -> Stored:
+        channel = self._channels.get(message.channel_id)
+        schema = None if channel is None else self._schemas.get(channel.schema_id)
+        if channel is None or schema is None:
+            raise McapError(f"a message of an unknown channel, {message.channel_id}")
+        return Stored(channel.topic, schema.name, message.log_time, message.data)
+
+    def _behind_damage(self, offset: int, why: str) -> int:
+        """Where to go on; the end of the file if nothing follows, which is what a recorder leaves that was killed."""
+        following = self._next_chunk(offset + 1)
+        if not self._salvage and (self.closed or following is not None):
+            self._refuse(f"{why}, at byte {offset}")
+        end = len(self._data) if following is None else following
+        self.left_out.append((offset, end - offset, why))
+        return end
+
+    def _next_chunk(self, offset: int) -> int | None:
+        """Offset of the next chunk that is whole; for damage that hides where records begin."""
+        while (mark := self._data.find(CHUNK_MARK, offset + CHUNK_MARK_AT)) >= 0:
+            offset = mark - CHUNK_MARK_AT
+            end = self._end_of(offset)
+            if end is not None and self._data[offset] == Opcode.CHUNK:
+                try:
+                    chunk = Chunk.read(ReadDataStream(BytesIO(self._data[offset + HEAD.size : end])))
+                    if zlib.crc32(decompress(chunk)) == chunk.uncompressed_crc:
+                        return offset
+                except DAMAGE:
+                    pass
+            offset += 1
+        return None
+
+    def _check_sums(self) -> None:
+        """Refuse a closed file of which a byte is wrong."""
+        data = self._data
+        footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
+        end = footer.summary_start
+        index = memoryview(data)[end : len(data) - len(MAGIC) - 4]
+        good = end <= len(data) and zlib.crc32(index) == footer.summary_crc
+        if not good or zlib.crc32(memoryview(data)[: end - DATA_END_BYTES]) != SUM.unpack_from(data, end - SUM.size)[0]:
+            self._refuse("a checksum is wrong")
+
+    def _check_end(self, offset: int, end: int) -> None:
+        """The end of the data; a file that was killed while it was closed has all of them."""
+        data = self._data
+        with_footer = data[-FOOTER_BYTES : HEAD.size - FOOTER_BYTES] == HEAD.pack(Opcode.FOOTER, 20)
+        if with_footer and not self.closed and not self._salvage:
+            self._refuse("its last bytes are not the end of an MCAP file")
+        (stored,) = SUM.unpack_from(data, end - SUM.size)
+        if stored and zlib.crc32(memoryview(data)[:offset]) != stored:
+            if not self._salvage:
+                self._refuse("a checksum is wrong")
+            self.left_out.append((end, len(data) - end, "the checksum of all data is wrong"))
+
+    def _refuse(self, why: str) -> NoReturn:
+        raise BagError(f"{self.path}: damaged: {why}; `grasp recover` makes a new bag of what is whole")
+
+
+def decompress(chunk: Chunk) -> bytes:
+    """Content of a chunk, of the size that it claims and not too large.
+
+    Raises
+    ------
+    McapError, zstandard.ZstdError
+        If it is neither.
+    """
+    allowed = min(RECORD_BYTES, RATIO * (len(chunk.data) + 1000))
+    if chunk.uncompressed_size > allowed:
+        raise McapError(f"a chunk of {chunk.uncompressed_size} bytes; allowed: at most {allowed}")
+    if chunk.compression == "zstd":
+        data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(chunk.uncompressed_size + 1)
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise McapError(f"compression {chunk.compression!r}; allowed: zstd")
+    if len(data) != chunk.uncompressed_size:
+        raise McapError("a chunk is not as long as it claims")
+    return data

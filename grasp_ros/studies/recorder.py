@@ -1,0 +1,161 @@
+"""What the recorder costs and what it survives: bytes and time per tick, and recordings that are killed."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import tempfile
+import time
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros.graph import bag, rosbag2
+from grasp_ros.graph.recorder import FLUSH_SECONDS, Recorder
+from grasp_ros.graph.recover import recover
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene import Scene
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, Topic
+from grasp_ros.simulation import Trajectory, simulate
+
+LONGEST_SECONDS = 1.0  # after which a recording is killed at the latest
+PROMISED_SECONDS = 0.2  # of wall time that a kill may cost
+Tick = tuple[int, list[tuple[Topic, bytes]], list[float]]
+
+
+def ticks_of(run: Trajectory) -> Iterator[Tick]:
+    """What a monitor would record of a sampled run: time in ns, messages, and its own values."""
+    scene, level, alone = run.scene, run.energy, energy(run.scene.system.alone, run.state).V_c
+    bodies = [body for body in (LEFT, OBJECT, RIGHT) if body not in scene.system.absent]
+    effort = np.vstack([np.zeros(3), run.inputs[:-1]])
+    for tick, state in enumerate(run.state):
+        time_ns = tick * scene.period_ns
+        forces = {topic: run.command[tick, side] for side, topic in zip(
+            scene.system.laws, scene.controllers.values(), strict=True)}
+        forces |= {output.topic: output.value(scene.system, tick, state) for output in scene.outputs}
+        column = np.array([COLUMN[body] for body in bodies])
+        states = rosbag2.list_message(
+            time_ns, [NAMES[body] for body in bodies], state[column], state[column + 1], effort[tick, bodies]
+        )
+        own = [level.V[tick], level.V_c[tick], level.V_rate[tick], level.mode[tick], 0.0, 0.0, alone[tick], 0.0, 1.0]
+        rest = [(topic, rosbag2.force_message(time_ns, force)) for topic, force in forces.items()]
+        yield time_ns, [(JOINT_STATES, states), *rest], [float(value) for value in own]
+
+
+def write(path: Path, run: Trajectory) -> None:
+    """Record a sampled run without a graph.
+
+    Raises
+    ------
+    BagError
+        If the bag cannot be written.
+    """
+    recorder = Recorder(path, run.scene, {})
+    for tick in ticks_of(run):
+        recorder.write_tick(*tick)
+    recorder.close()
+
+
+class Cost(NamedTuple):
+    """What a tick takes."""
+
+    raw: float  # bytes of its messages
+    size: float  # bytes in the bag
+    seconds: float  # of the process
+
+
+def cost(scene: Scene) -> Cost:
+    """Bytes and processor time per tick of a recording."""
+    ticks = list(ticks_of(simulate(scene, sampled=True)))
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "bag"
+        recorder = Recorder(path, scene, {})
+        begin = time.process_time()
+        for tick in ticks:
+            recorder.write_tick(*tick)
+        recorder.close()
+        seconds = time.process_time() - begin
+        size = (path / "bag.mcap").stat().st_size
+    values = rosbag2.list_message(0, LYAPUNOV_NAMES, np.zeros(len(LYAPUNOV_NAMES)))
+    raw = sum(len(values) + sum(len(cdr) for _, cdr in messages) for _, messages, _ in ticks)
+    return Cost(raw / len(ticks), size / len(ticks), seconds / len(ticks))
+
+
+class Kill(NamedTuple):
+    """A recording that was killed."""
+
+    written: int  # ticks
+    read: int  # ticks that are in the bag
+    recovered: int  # ticks in the bag that `recover` made of it
+    lost: float  # s of wall time before the kill from which nothing is there
+
+    @property
+    def survived(self) -> bool:
+        """Whether the bag opened and no more is lost than promised."""
+        return self.read == self.recovered and self.lost <= PROMISED_SECONDS
+
+
+def kill(scene: Scene, ticks: Iterable[Tick], after: float) -> Kill:
+    """Record ticks in a process of its own, and kill it some seconds after the bag was opened."""
+    with tempfile.TemporaryDirectory() as directory:
+        path, noted = Path(directory) / "bag", Path(directory) / "times"
+        ticks = list(ticks)
+        times: Array = np.lib.format.open_memmap(noted, "w+", float, (len(ticks),))
+        child = multiprocessing.get_context("fork").Process(target=_record, args=(path, scene, ticks, times))
+        child.start()
+        while not times[0] and child.is_alive():
+            time.sleep(1e-3)
+        time.sleep(after)
+        os.kill(child.pid or 0, signal.SIGKILL)
+        end = time.monotonic()
+        child.join()
+        done = np.array(times[times > 0.0])
+        read = _count(path)
+        lost = 0.0 if read >= len(done) else end - float(done[read])
+        new = Path(directory) / "new"
+        saved = recover(path, new).ticks if read else 0
+        return Kill(len(done), read, saved, lost)
+
+
+def _count(path: Path) -> int:
+    """Ticks in a bag; 0 if it was killed before the first was on the disk."""
+    try:
+        return len(bag.read(path).tick)
+    except bag.BagError as error:
+        if "holds no tick" in str(error):
+            return 0
+        raise
+
+
+def _record(path: Path, scene: Scene, ticks: list[Tick], times: Array) -> None:
+    """The process that is killed: a tick each millisecond, and when it had been written."""
+    recorder = Recorder(path, scene, {})
+    begin = time.monotonic()
+    for number, tick in enumerate(ticks):
+        recorder.write_tick(*tick)
+        times[number] = time.monotonic()
+        time.sleep(max(0.0, begin + 1e-3 * number - time.monotonic()))
+    time.sleep(2.0 * LONGEST_SECONDS)
+
+
+def run(scene: Scene, kills: int, seed: int) -> bool:
+    """Print what a tick costs and how many kills were survived; returns whether all were."""
+    found = cost(scene)
+    print(f"{scene.title}: {scene.ticks + 1} ticks")
+    print(f"messages of a tick  {found.raw:.0f} bytes")
+    print(f"in the bag          {found.size:.0f} bytes, with index and metadata")
+    print(f"processor           {1e6 * found.seconds:.1f} us a tick")
+    rng, ticks = np.random.default_rng(seed), list(ticks_of(simulate(scene, sampled=True)))
+    ends = [kill(scene, ticks, rng.uniform(0.0, LONGEST_SECONDS)) for _ in tqdm(range(kills), unit="kill")]
+    survived = sum(end.survived for end in ends)
+    worst = max((end.lost for end in ends), default=0.0)
+    print(f"killed              {survived} of {kills} bags have all but the last {PROMISED_SECONDS} s")
+    print(f"lost at most        {1e3 * worst:.0f} ms; a chunk is handed to the disk every {1e3 * FLUSH_SECONDS:.0f} ms")
+    return survived == kills

@@ -1,0 +1,313 @@
+"""Bags whose recording was killed, cut off, damaged, or ran out of space, read back by three readers."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from processes import wait_for
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
+from grasp_ros.graph.recorder import RESERVE_BYTES, Recorder
+from grasp_ros.graph.recover import recover
+from grasp_ros.graph.rosbag2 import INFORMATION
+from grasp_ros.scene.topics import JOINT_STATES
+from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.studies import recorder as study
+
+SECONDS = 60.0
+LIMIT = 9 * RESERVE_BYTES // 4
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    return simulate(scenes.load("case_01", ["time.duration_s=1"]), sampled=True)
+
+
+@pytest.fixture
+def closed(tmp_path: Path, run: Trajectory) -> Path:
+    path = tmp_path / "bag"
+    study.write(path, run)
+    return path
+
+
+def storage(path: Path) -> Path:
+    return next(path.glob("*.mcap"))
+
+
+def put(path: Path, content: bytes) -> Path:
+    """A bag without metadata, as a recorder leaves it that was killed."""
+    shutil.rmtree(path, ignore_errors=True)
+    path.mkdir()
+    (path / "bag.mcap").write_bytes(content)
+    return path
+
+
+def test_a_bag_is_the_run_bit_for_bit(closed: Path, run: Trajectory) -> None:
+    recording = bag.read(closed)
+    assert recording.state.tobytes() == run.state.tobytes()
+    assert recording.command.tobytes() == run.command.tobytes()
+    assert recording.inputs.tobytes() == run.inputs.tobytes()
+    assert recording.lost == {"end": "closed", "ticks that are missing": "none"}
+    assert {entry.name for entry in closed.iterdir()} == {"bag.mcap", "metadata.yaml"}
+
+
+def test_three_readers_take_it(closed: Path, run: Trajectory) -> None:
+    with Reader(closed) as reader:
+        store = get_typestore(Stores.ROS2_JAZZY)
+        states = [connection for connection in reader.connections if connection.topic == "/joint_states"]
+        found = [store.deserialize_cdr(raw, "sensor_msgs/msg/JointState") for _, _, raw in reader.messages(states)]
+        assert reader.message_count == 7 * len(run.t) + 2
+        assert [message.position[0] for message in found] == run.state[:, 0].tolist()
+    with storage(closed).open("rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics.message_count == 7 * len(run.t) + 2
+        rows = list(reader.iter_decoded_messages(topics=["/left/effort_command"]))
+        assert [decoded.wrench.force.x for _, _, _, decoded in rows] == run.command[:, 0].tolist()
+
+
+def test_the_metadata_are_those_of_another_writer(tmp_path: Path, closed: Path, run: Trajectory) -> None:
+    """All that `ros2 bag info` shows, and the copy within the file that it falls back on."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    with Reader(closed) as reader, Writer(tmp_path / "other", version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for connection in reader.connections:
+            writer.add_connection(
+                connection.topic, connection.msgtype, typestore=store,
+                offered_qos_profiles=connection.ext.offered_qos_profiles,
+            )
+        for connection, time_ns, raw in reader.messages(reader.connections):
+            writer.write(writer.connections[connection.id - 1], time_ns, raw)
+    ours, theirs = (
+        yaml.safe_load((path / "metadata.yaml").read_text())[INFORMATION] for path in (closed, tmp_path / "other")
+    )
+    assert ours.keys() == theirs.keys()
+    for key in ours.keys() - {"custom_data", "ros_distro", "files", "relative_file_paths"}:
+        assert ours[key] == theirs[key], key
+    assert {**theirs["files"][0], "path": "bag.mcap"} == ours["files"][0]
+    with storage(closed).open("rb") as file:
+        inside = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    assert yaml.safe_load(inside["rosbag2"]["serialized_metadata"]) == ours
+
+
+def test_a_bag_that_was_cut_off_at_any_byte_is_read_to_there(tmp_path: Path, closed: Path, run: Trajectory) -> None:
+    whole, before = storage(closed).read_bytes(), 0
+    cuts = sorted({*np.linspace(1, len(whole) - 1, 16, dtype=int).tolist(), *range(len(whole) - 40, len(whole), 3)})
+    for cut in cuts:
+        path = put(tmp_path / "cut", whole[:cut])
+        try:
+            recording = bag.read(path)
+        except bag.BagError:
+            assert before == 0
+            continue
+        count = len(recording.tick)
+        assert recording.state.tobytes() == run.state[:count].tobytes()
+        assert recording.lost["end"].startswith("not closed")
+        assert count >= before
+        before = count
+    assert before == len(run.t)
+
+
+def test_every_flipped_bit_is_noticed(tmp_path: Path, closed: Path, run: Trajectory) -> None:
+    whole, rng = storage(closed).read_bytes(), np.random.default_rng(0)
+    text = (closed / "metadata.yaml").read_bytes()
+    for place in rng.integers(8 * len(whole), size=150).tolist():
+        content = bytearray(whole)
+        content[place // 8] ^= 1 << place % 8
+        storage(closed).write_bytes(content)
+        with pytest.raises(bag.BagError, match=r"bag\.mcap"):
+            bag.read(closed)
+    storage(closed).write_bytes(whole)
+    for place in rng.integers(8 * len(text), size=15).tolist():
+        content = bytearray(text)
+        content[place // 8] ^= 1 << place % 8
+        (closed / "metadata.yaml").write_bytes(content)
+        try:
+            bag.read(closed)
+        except bag.BagError:
+            continue
+        assert yaml.safe_load(content.decode()) == yaml.safe_load(text)  # a blank that is another blank
+
+
+def test_what_is_whole_is_recovered_around_damage(tmp_path: Path, closed: Path, run: Trajectory) -> None:
+    content = bytearray(storage(closed).read_bytes())
+    chunks = [match.start() for match in re.finditer(b"\x04\x00\x00\x00zstd", content)]
+    content[chunks[1] + 100] ^= 4
+    path = put(tmp_path / "damaged", bytes(content))
+    with pytest.raises(bag.BagError, match=r"bag\.mcap: damaged: a checksum is wrong; `grasp recover`"):
+        bag.read(path)
+    half = put(tmp_path / "half", bytes(content[: chunks[3]]))
+    with pytest.raises(bag.BagError, match=r"damaged: the checksum of a chunk is wrong, at byte \d+; `grasp recover`"):
+        bag.read(half)
+    found = recover(path, tmp_path / "new")
+    recording = bag.read(tmp_path / "new")
+    assert 0 < found.ticks == len(recording.tick) < len(run.t)
+    assert recording.state.tobytes() == run.state[recording.tick].tobytes()
+    assert recording.lost["ticks that are missing"] == f"0-{recording.tick[0] - 1}" or recording.tick[0] == 0
+    assert "checksum" in recording.lost["bytes that were left out"]
+    assert storage(path).read_bytes() == content
+
+
+def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, run: Trajectory, command: Any) -> None:
+    whole = storage(closed).read_bytes()
+    path = put(tmp_path / "killed", whole[: len(whole) // 2])
+    result = command("inspect", str(path))
+    assert result.returncode == 0
+    assert "not closed" in result.stdout
+    result = command("recover", "killed")
+    assert result.returncode == 0, result.stderr
+    ticks = len(bag.read(tmp_path / "killed_recovered").tick)
+    assert f"{ticks} ticks written to killed_recovered" in result.stdout
+    assert 0 < ticks < len(run.t)
+    with Reader(tmp_path / "killed_recovered") as reader:
+        assert reader.message_count == 7 * ticks + 2
+        assert sum(1 for _ in reader.messages()) == 7 * ticks + 2
+    assert {entry.name for entry in path.iterdir()} == {"bag.mcap"}
+    again = command("recover", "killed")
+    assert again.returncode == 2
+    assert "killed_recovered: cannot be written: File exists" in again.stderr
+
+
+def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajectory) -> None:
+    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
+    for number, tick in enumerate(study.ticks_of(run)):
+        if number not in (0, 7, 100, 101, 102):
+            recorder.write_tick(*tick)
+    recorder.close({"lost messages": 5})
+    recording = bag.read(tmp_path / "bag")
+    assert recording.lost == {"end": "closed", "ticks that are missing": "0, 7, 100-102", "lost messages": "5"}
+    assert recording.versions == {"python": "3"}
+
+
+def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path, run: Trajectory) -> None:
+    recorder = Recorder(tmp_path / "bag", run.scene, {})
+    for _, tick in zip(range(3), study.ticks_of(run), strict=False):
+        recorder.write_tick(*tick)
+
+    def there() -> bool:
+        try:
+            return len(bag.read(tmp_path / "bag").tick) == 3
+        except bag.BagError:
+            return False
+
+    wait_for(there, "three ticks")
+    recorder.close()
+
+
+def test_a_bag_that_was_deleted_meanwhile_is_refused(tmp_path: Path, run: Trajectory) -> None:
+    recorder, ticks = Recorder(tmp_path / "bag", run.scene, {}), study.ticks_of(run)
+    shutil.rmtree(tmp_path / "bag")
+    wait_for(lambda: bool(recorder._error), "the recorder to see it")
+    with pytest.raises(bag.BagError, match="was deleted during the recording"):
+        recorder.write_tick(*next(ticks))
+    with pytest.raises(bag.BagError, match="was deleted during the recording"):
+        recorder.close()
+
+
+def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    ticks = list(study.ticks_of(run))
+    try:
+        recorder = Recorder(path, run.scene, {})
+        for number in range(10**6):
+            _, messages, own = ticks[number % len(ticks)]
+            recorder.write_tick(number * run.scene.period_ns, messages, own)
+    except bag.BagError as error:
+        answers.put((number, str(error)))
+
+
+def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Path, run: Trajectory) -> None:
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    long = simulate(scenes.load("case_01"), sampled=True)
+    child = context.Process(target=limited, args=(tmp_path / "bag", long, LIMIT, answers))
+    child.start()
+    number, sentence = answers.get(timeout=SECONDS)
+    child.join(SECONDS)
+    assert "files may not be larger; the bag is closed, and whole up to there" in sentence
+    recording = bag.read(tmp_path / "bag")
+    assert np.array_equal(recording.tick, np.arange(number + 1))  # the tick that was refused is there, too
+    assert recording.lost["end"] == "files may not be larger"
+    assert storage(tmp_path / "bag").stat().st_size <= LIMIT
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.message_count == 7 * (number + 1) + 2
+
+
+FULL = """
+import sys
+from pathlib import Path
+from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
+from grasp_ros.graph.recorder import Recorder
+from grasp_ros.simulation import simulate
+from grasp_ros.studies import recorder as study
+run = simulate(scenes.load("case_01"), sampled=True)
+disk = Path(sys.argv[1])
+recorder = Recorder(disk / "bag", run.scene, {})
+number = -1
+try:
+    for number, tick in enumerate(study.ticks_of(run)):
+        if number == 500:  # somebody else fills the disk
+            with (disk / "other").open("wb", buffering=0) as other:
+                try:
+                    while True:
+                        other.write(bytes(4096))
+                except OSError:
+                    pass
+        recorder.write_tick(*tick)
+except bag.BagError as error:
+    found = bag.read(disk / "bag")
+    print(number, len(found.tick), found.lost["end"], error, sep="|")
+"""
+
+
+def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
+    """A real one, in memory, where this process may mount it."""
+    script = f'mount -t tmpfs -o size=6m none "$0" && exec {sys.executable} -c "$1" "$0"'
+    if subprocess.run(["unshare", "-rm", "true"], capture_output=True, check=False).returncode:
+        pytest.skip("no file system may be mounted here")
+    result = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", script, str(tmp_path), FULL], capture_output=True, text=True, timeout=SECONDS,
+        check=False, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert result.returncode == 0, result.stderr
+    number, ticks, end, sentence = result.stdout.strip().split("|")
+    assert int(ticks) >= int(number) >= 500
+    assert end == "no space is left on the disk"
+    assert "the bag is closed, and whole up to there" in sentence
+
+
+@pytest.mark.slow
+def test_recordings_that_are_killed_are_there(run: Trajectory) -> None:
+    """`grasp study recorder --kills 100` does more of them."""
+    ticks, rng = list(study.ticks_of(run)), np.random.default_rng(0)
+    for _ in range(4):
+        end = study.kill(run.scene, ticks, rng.uniform(0.0, study.LONGEST_SECONDS))
+        assert end.survived, end
+
+
+def test_a_bag_of_another_scene_is_refused(tmp_path: Path, run: Trajectory) -> None:
+    recorder = Recorder(tmp_path / "bag", scenes.load("case_01", ["time.duration_s=0.5"]), {})
+    for tick in study.ticks_of(run):
+        recorder.write_tick(*tick)
+    recorder.close()
+    with pytest.raises(bag.BagError, match="/joint_states: 501000000 ns; allowed: ticks of the scene"):
+        bag.read(tmp_path / "bag")
+    assert recover(tmp_path / "bag", tmp_path / "new").ticks == 501
+    assert bag.read(tmp_path / "new").counts[JOINT_STATES.name] == 501
