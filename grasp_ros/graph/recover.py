@@ -62,6 +62,8 @@ def recover(path: Path, new: Path) -> Recovery:
         for time_ns, tick, beside in chain([begin], ticks):
             own = decode(LYAPUNOV, tick.pop(LYAPUNOV))
             stamp_ns = own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec
+            if stamp_ns > scene.ticks * scene.period_ns:
+                continue
             recorder.write_tick(time_ns, tick.items(), own.position.tolist(), stamp_ns)
             for topic, cdr in beside:
                 recorder.write(topic, cdr)

@@ -242,11 +242,13 @@ def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Pat
     child.join(SECONDS)
     assert "files may not be larger; the bag is closed, and whole up to there" in sentence
     recording = bag.read(tmp_path / "bag")
-    assert np.array_equal(recording.tick, np.arange(number + 1))  # the tick that was refused is there, too
+    ticks = len(recording.tick)
+    assert ticks in (number, number + 1)  # with the tick that was refused, unless the bag had been closed before it
+    assert np.array_equal(recording.tick, np.arange(ticks))
     assert recording.lost["end"] == "files may not be larger"
     assert storage(tmp_path / "bag").stat().st_size <= LIMIT
     with Reader(tmp_path / "bag") as reader:
-        assert reader.message_count == 7 * (number + 1) + 2
+        assert reader.message_count == 7 * ticks + 2
 
 
 FULL = """
