@@ -12,7 +12,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from grasp_ros.cli import graph, plot, simulate, studies
+from grasp_ros.cli import graph, map, plot, simulate, studies
 from grasp_ros.cli.arguments import Command
 from grasp_ros.physics.errors import Refused
 
@@ -39,6 +39,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="grasp", description="Simulate, run, inspect and draw a colliding grasp.")
     commands = parser.add_subparsers(required=True, metavar="command")
-    for subject in (simulate, graph, plot, studies):
+    for subject in (simulate, map, graph, plot, studies):
         subject.add_to(commands)
     return parser

@@ -4,6 +4,7 @@
 `polynomial` in them; `modes` is the automaton, `friction` that of the object, `energy_check` compares energies.
 """
 
-from grasp_ros.exact.integrator import Event, Integrator, Status
+from grasp_ros.exact.events import Event
+from grasp_ros.exact.integrator import Integrator, Status
 
 __all__ = ["Event", "Integrator", "Status"]

@@ -173,7 +173,7 @@ def correct_side(f: Array, side: Body, pair: Approach, start: Begin) -> tuple[fl
         largest, size = max(largest, abs(f[E_NODES + at])), size + abs(step)  # a sum keeps nan
         bent = max(bent, 1.0 / f[U_NODES + at])
     if pair.hertzian == 0.0:
-        return size / start.scale, 0.0
+        return size / max(start.scale, abs(pair.e)), 0.0
     size_of_force = pair.rest + pair.share * largest
     bent = size * max(start.h * pair.rate * bent, pair.share / size_of_force)
     return size / (largest + CLOSE * (start.scale / pair.rate) if pair.stiff else start.scale), bent

@@ -13,6 +13,7 @@ from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of, keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
 from grasp_ros.exact.records import (
@@ -33,6 +34,7 @@ from grasp_ros.exact.roots import first_rise
 from grasp_ros.exact.scales import new_step
 from grasp_ros.exact.taylor_step import accepted_length, fitted_step
 from grasp_ros.physics.layout import (
+    DAMPING,
     DISSIPATION,
     EPS,
     LANES,
@@ -55,6 +57,7 @@ from grasp_ros.physics.layout import (
     Body,
     Filled,
     Pair,
+    Segment,
     Slide,
     Transition,
     Work,
@@ -136,11 +139,13 @@ def write_state(at: Array, u_l: float, u_r: float, y: Array) -> None:
 def flies_free(plant: Plant, y: Array, side: Body, touches: bool, t: float) -> bool:
     """Whether an arm that touches nothing is better put where it flies than where object and gap say.
 
-    Their roundings, of the size of x_o, would show in its place, or drive it by its spring within t s.
+    Their roundings, of the size of x_o, would show in its place, or drive it by its spring within t s; a damper that
+    stops it within t leaves less than the roundings of a series.
     """
     x, v, _ = arm_of(y, side)
     row, x_o = plant.bodies[side], abs(y[X_O])
-    return not touches and (x_o > abs(x) or row[STIFFNESS] * t * x_o > row[MASS] * abs(v))
+    coarse = x_o > abs(x) or row[STIFFNESS] * t * x_o > row[MASS] * abs(v)
+    return not touches and (coarse or row[DAMPING] * t > row[MASS])
 
 
 @inlined
@@ -204,5 +209,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     keep_resting(state)
     deliver(tables, step, s, t, flies, free, state, out)
     tick(state.clock, t)
+    leave_step(tables, s, step.unit)
+    notify(out, Segment.CONTACT, t)
     make_transitions(plant, state, left, right, slide, s, out)
     return t

@@ -11,6 +11,7 @@ from grasp_ros.exact.friction import slide_in_flight
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, keep_resting, write_penetrations
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.observer import notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Candidate, Flights, Integers, Motion, Output, Plant, Settings, State, Tables
@@ -29,6 +30,7 @@ from grasp_ros.physics.layout import (
     Body,
     Filled,
     Pair,
+    Segment,
     Transition,
     Work,
 )
@@ -109,5 +111,6 @@ def flight_segment(tables: Tables, plant: Plant, state: State, settings: Setting
     deliver(tables, plant, state, settings, flights, t, out)
     move(flights, state, t)
     tick(state.clock, t)
+    notify(out, Segment.FLIGHT, t)
     make_transitions(plant, state, left, right, slide, t, out)
     return t

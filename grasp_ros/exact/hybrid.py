@@ -48,7 +48,7 @@ def advance(
         First neglected Taylor term, relative to the impact.
     max_work : int
         Budget of flights, contact steps and evaluations of event functions together.
-    grid, rows, events, filled, work : arrays (n,), (n, 6), (m, 5), (4,) and (4,)
+    grid, rows, events, filled, work : arrays (n,), (n, 6), (m, 5), (6,) and (4,)
         `records.Output`, filled in place; output times in s from the begin of their interval.
     own : array (3,), N by body
         Constant forces of the bodies by themselves, to which the inputs are added.

@@ -53,6 +53,7 @@ from grasp_ros.physics.layout import (
 )
 
 LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
+PLACE, VELOCITY = 0, 1  # of a body in the state
 FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
 
 
@@ -137,8 +138,10 @@ def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: App
         return math.inf
     last = write_lane(tables, U_L + side, pair.u, h, pair.rate * (pair.e - pair.offset))
     if pair.hertzian == 0.0 or not pair.u > 0.0:
-        return last / start.scale
-    moving = max(abs(state.y[V_L]), abs(state.y[V_R]), abs(state.y[V_O]))
+        return last / max(start.scale, abs(pair.e))
+    v_end = start.v + f[V_NODES + STAGES - 1]
+    d_end = pair.rate * (f[nodes + STAGES - 1] - pair.offset)
+    moving = max(abs(start.v), abs(state.y[v]), abs(v_end), abs(v_end + pair.sign * d_end))
     relative = max(moving, 1024.0 * pair.rate * largest) if pair.stiff else moving
     return last / max(min(relative, pair.u / h), 0.25 * moving)
 
@@ -160,14 +163,24 @@ def write_lanes(tables: Tables, plant: Plant, state: State, left: Approach, righ
 
 
 @kernel
+def largest_in_contact(state: State, lane: int) -> float:
+    """The largest size of x or v of the object and of the arms that push it; the others fly as they like."""
+    y, largest = state.y, abs(state.y[X_O + lane])
+    if state.mode[LEFT] == Pair.CONTACT:
+        largest = max(largest, abs(y[X_L + lane]))
+    if state.mode[RIGHT] == Pair.CONTACT:
+        largest = max(largest, abs(y[X_R + lane]))
+    return largest
+
+
+@kernel
 def velocity_scale(plant: Plant, state: State, settings: Settings) -> float:
     """What errors of velocities are relative to, m/s."""
-    y, scale = state.y, math.inf
+    scale = math.inf
     for side in (LEFT, RIGHT):
         if state.mode[side] == Pair.CONTACT and plant.pairs[side, DISSIPATION] > 0.0:
             scale = min(scale, 1.0 / plant.pairs[side, DISSIPATION])
-    reach = max(abs(y[X_L]), abs(y[X_O]), abs(y[X_R]))
-    return max(scale, abs(y[V_L]), abs(y[V_O]), abs(y[V_R]), settings.rate * reach)
+    return max(scale, largest_in_contact(state, VELOCITY), settings.rate * largest_in_contact(state, PLACE))
 
 
 @kernel

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from enum import Enum
-from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.events import Event, to_events
 from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.jit import with_deep_stack
 from grasp_ros.exact.outputs import SPARE
-from grasp_ros.exact.records import Loop, new_place
+from grasp_ros.exact.records import Loop, Plant, State, new_place
+from grasp_ros.exact.sight import Wanted
 from grasp_ros.exact.squeezed import creep
+from grasp_ros.exact.watcher import Watcher
 from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Body, Filled, Outcome, Pair, Place, Transition, Work
+from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -39,25 +41,6 @@ class Status(Enum):
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
-class Event(NamedTuple):
-    """One event of one pair, or of the object."""
-
-    time: float  # s
-    side: Body  # LEFT or RIGHT; OBJECT for what friction does
-    kind: Transition
-    u: float  # penetration, m; 0 for the object
-    u_rate: float  # m/s; 0 for the object
-
-
-def to_events(table: Array) -> list[Event]:
-    """Records of rows (m, 5)."""
-    time, side, kind, u, u_rate = table.T.tolist()
-    bodies = map(_BODIES.__getitem__, map(int, side))
-    kinds = map(_KINDS.__getitem__, map(int, kind))
-    return list(map(Event, time, bodies, kinds, u, u_rate))
-
-
-_KINDS, _BODIES = tuple(Transition), tuple(Body)
 _OUTPUTS, _EVENTS = int(Filled.OUTPUTS), int(Filled.EVENTS)
 _GOES_ON = (Outcome.GO_ON, Outcome.SQUEEZED)
 _NO_TIMES = np.zeros(0)
@@ -105,7 +88,7 @@ class Integrator:
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
-        self._system, self._accuracy = system, accuracy
+        self._system, self._continuous, self._accuracy = system, continuous, accuracy
         self._max_events, self._max_work = max_events, max_work
         self._time, self._clock = 0.0, np.zeros(3)
         self._given = system.closed_loop if continuous else system.bodies.copy()
@@ -118,6 +101,15 @@ class Integrator:
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._events: list[Array] = []
         self._event_count = 0
+        self._watcher: Watcher | None = None
+
+    def watch(self, wanted: Wanted, bound: float) -> Watcher:
+        """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
+        plant = Plant(self._given, self._bodies, self._pairs, self._coulomb)
+        self._watcher = Watcher(plant, State(self._y, self._mode, self._clock), wanted)
+        self._watcher.set_system(self._system, self._continuous)
+        self._watcher.begin(bound)
+        return self._watcher
 
     @property
     def state(self) -> Array:
@@ -203,6 +195,8 @@ class Integrator:
         out, filled = np.empty((len(grid), 6)), np.zeros(len(Filled), dtype=np.int64)
         clock, outcome = self._clock, Outcome.GO_ON
         with workspace(self._accuracy) as (tables, event_rows):
+            if self._watcher is not None:
+                self._watcher.attach(filled, tables)
             while self.status is Status.DONE:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
                 most = min(self._spent + BREATH, self._max_work)

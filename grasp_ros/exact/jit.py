@@ -82,6 +82,13 @@ def with_deep_stack(function: Callable[[], None]) -> Callable[[], None]:
     return FunctionType(code, function.__globals__, function.__name__)
 
 
+def compiled_address(function: Any, signature: str) -> int:
+    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been."""
+    function.compile(signature)
+    (result,) = function.overloads.values()
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+
+
 def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> Any:
     """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
     before = numba.config.CACHE_DIR

@@ -107,7 +107,8 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
     """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
 
     dt = 2 G ds with G = w_l w_r of the sides in contact. Halley's iteration with bisection: its error is cubed each
-    time, so a correction of 1e-6 is the last one needed. It starts from the parabola through both ends.
+    time, or squared where u' is little more than rounding, so a correction of 1e-8 is the last one needed. It starts
+    from the parabola through both ends.
     """
     c, at, n, unit = tables.c, tables.at, step.order, step.unit
     slope = c[LANES + TIME]
@@ -131,7 +132,7 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
         following = s - newton / (1.0 - bend)
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - s) <= 1e-6 * s and abs(bend) <= 1e-6:
+        elif abs(following - s) <= 1e-8 * s and abs(bend) <= 1e-8:
             return following
         if high - low <= 2.0 * EPS * high:
             return following

@@ -53,7 +53,7 @@ class Output(NamedTuple):
     grid: Array  # (n,) ascending output times on the clock, s
     rows: Array  # (n, 6) states at them
     events: Array  # (m, 5) time s, body, Transition, u m, u' m/s
-    filled: Integers  # (2,) rows in use, see `layout.Filled`
+    filled: Integers  # (6,) rows in use, see `layout.Filled`
     work: Integers  # (4,) counters, see `layout.Work`
 
 

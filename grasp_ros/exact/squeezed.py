@@ -19,6 +19,7 @@ from grasp_ros.exact.implicit import expand_row, implicit_step, wait
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import is_clamped, keep_resting
 from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.radau import FIRST, STAGES
@@ -49,6 +50,7 @@ from grasp_ros.physics.layout import (
     Filled,
     Outcome,
     Pair,
+    Segment,
     Slide,
     Transition,
     Work,
@@ -146,6 +148,8 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     place_free(flies[0], flies[1], free, t, y)
     keep_resting(state)
     tick(state.clock, t)
+    leave_step(tables, s, h)
+    notify(out, Segment.CREEP, t)
     make_transitions(plant, state, left, right, slide, s, out)
     return t
 

@@ -13,6 +13,7 @@ import numpy as np
 from grasp_ros.exact.clock import tick
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, keep_resting, reduced_mass
+from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, Start, State, Tables
@@ -36,6 +37,7 @@ from grasp_ros.physics.layout import (
     Body,
     Filled,
     Pair,
+    Segment,
     Slide,
     Work,
 )
@@ -174,4 +176,6 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
         state.y[lane] = at[lane]
     keep_resting(state)
     tick(state.clock, t)
+    leave_step(tables, h, scale)
+    notify(out, Segment.START, t)
     return t

@@ -50,6 +50,15 @@ class Slide(IntEnum):
     STUCK = 3
 
 
+class Segment(IntEnum):
+    """How a piece of the motion is known, and what its table of polynomials holds."""
+
+    FLIGHT = 0  # a closed form
+    CONTACT = 1  # a Taylor step in regularised time: w = sqrt(u) of what touches
+    START = 2  # the begin of a contact: u, in powers of t^(1/4)
+    CREEP = 3  # an implicit step: u, in powers of t
+
+
 class Transition(IntEnum):
     """Events of one pair, and of the object."""
 
@@ -94,12 +103,14 @@ class Place(IntEnum):
 
 
 class Filled(IntEnum):
-    """Counters of the rows in use, and of the steps for which no implicit one is tried."""
+    """Counters of the rows in use and of the steps for which no implicit one is tried; the observer of a run."""
 
     OUTPUTS = 0
     EVENTS = 1
     WAIT = 2  # contact steps until the next trial
     PENALTY = 3  # their number after the last trial that failed
+    OBSERVER = 4  # address of what is called after each segment, see `exact.observer`; 0: nothing
+    CONTEXT = 5  # address of what it is called with
 
 
 class Work(IntEnum):

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY, Event, Status, to_events
+from grasp_ros.exact.events import Event, to_events
+from grasp_ros.exact.integrator import ACCURACY, Status
 from grasp_ros.methods.registry import EXACT, METHODS, find
 from grasp_ros.physics.energy import Energy, energy
 from grasp_ros.physics.errors import Refused

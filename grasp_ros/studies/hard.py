@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros.exact.integrator import Event
+from grasp_ros.exact.events import Event
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate

@@ -23,14 +23,13 @@ from grasp_ros.verification.motion import ledgers
 from grasp_ros.verification.replay import findings
 from grasp_ros.verification.restarts import digits, reversal, splitting
 from grasp_ros.verification.roundings import DIED_OUT
-from grasp_ros.verification.segments import Detail, detail, grid_of, pieces_of, rule
+from grasp_ros.verification.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
 
 MOST_EVENTS = 2000
 MOST_WORK = 10_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
 OUTPUTS = 201  # of a run that stalls
 LIMIT = 100.0  # units of rounding
-REFINED = 8  # parts of a piece, where its balance fails: is it the quadrature?
 SPLIT, SHORT = 4, 50  # every how many scenes a run is started anew, and compared with short control periods
 FALLS = 0.5  # part of the distance that may be left at a sixteenth of the period
 
@@ -98,7 +97,7 @@ def _end(run: Trajectory, product: Product) -> Check:
 
 
 def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
-    close = look(first, 1, product)
+    close = look(first, pieces_of(first), product)
     run = close.run
     same = np.array_equal(first.event_table, run.event_table)
     same &= np.array_equal(np.nan_to_num(first.state[-1]), np.nan_to_num(run.state[-1]))
@@ -142,9 +141,9 @@ def _smallest(run: Trajectory) -> float:
     return float(numbers[numbers > 0.0].min(initial=np.inf))
 
 
-def look(run: Trajectory, parts: int, product: Product) -> Detail:
+def look(run: Trajectory, pieces: Pieces, product: Product) -> Detail:
     """The same run with outputs at the nodes of its pieces."""
-    pieces, table = pieces_of(run), rule(parts)
+    table = rule()
     grid = grid_of(pieces, table)
     again = product.run(run.scene, np.append(grid.ravel(), run.scene.duration))
     return detail(again, pieces, table, grid)
@@ -159,17 +158,17 @@ def _held(run: Trajectory) -> float:
 
 
 def _balances(close: Detail, product: Product) -> Iterator[Check]:
-    """Equations of motion and energy; a failure counts if a finer quadrature finds it, too."""
-    finer: dict[str, Array] | None = None
-    for ledger in ledgers(close):
-        error = np.where(ledger.resolved, ledger.error, 0.0)
-        skipped = int(np.count_nonzero(~ledger.resolved))
-        if not error.max(initial=0.0) <= LIMIT:
-            if finer is None:
-                finer = {entry.name: np.where(entry.resolved, entry.error, 0.0)
-                         for entry in ledgers(look(close.run, REFINED, product))}
-            error = np.where(finer[ledger.name] <= LIMIT, np.minimum(error, finer[ledger.name]), error)
-        yield Check(ledger.name, float(error.max(initial=0.0)), LIMIT, skipped)
+    """Equations of motion and energy; where they fail, those of shorter pieces count."""
+    found = {ledger.name: np.where(ledger.resolved, ledger.error, 0.0) for ledger in ledgers(close)}
+    skipped = {ledger.name: int(np.count_nonzero(~ledger.resolved)) for ledger in ledgers(close)}
+    fails = np.logical_or.reduce([~(error <= LIMIT) for error in found.values()])
+    if fails.any():
+        shorter, first = cut(close.pieces, fails)
+        for ledger in ledgers(look(close.run, shorter, product)):
+            error = np.where(ledger.resolved, ledger.error, 0.0)
+            found[ledger.name] = np.where(fails, np.maximum.reduceat(error, first), found[ledger.name])
+    for name, error in found.items():
+        yield Check(name, float(error.max(initial=0.0)), LIMIT, skipped[name])
 
 
 def states(run: Trajectory) -> list[Check]:

@@ -23,6 +23,7 @@ PIECES = 150  # of all segments together, about
 LEVELS = 1, 8  # of ever shorter pieces at both ends of a segment
 MIDDLE = 3, 12  # equal pieces between them
 GRADING = 0.2  # length of one level by that of the next
+CUTS, CUT, PARTS = 12, 0.1, 8  # levels, their grading, and equal parts of a piece that is looked at more closely
 SHORTEST = 64.0 * EPS  # of a piece, relative to its time: nodes must differ
 INNER, FIRST, LAST, WHOLE = range(4)  # which ends of a piece are ends of its segment
 PLACES = [COLUMN[body] for body in (LEFT, RIGHT, OBJECT)]
@@ -67,17 +68,17 @@ class Detail(NamedTuple):
 
 
 @cache
-def rule(parts: int) -> Rule:
-    """Gauss and Legendre in s on equal parts, t = s at inner ends and ~ s^2 at the ends of a segment."""
+def rule() -> Rule:
+    """Gauss and Legendre in s, t = s at inner ends and ~ s^2 at the ends of a segment."""
     x, weight = np.polynomial.legendre.leggauss(NODES)
     half = np.zeros(NODES)
     moments = np.zeros((NODES + 1) // 2)
     moments[0] = 2.0
     half[::2] = np.linalg.solve(np.polynomial.legendre.legvander(x[::2], len(moments) - 1).T, moments)
-    s = ((np.arange(parts)[:, None] + 0.5 * (x + 1.0)) / parts).ravel()
+    s = 0.5 * (x + 1.0)
     maps = np.array([s, s * s, s * (2.0 - s), s * s * (3.0 - 2.0 * s)])
     slopes = np.array([np.ones_like(s), 2.0 * s, 2.0 - 2.0 * s, 6.0 * s * (1.0 - s)])
-    fine, coarse = (slopes * np.tile(0.5 * table / parts, parts) for table in (weight, half))
+    fine, coarse = (slopes * (0.5 * table) for table in (weight, half))
     return Rule(maps, fine, coarse)
 
 
@@ -105,6 +106,27 @@ def pieces_of(run: Trajectory) -> Pieces:
         last = len(at) - 2
         for k, (begin, end) in enumerate(pairwise(at.tolist())):
             rows.append((begin, end, FIRST * (k == 0) + LAST * (k == last), number))
+    return _table(rows)
+
+
+def cut(pieces: Pieces, where: NDArray[np.bool_]) -> tuple[Pieces, NDArray[np.int64]]:
+    """Some pieces cut into parts, ever shorter ones at both ends, where a layer may hide; also the first of each."""
+    near = CUT ** np.arange(CUTS, 1.0, -1.0)
+    share = np.concatenate([[0.0], near, np.linspace(CUT, 1.0 - CUT, PARTS + 1), 1.0 - near[::-1]])
+    first: list[int] = []
+    rows: list[tuple[float, float, int, int]] = []
+    for begin, end, kind, number, cuts in zip(*pieces, where, strict=True):
+        first.append(len(rows))
+        at = begin + (end - begin) * (share if cuts else share[:1])
+        at = np.append(at[np.concatenate([[True], np.diff(at) > SHORTEST * end])], end)
+        last = len(at) - 2
+        for k, (a, b) in enumerate(pairwise(at.tolist())):
+            rows.append((a, b, kind & (FIRST * (k == 0) | LAST * (k == last)), number))
+    return _table(rows), np.array(first)
+
+
+def _table(rows: list[tuple[float, float, int, int]]) -> Pieces:
+    """Pieces of rows with begin, end, kind and segment."""
     table = np.array(rows).reshape(-1, 4)
     return Pieces(table[:, 0], table[:, 1], table[:, 2].astype(np.int64), table[:, 3].astype(np.int64))
 

@@ -19,10 +19,11 @@ BELOW = {  # what the files of a room may import beside their own room
     "scene": ("physics",),
     "methods": ("physics", "exact", "scene"),
     "simulation": ("physics", "exact", "scene", "methods"),
+    "maps": ("physics", "exact", "scene", "simulation"),
     "graph": ("physics", "exact", "scene", "simulation"),
     "verification": ("physics", "exact", "scene", "simulation"),
-    "studies": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification"),
-    "cli": ("physics", "exact", "scene", "methods", "simulation", "graph", "verification", "studies"),
+    "studies": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification"),
+    "cli": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification", "studies"),
 }
 ROOMS = tuple(BELOW)
 
@@ -88,7 +89,7 @@ def test_each_library_has_its_place(name: str) -> None:
         assert "rosbags" not in found
     if name not in ("graph/recorder.py", "graph/storage.py"):
         assert "mcap" not in found
-    if name not in ("simulation/plots.py", "studies/figures.py", "studies/page_figures.py"):
+    if name not in ("simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py"):
         assert "matplotlib" not in found
     if not name.startswith("exact/"):
         assert "numba" not in found

@@ -35,7 +35,7 @@ DRAWS = 100
 
 def drawn(draw_scene: Callable[[Draw], Scene]) -> list[Scene]:
     """The same scenes whatever else runs: hypothesis mixes numbers from the sources of the day into its floats."""
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(0)
     return [draw_scene(Draw(rng.random(NUMBERS).tolist())) for _ in range(DRAWS)]
 
 
@@ -72,7 +72,7 @@ def test_degenerate_scenes_cover_all_habits() -> None:
 
 def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes of the same kind at the coarsest accuracy."""
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(0)
     monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
     found: list[Check] = []
     for _ in range(60):

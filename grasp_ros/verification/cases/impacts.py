@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Event
+from grasp_ros.exact.events import Event
 from grasp_ros.physics.layout import EPS, LEFT, Transition
 from grasp_ros.physics.model import Array, Contact
 from grasp_ros.verification.cases.case import Case, Solver, recorded

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Event
+from grasp_ros.exact.events import Event
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.scene import Scene

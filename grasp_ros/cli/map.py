@@ -1,0 +1,103 @@
+"""`grasp map`: outcomes of a scene over two of its numbers, or of a sample of any number of them."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_scene, load_scene, prepare, whole
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
+from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation.chunk import SETTLED, STATUSES, Setup
+from grasp_ros.simulation.outcomes import GROUPS
+
+PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
+RANGE = "section.key=low:high[:n[:log]]"
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommand."""
+    text = "outcomes of many variants of a scene: a map over two numbers, or a sample; goes on after it was stopped"
+    sub = add_command(commands, "map", _map, text)
+    add_scene(sub)
+    add_accuracy(sub)
+    sub.add_argument("--x", metavar=RANGE, help="number along the map, n values (default 101), even or logarithmic")
+    sub.add_argument("--y", metavar=RANGE, help="number up the map")
+    sub.add_argument("--vary", action="append", default=[], metavar="section.key=low:high[::log]",
+                     help="one more number of a sample")
+    sub.add_argument("--sample", type=whole(1), default=0, metavar="N", help="N rows at random instead of a grid")
+    sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the sample (default 0)")
+    sub.add_argument("--independent", action="store_true", help="independent numbers instead of a Sobol sequence")
+    sub.add_argument("--outcome", action="append", default=[], metavar="NAME",
+                     help=f"one of {', '.join(GROUPS)}, or a column of one (default settling_time and touches)")
+    sub.add_argument("--settled", type=float, default=SETTLED, metavar="PART", help="part of the largest initial"
+                     f" displacement within which a run counts as settled (default {SETTLED:g})")
+    sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
+    sub.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N", help="budget of a row")
+    sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N", help="budget of a row")
+    where = sub.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=whole(1), default=0, metavar="N", help="processes of a Dask cluster")
+    where.add_argument("--scheduler", default="", metavar="tcp://HOST:PORT", help="a Dask cluster that exists")
+    sub.add_argument("-o", "--output", type=Path, metavar="FILE.zarr", required=True,
+                     help="new directory, or one of the same map, which is completed; figures come beside it")
+
+
+def _map(options: argparse.Namespace) -> int:
+    try:
+        return _run(options)
+    except ModuleNotFoundError as error:
+        if str(error.name).split(".")[0] not in PACKAGES:
+            raise
+        raise Refused(f"`grasp map` needs {error.name}; pip install 'grasp_ros[map]'") from None
+
+
+def _run(options: argparse.Namespace) -> int:
+    from grasp_ros.maps import figures, store
+    from grasp_ros.maps.plan import Plan, read_axis
+    from grasp_ros.maps.run import run
+
+    scene = load_scene(options.scene, options.settings)
+    given = [("--y", options.y), ("--x", options.x), *(("--vary", text) for text in options.vary)]
+    axes = tuple(read_axis(option, text) for option, text in given if text is not None)
+    if options.vary and not options.sample:
+        raise Refused("--vary: allowed: with --sample N; a map has --x and --y")
+    outcomes = tuple(options.outcome) or Setup().outcomes
+    setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.max_events, options.max_work)
+    plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
+    prepare()
+    with tqdm(total=plan.rows, unit="run", desc=scene.name, smoothing=0.05) as bar:
+        def progress(done: int, _: int) -> None:
+            bar.update(done - bar.n)
+
+        run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
+    data = store.read(options.output)
+    print(report(data))
+    for column in store.columns_of(data):
+        path = options.output.with_name(f"{options.output.stem}_{column}.png")
+        figures.draw(data, plan, column, path)
+        print(f"written to {path}")
+    print(f"written to {options.output}")
+    return 0
+
+
+def report(data: Any) -> str:
+    """A line for each outcome, and how the runs ended."""
+    from grasp_ros.maps import store
+
+    names = store.columns_of(data)
+    width = max(map(len, [*names, "status"]))
+    heads = ("least", "5 %", "median", "95 %", "largest", "inf")
+    lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in heads)]
+    for name in names:
+        values = data[name].values.ravel()
+        finite = values[np.isfinite(values)]
+        cells = np.quantile(finite, (0.0, 0.05, 0.5, 0.95, 1.0)) if len(finite) else np.full(5, np.nan)
+        lines.append(f"{name:<{width}}" + "".join(f"{cell:12.6g}" for cell in cells) + f"{np.isinf(values).sum():12d}")
+    codes, counts = np.unique(data["status"].values, return_counts=True)
+    ended = ", ".join(f"{STATUSES[code] if code >= 0 else 'not done'} {count}" for code, count in zip(
+        codes, counts, strict=True))
+    return "\n".join([*lines, f"{'status':<{width}}  {ended}"])

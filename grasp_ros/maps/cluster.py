@@ -1,0 +1,105 @@
+"""Rows in other processes, by Dask: a cluster of this machine, or one that exists.
+
+The client hands out chunks and writes what comes back; a chunk whose worker dies is computed again by another one, and
+is written once, because it is written here.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from itertools import islice
+from typing import Any
+
+from grasp_ros.maps.plan import Plan
+from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation.chunk import Chunk, compute
+from grasp_ros.simulation.ensemble import Span
+from grasp_ros.simulation.versions import versions
+
+AHEAD = 3  # chunks for each worker that are handed out
+TIMEOUT_S = 10
+
+
+@cache
+def _known(document: str) -> tuple[dict[str, str], Plan]:
+    return versions(), Plan.from_document(json.loads(document))
+
+
+def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
+    """One chunk, and the versions that it was computed with; what a worker does."""
+    found, plan = _known(document)
+    return found, compute(plan.variants(*span), plan.setup)
+
+
+@contextmanager
+def connect(workers: int, scheduler: str) -> Iterator[Any]:
+    """A client of a new cluster of so many processes on this machine, or of the scheduler at an address.
+
+    Raises
+    ------
+    Refused
+        If Dask is not installed, or nobody answers there.
+    """
+    try:
+        from distributed import Client, LocalCluster
+    except ModuleNotFoundError as error:
+        raise Refused(f"--workers, --scheduler: need {error.name}; pip install 'grasp_ros[cluster]'") from None
+    if scheduler:
+        try:
+            client = Client(scheduler, timeout=TIMEOUT_S)
+        except (OSError, ValueError) as error:
+            raise Refused(f"--scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
+        with client:
+            yield client
+        return
+    with LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as cluster, (
+            Client(cluster)) as client:
+        yield client
+
+
+def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple[Span, Chunk]]:
+    """Do chunks on a cluster, and hand each over when it is done.
+
+    Raises
+    ------
+    Refused
+        If a chunk kills its workers again and again, or a worker has other versions than the client.
+    """
+    from distributed import as_completed
+
+    document, own = json.dumps(plan.to_document()), versions()
+    following = iter(spans)
+
+    def submit(count: int) -> list[Any]:
+        return [_submitted(client, document, span) for span in islice(following, count)]
+
+    threads = max(sum(client.nthreads().values()), 1)
+    waiting: dict[Any, Span] = dict(submit(AHEAD * threads))
+    completed = as_completed(list(waiting))
+    for future in completed:
+        span = waiting.pop(future)
+        found, chunk = _result(future, span)
+        if found != own:
+            other = ", ".join(f"{name} {version}" for name, version in found.items() if own.get(name) != version)
+            raise Refused(f"a worker has {other}; allowed: the versions of this process, because the bits may differ")
+        for added, following_span in submit(1):
+            waiting[added] = following_span
+            completed.add(added)
+        yield span, chunk
+
+
+def _submitted(client: Any, document: str, span: Span) -> tuple[Any, Span]:
+    return client.submit(work, document, span, pure=False), span
+
+
+def _result(future: Any, span: Span) -> tuple[dict[str, str], Chunk]:
+    from distributed import CancelledError, KilledWorker
+
+    try:
+        found: tuple[dict[str, str], Chunk] = future.result()
+    except (KilledWorker, CancelledError) as error:
+        raise Refused(f"rows {span[0]} to {span[1] - 1}: their workers died: {' '.join(str(error).split())}") from None
+    return found

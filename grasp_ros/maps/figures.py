@@ -1,0 +1,107 @@
+"""Pictures of maps and samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm, Normalize
+
+from grasp_ros.maps.plan import Plan
+from grasp_ros.simulation.plots import save
+
+BINS, SCATTERED, DOT, MOST_COLUMNS = 60, 20_000, 2.0, 4
+COLORS = "viridis"
+MISSING = "#c8c8c8"  # what was refused, stopped, or never settles
+LOG_FROM = 1e3  # ratio of values from which on colours are those of their logarithms
+
+
+def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
+    """Draw one outcome: a heat map over two axes, a curve over one, a histogram and scatter of a sample.
+
+    Raises
+    ------
+    Refused
+        If the file cannot be written.
+    """
+    values = np.asarray(data[outcome].values)
+    label = f"{outcome.replace('_', ' ')}, {data[outcome].attrs['units']}"
+    if plan.sample:
+        _sample(data, plan, values, label, path)
+        return
+    figure, axes = plt.subplots(figsize=(8.0, 6.0), layout="constrained")
+    figure.suptitle(plan.scene.title, fontsize="medium")
+    if len(plan.axes) == 1:
+        axes.plot(plan.axes[0].values, values, ".", markersize=DOT)
+        axes.set_ylabel(label)
+        _scale(axes, plan, 0, None)
+    else:
+        heat(axes, plan, values, label)
+    save(figure, path)
+
+
+def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
+    """A heat map over two axes: one pixel for each run."""
+    shown = np.ma.masked_invalid(values)
+    colors = matplotlib.colormaps[COLORS].with_extremes(bad=MISSING)
+    y, x = plan.axes
+    if x.log or y.log:
+        mesh: Any = axes.pcolormesh(x.values, y.values, shown, cmap=colors, norm=_norm(shown), rasterized=True)
+    else:
+        extent = (x.low, x.high, y.low, y.high)
+        mesh = axes.imshow(shown, extent=extent, origin="lower", aspect="auto", cmap=colors, norm=_norm(shown),
+                           interpolation="none")
+    axes.figure.colorbar(mesh, ax=axes, label=label)
+    _scale(axes, plan, 1, 0)
+
+
+def _norm(shown: Any) -> Normalize:
+    if shown.count() and shown.min() > 0.0 and shown.max() > LOG_FROM * shown.min():
+        return LogNorm()
+    return Normalize()
+
+
+def _scale(axes: Axes, plan: Plan, x: int, y: int | None) -> None:
+    axes.set_xlabel(plan.axes[x].name)
+    if plan.axes[x].log:
+        axes.set_xscale("log")
+    if y is not None:
+        axes.set_ylabel(plan.axes[y].name)
+        if plan.axes[y].log:
+            axes.set_yscale("log")
+
+
+def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -> None:
+    """The histogram, and the outcome over the numbers with which it goes most."""
+    finite = np.isfinite(values)
+    strongest = [name for name, _ in correlations(data, plan, values)][: MOST_COLUMNS - 1]
+    figure, columns = plt.subplots(1, len(strongest) + 1, figsize=(3.6 * (len(strongest) + 1), 3.8), squeeze=False,
+                                   layout="constrained")
+    figure.suptitle(f"{plan.scene.title}: {plan.sample} runs", fontsize="medium")
+    first, *others = columns[0]
+    first.hist(values[finite], bins=BINS, color="#0072b2")
+    first.set_xlabel(label)
+    first.set_ylabel("runs")
+    shown = np.flatnonzero(finite)[:SCATTERED]
+    for axes, name in zip(others, strongest, strict=True):
+        axes.plot(data[name].values[shown], values[shown], ".", markersize=DOT, alpha=0.3, color="#333333")
+        axes.set_xlabel(name, fontsize="small")
+        axes.set_ylabel(label, fontsize="small")
+    save(figure, path)
+
+
+def correlations(data: Any, plan: Plan, values: np.ndarray) -> list[tuple[str, float]]:
+    """Rank correlation (Spearman) of an outcome with each number of a sample, the strongest first."""
+    finite = np.isfinite(values)
+    found = []
+    for axis in plan.axes:
+        ranks = np.array([np.argsort(np.argsort(column[finite])) for column in (data[axis.name].values, values)])
+        spread = finite.sum() > 1 and np.ptp(values[finite]) > 0.0
+        found.append((axis.name, float(np.corrcoef(ranks.astype(float))[0, 1]) if spread else 0.0))
+    return sorted(found, key=lambda entry: -abs(entry[1]))

@@ -1,0 +1,181 @@
+"""Which variants of a scene a map holds: a grid over two numbers or one, or a sample of any number of them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.variants import Variants, parameter_of
+
+POINTS, MOST, MOST_AXES = 101, 10**9, 2
+LOG = "log"
+
+
+class Axis(NamedTuple):
+    """A range of one number of a scene."""
+
+    name: str  # "section.key", or several joined by +, which have the same value
+    low: float
+    high: float
+    points: int = POINTS
+    log: bool = False
+
+    def at(self, parts: Array) -> Array:
+        """Values (n,) at parts of the range in [0, 1]; both ends are exact."""
+        if self.log:
+            values = np.exp((1.0 - parts) * math.log(self.low) + parts * math.log(self.high))
+        else:
+            values = (1.0 - parts) * self.low + parts * self.high
+        return np.asarray(np.where(parts == 0.0, self.low, np.where(parts == 1.0, self.high, values)))
+
+    @property
+    def keys(self) -> list[str]:
+        """The numbers, each "section.key"."""
+        return self.name.split("+")
+
+    @property
+    def values(self) -> Array:
+        """Values (points,) of a grid."""
+        return self.at(np.arange(self.points) / (self.points - 1))
+
+
+def read_axis(option: str, text: str) -> Axis:
+    """An axis from "section.key[+section.key]=low:high[:n[:log]]".
+
+    Raises
+    ------
+    Refused
+        If it is written otherwise.
+    """
+    allowed = (
+        "allowed: section.key=low:high, keys of one value joined by +, :n behind it for n >= 2 values, and :log behind"
+        " that for a scale > 0"
+    )
+    match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d+)(?::(log))?)?", text)
+    if match is None:
+        raise Refused(f"{option} {text}: not understood; {allowed}")
+    name, low, high, points, log = match.groups()
+    try:
+        axis = Axis(name, float(low), float(high), int(points or POINTS), log == LOG)
+    except ValueError:
+        raise Refused(f"{option} {text}: not understood; {allowed}") from None
+    finite = math.isfinite(axis.low) and math.isfinite(axis.high)
+    if not (finite and axis.low < axis.high and 2 <= axis.points <= MOST) or (axis.log and axis.low <= 0.0):
+        raise Refused(f"{option} {text}: not a range; {allowed}")
+    return axis
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that the numbers of a map depend on.
+
+    Attributes
+    ----------
+    scene : Scene
+    setup : Setup
+    axes : tuple of Axis
+        Of a grid: y and x, or x alone; of a sample: any number.
+    sample : int
+        Rows of a sample; 0: a grid.
+    seed : int
+    quasi : bool
+        Whether the sample is a scrambled Sobol sequence instead of independent numbers.
+    """
+
+    scene: Scene
+    setup: Setup
+    axes: tuple[Axis, ...]
+    sample: int = 0
+    seed: int = 0
+    quasi: bool = True
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Of the outcomes: (n,) of a sample, (y, x) or (x,) of a grid."""
+        return (self.sample,) if self.sample else tuple(axis.points for axis in self.axes)
+
+    @property
+    def rows(self) -> int:
+        """Number of runs."""
+        return math.prod(self.shape)
+
+    def variants(self, first: int, last: int) -> Variants:
+        """The rows from the first to before the last one."""
+        if self.sample:
+            columns = [np.ascontiguousarray(column) for column in self._sample[first:last].T]
+        else:
+            places = np.unravel_index(np.arange(first, last), self.shape)
+            columns = [axis.values[place] for axis, place in zip(self.axes, places, strict=True)]
+        pairs = zip(self.axes, columns, strict=True)
+        return Variants(self.scene, {key: column for axis, column in pairs for key in axis.keys})
+
+    @cached_property
+    def _sample(self) -> Array:
+        """Values (n, axes)."""
+        n, k = self.sample, len(self.axes)
+        if self.quasi:
+            from scipy.stats import qmc
+
+            parts = qmc.Sobol(k, rng=np.random.default_rng(self.seed)).random(2 ** max(math.ceil(math.log2(n)), 0))[:n]
+        else:
+            parts = np.random.default_rng(self.seed).random((n, k))
+        return np.stack([axis.at(parts[:, i]) for i, axis in enumerate(self.axes)], axis=1)
+
+    def to_document(self) -> dict[str, Any]:
+        """Everything as JSON has it."""
+        return {
+            "scene_name": self.scene.name, "scene": self.scene.to_yaml(), "setup": self.setup._asdict(),
+            "axes": [axis._asdict() for axis in self.axes], "sample": self.sample, "seed": self.seed,
+            "quasi": self.quasi,
+        }
+
+    @staticmethod
+    def from_document(document: dict[str, Any]) -> Plan:
+        """The plan of a document."""
+        setup = Setup(**{**document["setup"], "outcomes": tuple(document["setup"]["outcomes"])})
+        scene = scenes.parse(document["scene"], document["scene_name"], document["scene_name"])
+        axes = tuple(Axis(**axis) for axis in document["axes"])
+        return Plan(scene, setup, axes, document["sample"], document["seed"], document["quasi"])
+
+
+def check(plan: Plan) -> None:
+    """Refuse axes that the scene has not, or whose ends it refuses.
+
+    Raises
+    ------
+    Refused
+        Names the axis.
+    """
+    names = [key for axis in plan.axes for key in axis.keys]
+    if not names or len(set(names)) < len(names):
+        raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")
+    if not plan.sample and len(plan.axes) > MOST_AXES:
+        raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
+    for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
+        parameter = parameter_of(plan.scene, key)
+        if parameter.whole:
+            raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")
+        for end in (axis.low, axis.high):
+            if not parameter.accepts(end):
+                raise Refused(f"{plan.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")
+
+
+def relative(scene: Scene, part: float, without: Sequence[str] = ()) -> tuple[Axis, ...]:
+    """Axes for every number of a scene that is neither 0 nor one of its times: off by up to a part of it."""
+    return tuple(
+        Axis(f"{section}.{key}", value - part * abs(value), value + part * abs(value))
+        for section, numbers in scene.values.items() if section != "time"
+        for key, value in numbers.items()
+        if isinstance(value, float) and value and f"{section}.{key}" not in without
+    )

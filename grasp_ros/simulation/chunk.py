@@ -1,0 +1,183 @@
+"""A chunk of an ensemble: rows of variants, one after the other, and their outcomes.
+
+A plain row is integrated with its chunk in one call (`exact.rows`), without the interpreter. Any other, and a plain one
+that stops, is driven as `simulate` drives a scene. Both give the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Integrator, Status
+from grasp_ros.exact.rows import Rows, integrate_rows
+from grasp_ros.exact.sight import SEEN, Seen, Wanted
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import EVENT_BODY, EVENT_KIND, LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import Outcome as Ended
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import lyapunov
+from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
+from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
+from grasp_ros.simulation.variants import SET_POINT, Variants
+
+REFUSED = "REFUSED"
+STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if status is not Status.DONE))
+SETTLED = 0.02  # part of the largest initial displacement
+TOUCHES = len((LEFT, RIGHT))
+NO_GRID = np.zeros(0)
+NEVER = np.zeros(1, dtype=np.int64)
+LEFT_OUT = -2  # in place of why a row ended
+
+
+class Setup(NamedTuple):
+    """What the rows of an ensemble depend on, beside the scene and its numbers.
+
+    Attributes
+    ----------
+    outcomes : tuple of str
+        Columns or groups, see `outcomes`.
+    accuracy : float
+        Of `exact`, see `exact.integrator.Integrator`.
+    sampled : bool
+        See `simulate`.
+    settled : float
+        Part of the largest initial displacement within which a run counts as settled.
+    max_events, max_work : int
+        Budgets of each row.
+    """
+
+    outcomes: tuple[str, ...] = ("settling_time", "touches")
+    accuracy: float = ACCURACY
+    sampled: bool = False
+    settled: float = SETTLED
+    max_events: int = MAX_EVENTS
+    max_work: int = MAX_WORK
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Outcomes of some rows.
+
+    Attributes
+    ----------
+    columns : dict of str to array (n,)
+    status : array (n,)
+        Places in `STATUSES`.
+    stops : dict of int to str
+        Why and where a row was refused or stopped, by its place among these rows.
+    """
+
+    columns: dict[str, Array]
+    status: np.ndarray
+    stops: dict[int, str]
+
+
+class _Row(NamedTuple):
+    seen: Array
+    state: Array
+    touches: Array
+    growth: float
+    status: Status
+    stop: str
+
+
+def check(scene: Scene, setup: Setup) -> list[Outcome]:
+    """The columns that are asked for.
+
+    Raises
+    ------
+    Refused
+        If an outcome is unknown or not to be had, or a setting is outside its range.
+    """
+    columns = find(setup.outcomes)
+    Integrator(scene.system, continuous=True, accuracy=setup.accuracy)
+    if not 0.0 < setup.settled < 1.0:
+        raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
+    if any(column.name == LYAPUNOV for column in columns):
+        lyapunov.check(scene, setup.sampled or scene.sampled)
+    return columns
+
+
+def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -> Chunk:
+    """Run some rows, one after the other; a `stop` that is not 0 ends it early, with rows left out."""
+    columns, n = find(setup.outcomes), variants.rows
+    runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, TOUCHES)), np.full(n, np.nan))
+    status, stops = np.zeros(n, dtype=np.int8), variants.faults()
+    for i in stops:
+        status[i] = STATUSES.index(REFUSED)
+    left = np.flatnonzero(status == 0)
+    if _is_plain(variants, setup, columns):
+        left = _run_plain(variants, setup, wanted_by(columns), runs, left, stop)
+    for i in left.tolist():
+        if stop[0]:
+            break
+        row = _run(variants.row(i), setup, columns)
+        runs.seen[i], runs.state[i], runs.touches[i], runs.growth[i] = row[:4]
+        if row.status is not Status.DONE:
+            status[i], stops[i] = STATUSES.index(row.status.name), row.stop
+    for place in (place for body in variants.scene.system.absent for place in (COLUMN[body], COLUMN[body] + 1)):
+        runs.state[:, place] = runs.seen[:, Seen.LOW + place] = runs.seen[:, Seen.HIGH + place] = np.nan
+    found = {column.name: np.array(column.read(runs)) for column in columns}
+    for name, values in found.items():
+        values[status != 0 if name not in LAST else status == STATUSES.index(REFUSED)] = np.nan
+    return Chunk(found, status, stops)
+
+
+def _is_plain(variants: Variants, setup: Setup, columns: Sequence[Outcome]) -> bool:
+    """Whether rows can be integrated without the interpreter: continuous feedback, no other inputs, arrays for all."""
+    scene = variants.scene
+    inputs = setup.sampled or scene.sampled or scene.system.external
+    return variants.is_plain and not inputs and all(column.name != LYAPUNOV for column in columns)
+
+
+def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, which: NDArray[np.int64],
+               stop: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Integrate rows in one call; returns those that are left to `_run`, because they do not just reach the end."""
+    block, n = variants.block(), len(which)
+    gains = np.zeros((n, 2, 2))
+    gains[:] = block.laws[which][..., :SET_POINT]
+    rows = Rows(
+        block.closed_loop[which], block.bodies[which], gains, block.pairs[which], block.coulomb[which, 0, 0],
+        block.state[which, :, 0], np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)), np.full(n, LEFT_OUT),
+    )
+    integrate_rows(rows, variants.scene.duration, setup.accuracy, wanted, setup.settled, stop, setup.max_events,
+                   setup.max_work)
+    done = rows.outcome == Ended.DONE
+    runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
+    runs.touches[which[done]] = rows.touches[done]
+    return np.asarray(which[~done])
+
+
+def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
+    """One row, driven as `simulate` drives it."""
+    system, sampled = scene.system, setup.sampled or scene.sampled
+    integrator = Integrator(
+        system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
+    watcher, wanted = None, wanted_by(columns)
+    if wanted:
+        watcher = integrator.watch(wanted, setup.settled)
+    if sampled:
+        SampledLoop(scene, NO_GRID, {}, None).drive(integrator)
+    elif system.external:
+        drive_external(scene, NO_GRID, integrator)
+    else:
+        integrator.advance(scene.duration)
+    seen = np.full(SEEN, np.nan)
+    if watcher is not None:
+        watcher.finish()
+        seen = watcher.seen.copy()
+    growth = np.nan
+    if integrator.status is Status.DONE and any(column.name == LYAPUNOV for column in columns):
+        growth = lyapunov.exponent(system, scene.duration, setup.accuracy)
+    touched = integrator.event_table[integrator.event_table[:, EVENT_KIND] == Transition.TOUCH, EVENT_BODY]
+    touches = np.array([(touched == side).sum() for side in (LEFT, RIGHT)], dtype=float)
+    return _Row(seen, integrator.state, touches, growth, integrator.status, integrator.stop)
+
+

@@ -1,0 +1,145 @@
+"""Ensembles: many variants of one scene, each row a run of its own, and of each run its outcomes alone.
+
+A row gives the bits of `simulate` for the scene with its numbers: it is the same integrator, driven the same way, with
+an observer (`exact.watcher`) in place of an output grid. Rows know nothing of each other, so that they do not depend on
+threads, order or chunks. A row that a scene's rules refuse, or whose run stops, says so in a sentence.
+
+Rows are computed in chunks, which are all that memory holds beside the table: the kernels release the interpreter's
+lock, so that threads share the work. `chunk.compute` does one; the threads here, and the processes of `maps`, only say
+which one is next.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.simulation.chunk import Chunk, Setup, check, compute
+from grasp_ros.simulation.variants import Variants
+
+CHUNK_S, ROW_S, TICK_S = 0.1, 4e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Table:
+    """An ensemble: its numbers and its outcomes, a row for each run.
+
+    Attributes
+    ----------
+    scene : Scene
+    setup : Setup
+    changes : dict of str to array (n,)
+        Numbers by "section.key".
+    columns : dict of str to array (n,)
+        Outcomes by the names of `outcomes.OUTCOMES`; nan in rows that were refused or stopped.
+    status : array (n,)
+        Places in `STATUSES`.
+    stops : dict of int to str
+        Why and where a row was refused or stopped.
+    """
+
+    scene: Scene
+    setup: Setup
+    changes: dict[str, Array]
+    columns: dict[str, Array]
+    status: np.ndarray
+    stops: dict[int, str]
+
+    @property
+    def done(self) -> np.ndarray:
+        """Rows (n,) that reached the end of the horizon."""
+        return np.asarray(self.status == 0)
+
+
+def ensemble(
+    scene: Scene,
+    changes: Mapping[str, ArrayLike],
+    outcomes: Sequence[str] = Setup().outcomes,
+    *,
+    setup: Setup | None = None,
+    threads: int | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> Table:
+    """Run variants of a scene, and keep their outcomes.
+
+    Parameters
+    ----------
+    scene : Scene
+    changes : mapping of str to array (n,)
+        Numbers of the scene by "section.key", one for each row; without any there is one row, the scene itself.
+    outcomes : sequence of str
+        Columns or groups of `outcomes`.
+    setup : Setup, optional
+        All that the rows depend on beside; its outcomes give way to those above.
+    threads : int, optional
+        Default: one for each core. The result does not depend on it.
+    progress : callable, optional
+        Called with the number of rows of each chunk that is done.
+
+    Raises
+    ------
+    Refused
+        If a key or an outcome is not known, or a setting is outside its range.
+    """
+    setup = (setup or Setup())._replace(outcomes=tuple(outcomes))
+    columns, variants = check(scene, setup), Variants(scene, changes)
+    table = Table(
+        scene, setup, variants.changes, {column.name: np.full(variants.rows, np.nan) for column in columns},
+        np.zeros(variants.rows, dtype=np.int8), {},
+    )
+    spans = chunks(variants.rows, chunk_rows(scene, setup))
+
+    def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
+        return compute(variants.part(*span), setup, stop)
+
+    for (first, last), chunk in in_threads(work, spans, threads):
+        for name, values in chunk.columns.items():
+            table.columns[name][first:last] = values
+        table.status[first:last] = chunk.status
+        table.stops.update({first + i: stop for i, stop in chunk.stops.items()})
+        if progress is not None:
+            progress(last - first)
+    return table
+
+
+def chunk_rows(scene: Scene, setup: Setup) -> int:
+    """Rows of one chunk, for about `CHUNK_S` of work."""
+    ticks = scene.ticks if setup.sampled or scene.sampled or scene.system.external else 1
+    return max(1, int(CHUNK_S / (ROW_S + ticks * TICK_S)))
+
+
+def chunks(rows: int, size: int) -> list[tuple[int, int]]:
+    """First row of each chunk, and the one behind its last."""
+    return [(first, min(first + size, rows)) for first in range(0, rows, size)]
+
+
+def in_threads(work: Callable[[Span, NDArray[np.int64]], Chunk], spans: Iterable[Span], threads: int | None = None
+               ) -> Iterator[tuple[Span, Chunk]]:
+    """Do chunks in threads, and hand each over when it is done; no more are begun than threads can soon take up.
+
+    The work is handed what it is to look at now and then: not 0 asks it to stop, after a Ctrl-C say.
+    """
+    workers = threads or os.cpu_count() or 1
+    waiting: dict[Future[Chunk], Span] = {}
+    following, stop = iter(spans), np.zeros(1, dtype=np.int64)
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            while True:
+                for span in islice(following, 2 * workers - len(waiting)):
+                    waiting[pool.submit(work, span, stop)] = span
+                if not waiting:
+                    return
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    yield waiting.pop(future), future.result()
+        finally:
+            stop[0] = 1
+            pool.shutdown(wait=False, cancel_futures=True)

@@ -1,0 +1,146 @@
+"""Outcomes of a run: numbers that say what came of it, computed from closed forms and polynomials, not from a grid.
+
+Each outcome is a column of `Outcome`; groups of columns have a name of their own. A run that stops before its end has
+no outcomes but its last state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.exact.sight import Quantity, Seen, Wanted
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import U_L, U_R, V_L, V_O, V_R, X_L, X_O, X_R
+from grasp_ros.physics.model import Array
+
+NOTHING = Wanted(0)
+
+
+class Runs(NamedTuple):
+    """What is left of n runs when they are over."""
+
+    seen: Array  # (n, k), see `exact.sight.Seen`
+    state: Array  # (n, 6)
+    touches: Array  # (n, 2)
+    growth: Array  # (n,) largest Lyapunov exponent, 1/s
+
+
+class Outcome(NamedTuple):
+    """One column."""
+
+    name: str
+    unit: str
+    text: str
+    wanted: Wanted
+    read: Callable[[Runs], Array]
+
+
+def _settling(runs: Runs) -> Array:
+    return np.where(runs.seen[:, Seen.INSIDE] > 0.0, runs.seen[:, Seen.OUTSIDE], np.inf)
+
+
+def _seen(place: int, factor: float = 1.0) -> Callable[[Runs], Array]:
+    return lambda runs: factor * runs.seen[:, place]
+
+
+def _low(q: int) -> Callable[[Runs], Array]:
+    return _seen(Seen.LOW + q)
+
+
+def _high(q: int) -> Callable[[Runs], Array]:
+    return _seen(Seen.HIGH + q)
+
+
+def _largest(q: int) -> Callable[[Runs], Array]:
+    return lambda runs: np.maximum(np.abs(runs.seen[:, Seen.LOW + q]), np.abs(runs.seen[:, Seen.HIGH + q]))
+
+
+def _peak(q: int) -> Callable[[Runs], Array]:
+    return lambda runs: np.maximum(runs.seen[:, Seen.HIGH + q], 0.0)
+
+
+def _state(place: int) -> Callable[[Runs], Array]:
+    return lambda runs: runs.state[:, place]
+
+
+def _touch(side: int) -> Callable[[Runs], Array]:
+    return lambda runs: runs.touches[:, side]
+
+
+def _growth(runs: Runs) -> Array:
+    return runs.growth
+
+
+_PLACES = {"left": (X_L, V_L), "object": (X_O, V_O), "right": (X_R, V_R)}
+_SIDES = ("left", "right")
+_GROUPS: dict[str, tuple[Outcome, ...]] = {
+    "settling_time": (Outcome(
+        "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, any"
+        " more; inf: it does at the end", Wanted.SETTLING, _settling),),
+    "touches": tuple(
+        Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _touch(side))
+        for side, name in enumerate(_SIDES)),
+    "peak_input": tuple(
+        Outcome(f"peak_input_{name}", "N", f"largest input of the {name} arm: command and external force",
+                Wanted.INPUTS, _largest(q))
+        for q, name in zip((Quantity.INPUT_L, Quantity.INPUT_R), _SIDES, strict=True)),
+    "peak_impact": tuple(
+        Outcome(f"peak_impact_{name}", "N", f"largest impact force of the {name} arm", Wanted.IMPACTS, _peak(q))
+        for q, name in zip((Quantity.IMPACT_L, Quantity.IMPACT_R), _SIDES, strict=True)),
+    "peak_penetration": tuple(
+        Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS, _peak(q))
+        for q, name in zip((U_L, U_R), _SIDES, strict=True)),
+    "energy": tuple(
+        Outcome(name, "J", text, Wanted.LOSSES, _seen(place)) for name, text, place in (
+            ("lost_dampers", "energy that the dampers of the arms took", Seen.DAMPERS),
+            ("lost_feedback", "energy that the velocity feedback took; 0 where commands are held", Seen.FEEDBACK),
+            ("lost_friction", "energy that friction of the object took", Seen.FRICTION),
+            ("lost_impacts", "energy that the impacts took", Seen.IMPACTS),
+            ("work_inputs", "work of held commands and external forces", Seen.WORK),
+        )),
+    "V_c_rise": (Outcome("V_c_rise", "J", "largest rise of V_c above what it was before, at events, steps and ticks",
+                         Wanted.RISE, _seen(Seen.RISE)),),
+    "extremes": tuple(
+        Outcome(f"{symbol}_{name}_{which}", unit, f"{word} {what} of the {name} mass", Wanted.MOTION, read(place))
+        for name, pair in _PLACES.items()
+        for place, symbol, unit, what in zip(pair, "xv", ("m", "m/s"), ("position", "velocity"), strict=True)
+        for which, word, read in (("min", "least", _low), ("max", "largest", _high))),
+    "last_state": tuple(
+        Outcome(f"{symbol}_{name}_end", unit, f"{what} of the {name} mass at the end", NOTHING, _state(place))
+        for name, pair in _PLACES.items()
+        for place, symbol, unit, what in zip(pair, "xv", ("m", "m/s"), ("position", "velocity"), strict=True)),
+    "lyapunov": (Outcome("lyapunov", "1/s", "largest Lyapunov exponent over the run", NOTHING, _growth),),
+}
+GROUPS: dict[str, tuple[str, ...]] = {group: tuple(entry.name for entry in own) for group, own in _GROUPS.items()}
+OUTCOMES: dict[str, Outcome] = {entry.name: entry for own in _GROUPS.values() for entry in own}
+LYAPUNOV = "lyapunov"
+LAST = frozenset(GROUPS["last_state"])  # also of a run that stopped
+
+
+def find(names: Iterable[str]) -> list[Outcome]:
+    """Outcomes by the names of columns or groups, each once.
+
+    Raises
+    ------
+    Refused
+        If there is no such name.
+    """
+    found: dict[str, Outcome] = {}
+    for name in names:
+        if name not in GROUPS and name not in OUTCOMES:
+            raise Refused(f"outcome {name}: not known; allowed: {', '.join({**GROUPS, **OUTCOMES})}")
+        found.update({column: OUTCOMES[column] for column in GROUPS.get(name, (name,))})
+    if not found:
+        raise Refused(f"outcomes: none; allowed: one or more of {', '.join(GROUPS)}")
+    return list(found.values())
+
+
+def wanted_by(columns: Iterable[Outcome]) -> Wanted:
+    """What a run must be watched for."""
+    total = NOTHING
+    for column in columns:
+        total |= column.wanted
+    return total

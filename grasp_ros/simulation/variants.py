@@ -1,0 +1,180 @@
+"""Variants of a scene: rows of other numbers for some of its keys, validated by the rules of the scene.
+
+Most keys are numbers of bodies, pairs or feedback, which go straight into arrays: a whole block of rows is checked
+and built at once. Rows that such a check finds fault with, and rows of any other key, are made as a scene of their own,
+so that the rules and the sentences are those of `scene.validation` alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import (
+    DAMPING,
+    DISSIPATION,
+    FORCE,
+    HERTZIAN,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    STIFFNESS,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
+)
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene, SceneError
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.parameter import Parameter
+
+POSITION_GAIN, VELOCITY_GAIN, SET_POINT, FEED_FORWARD = range(4)
+Place = tuple[str, int, int]  # array of `Block`, row, column
+_ARM = {"mass_kg": MASS, "stiffness_N_per_m": STIFFNESS, "damping_Ns_per_m": DAMPING}
+_PAIR = {"hertz_N_per_m1_5": HERTZIAN, "dissipation_s_per_m": DISSIPATION}
+_GAIN = {"position_gain_N_per_m": POSITION_GAIN, "velocity_gain_Ns_per_m": VELOCITY_GAIN, "set_point_m": SET_POINT,
+         "feed_forward_N": FEED_FORWARD}
+PLACES: dict[str, Place] = {
+    f"{section}.{key}": place
+    for side, name in ((LEFT, "left"), (RIGHT, "right"))
+    for section, array, columns in (
+        (f"{name}_arm", "bodies", _ARM), (f"{name}_contact", "pairs", _PAIR), (f"{name}_feedback", "laws", _GAIN),
+    )
+    for key, column in columns.items()
+    for place in [(array, int(side), column)]
+} | {
+    f"{section}.{key}": ("state", place, 0)
+    for section, x, v in (("left_arm", X_L, V_L), ("object", X_O, V_O), ("right_arm", X_R, V_R))
+    for key, place in (("position_m", x), ("velocity_m_per_s", v))
+} | {
+    "object.mass_kg": ("bodies", int(OBJECT), MASS),
+    "object_friction.viscous_Ns_per_m": ("bodies", int(OBJECT), DAMPING),
+    "object_friction.coulomb_N": ("coulomb", 0, 0),
+}
+
+
+@dataclass
+class Block:
+    """Systems of n rows as arrays, see `physics.system.System`."""
+
+    bodies: Array  # (n, 3, 4)
+    pairs: Array  # (n, 2, 2)
+    state: Array  # (n, 6, 1)
+    coulomb: Array  # (n, 1, 1)
+    laws: Array  # (n, 2, 4): Kp, Kv, set-point, feed-forward
+
+    @property
+    def closed_loop(self) -> Array:
+        """`bodies` with the continuous feedback in them, as `System.closed_loop` has it."""
+        bodies = self.bodies.copy()
+        gains, offset = self.laws[..., :SET_POINT], self.laws[..., SET_POINT]
+        bodies[:, : OBJECT, STIFFNESS] += gains[..., POSITION_GAIN]
+        bodies[:, : OBJECT, DAMPING] += gains[..., VELOCITY_GAIN]
+        bodies[:, : OBJECT, FORCE] += gains[..., POSITION_GAIN] * offset + self.laws[..., FEED_FORWARD]
+        return bodies
+
+
+class Variants:
+    """Rows of a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    changes : mapping of str to array (n,)
+        Numbers by "section.key", one for each row.
+
+    Raises
+    ------
+    Refused
+        If a key is not a number of this scene, or the arrays are not as long as each other.
+    """
+
+    def __init__(self, scene: Scene, changes: Mapping[str, ArrayLike]) -> None:
+        self.scene = scene
+        self.changes = {name: np.asarray(column, dtype=float) for name, column in changes.items()}
+        for name in self.changes:
+            parameter_of(scene, name)
+        lengths = {name: column.shape for name, column in self.changes.items()}
+        if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
+            raise Refused(f"changes: shapes {lengths} are not allowed; allowed: arrays (n,) of one length")
+        self.rows = next(iter(lengths.values()))[0] if lengths else 1
+
+    def part(self, first: int, last: int) -> Variants:
+        """Rows from the first to before the last one."""
+        return Variants(self.scene, {name: column[first:last] for name, column in self.changes.items()})
+
+    def row(self, i: int) -> Scene:
+        """One row as a scene.
+
+        Raises
+        ------
+        SceneError
+            If it cannot be run.
+        """
+        return self.scene.changed({name: float(column[i]) for name, column in self.changes.items()})
+
+    @cached_property
+    def is_plain(self) -> bool:
+        """Whether all rows follow from arrays: changed are numbers of bodies, pairs and feedback that have a place."""
+        tilted = "tilt" in self.scene.values and any(name.endswith(".mass_kg") for name in self.changes)
+        return not tilted and all(name in PLACES for name in self.changes)
+
+    def faults(self) -> dict[int, str]:
+        """Sentences for the rows that the scene's rules refuse."""
+        doubtful = self._doubtful() if self.is_plain else np.arange(self.rows)
+        found = {}
+        for i in doubtful.tolist():
+            try:
+                self.row(i)
+            except SceneError as error:
+                found[i] = str(error)
+        return found
+
+    def _doubtful(self) -> NDArray[np.int64]:
+        """Rows with a number outside its range, or with a negative sum of an arm's own and its feedback's."""
+        doubt = np.zeros(self.rows, dtype=bool)
+        for name, column in self.changes.items():
+            allowed = parameter_of(self.scene, name)
+            above = column > allowed.low if allowed.open_low else column >= allowed.low
+            doubt |= ~(above & (column <= allowed.high))
+        loop = self.block().closed_loop
+        return np.flatnonzero(doubt | (loop[:, : OBJECT, STIFFNESS : FORCE] < 0.0).any(axis=(1, 2)))
+
+    def block(self) -> Block:
+        """The rows as arrays; to be called only if `is_plain`."""
+        system, n = self.scene.system, self.rows
+        laws = np.zeros((2, 4))
+        for side, law in system.laws.items():
+            laws[side] = law.position_gain, law.velocity_gain, law.set_point, law.feed_forward
+        block = Block(*(np.repeat(array[None], n, axis=0) for array in (
+            system.bodies, system.pairs, system.state[:, None], np.full((1, 1), system.coulomb), laws,
+        )))
+        for name, column in self.changes.items():
+            array, row, place = PLACES[name]
+            getattr(block, array)[:, row, place] = column
+        return block
+
+
+def parameter_of(scene: Scene, name: str) -> Parameter:
+    """What a number of a scene is, by "section.key".
+
+    Raises
+    ------
+    Refused
+        If the scene does not name it, or if it is a list.
+    """
+    section, _, key = name.partition(".")
+    known = [f"{own}.{parameter.key}" for own in scene.values for parameter in BY_SECTION[own].parameters
+             if parameter.key in scene.values[own] and not parameter.several]
+    if name not in known:
+        raise Refused(f"{scene.name}: {name}: not a number of this scene; allowed: {', '.join(known)}")
+    return next(parameter for parameter in BY_SECTION[section].parameters if parameter.key == key)

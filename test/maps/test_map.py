@@ -1,0 +1,211 @@
+"""Maps: what a file holds, what goes on after a kill, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.main import main
+from grasp_ros.maps import run as runs
+from grasp_ros.maps.plan import Axis, Plan, read_axis, relative
+from grasp_ros.maps.run import run
+from grasp_ros.maps.store import MARKS, Store, columns_of, open_group, read
+from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation import ensemble as ensembles
+from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
+from grasp_ros.simulation.ensemble import ensemble
+
+GAIN, LOSS = "left_feedback.position_gain_N_per_m", "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"
+OUTCOMES = ("settling_time", "touches", "last_state")
+SHORT = "time.duration_s=1.0"
+DEADLINE_S = 120.0
+
+
+def small_plan(points: int = 12, **settings: object) -> Plan:
+    axes = (Axis(GAIN, -20.0, 10.0, 5), Axis(LOSS, 0.01, 1.0, points, True))
+    return Plan(scenes.load("case_01", [SHORT]), Setup(OUTCOMES), axes, **settings)  # type: ignore[arg-type]
+
+
+def assert_same(path: Path, other: Path) -> None:
+    found, expected = read(path), read(other)
+    for name in ("status", *columns_of(expected)):
+        np.testing.assert_array_equal(found[name].values, expected[name].values, name)
+
+
+@pytest.fixture
+def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ensembles, "CHUNK_S", 1e-9)
+
+
+def test_a_map_is_an_ensemble_over_two_axes(tmp_path: Path, tiny_chunks: None) -> None:
+    plan = small_plan()
+    run(plan, tmp_path / "map.zarr")
+    data = read(tmp_path / "map.zarr")
+    gains, losses = np.linspace(-20.0, 10.0, 5), np.geomspace(0.01, 1.0, 12)
+    np.testing.assert_allclose(data[GAIN], gains)
+    np.testing.assert_allclose(data[LOSS], losses)
+    for i, j in ((0, 3), (2, 0), (4, 11)):
+        row = {GAIN: data[GAIN].values[i : i + 1]} | dict.fromkeys(LOSS.split("+"), data[LOSS].values[j:j + 1])
+        alone = ensemble(plan.scene, row, OUTCOMES)
+        for name, values in alone.columns.items():
+            np.testing.assert_array_equal(data[name].values[i, j], values[0])
+            assert data[name].attrs["units"]
+    assert (data["status"].values[0] == STATUSES.index(REFUSED)).all()  # k + Kp < 0
+    assert (data["status"].values[2:] == 0).all()
+    found = Plan.from_document(open_group(tmp_path / "map.zarr").attrs["plan"])
+    assert found.to_document() == plan.to_document()
+    assert open_group(tmp_path / "map.zarr").attrs["versions"]["numba"]
+
+
+@pytest.mark.parametrize("quasi", [True, False])
+def test_a_sample_does_not_depend_on_chunks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quasi: bool) -> None:
+    scene = scenes.load("case_01", [SHORT])
+    plan = Plan(scene, Setup(OUTCOMES), relative(scene, 0.3), 20, 7, quasi)
+    assert len(plan.axes) == 17
+    run(plan, tmp_path / "whole.zarr")
+    monkeypatch.setattr(ensembles, "CHUNK_S", 1e-9)
+    run(plan, tmp_path / "pieces.zarr")
+    assert_same(tmp_path / "pieces.zarr", tmp_path / "whole.zarr")
+    values = read(tmp_path / "whole.zarr")["object.mass_kg"].values
+    assert (np.abs(values / 5.0 - 1.0) <= 0.3).all()
+    assert len(set(values)) == 20
+
+
+def test_it_goes_on_after_a_kill_and_computes_only_the_rest(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tiny_chunks: None
+) -> None:
+    """A real process, killed when some chunks are marked; the file then is that of a run without a kill."""
+    path = tmp_path / "killed.zarr"
+    plan = Plan(scenes.load("case_01"), Setup(("touches",)), (Axis(GAIN, 1.0, 9.0, 120),))
+    code = (
+        "from pathlib import Path; import json, sys; from grasp_ros.maps.plan import Plan;"
+        "from grasp_ros.maps.run import run; from grasp_ros.simulation import ensemble; ensemble.CHUNK_S = 1e-9;"
+        "run(Plan.from_document(json.loads(sys.argv[1])), Path(sys.argv[2]))"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code, json.dumps(plan.to_document()), str(path)])
+    until = time.monotonic() + DEADLINE_S
+    while len(list(path.glob(f"{MARKS}/c/*"))) < 5:
+        assert time.monotonic() < until
+        assert process.poll() is None
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    left = Store(path, plan, 1).spans
+    assert 0 < len(left) <= 115
+    done: list[int] = []
+    monkeypatch.setattr(runs, "compute", lambda variants, *rest: done.append(variants.rows) or compute(variants, *rest))
+    run(plan, path)
+    assert sum(done) == len(left)
+    run(plan, tmp_path / "whole.zarr")
+    assert_same(path, tmp_path / "whole.zarr")
+
+
+compute = runs.compute
+
+
+def test_what_is_something_else_is_left_alone(tmp_path: Path) -> None:
+    plan = small_plan()
+    run(plan, tmp_path / "map.zarr")
+    other = Plan(plan.scene, plan.setup._replace(accuracy=1e-12), plan.axes)
+    (tmp_path / "text").write_text("mine")
+    (tmp_path / "directory").mkdir()
+    (tmp_path / "directory" / "mine").write_text("mine")
+    for path, asked, words in (
+        (tmp_path / "text", plan, "not a map"), (tmp_path / "directory", plan, "not a map"),
+        (tmp_path / "map.zarr", other, r"a map of another plan \(setup\); allowed: a new path"),
+        (tmp_path / "nowhere" / "\0", plan, "cannot be written|not a map|null byte"),
+    ):
+        with pytest.raises((Refused, ValueError), match=words):
+            run(asked, path)
+    assert (tmp_path / "text").read_text() == "mine"
+    assert [entry.name for entry in (tmp_path / "directory").iterdir()] == ["mine"]
+    (tmp_path / "map.zarr" / MARKS / "zarr.json").unlink()
+    with pytest.raises(Refused, match="a damaged map: without done"):
+        run(plan, tmp_path / "map.zarr")
+
+
+def test_a_full_disk_is_refused_and_what_was_done_is_kept(tmp_path: Path, tiny_chunks: None) -> None:
+    """Files of a process that may not grow stand for a full disk: both are an OSError of the write."""
+    path, plan = tmp_path / "map.zarr", small_plan()
+    Store(path, plan, 1)
+    code = (
+        "import sys, json; from pathlib import Path; from grasp_ros.maps.plan import Plan;"
+        "from grasp_ros.maps.run import run; from grasp_ros.physics.errors import Refused\n"
+        "try: run(Plan.from_document(json.loads(sys.argv[1])), Path(sys.argv[2]))\n"
+        "except Refused as error: print(error)"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", code, json.dumps(plan.to_document()), str(path)], capture_output=True, text=True,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (8, 8)), check=True, timeout=DEADLINE_S,
+    )
+    assert "cannot be written: File too large; what is done is kept: the same command goes on" in answer.stdout
+    run(plan, path)
+    run(plan, tmp_path / "whole.zarr")
+    assert_same(path, tmp_path / "whole.zarr")
+
+
+@pytest.mark.slow
+def test_a_worker_that_dies_takes_no_row_with_it(tmp_path: Path, tiny_chunks: None) -> None:
+    """Two worker processes of a real cluster, one of which is killed: every chunk is written once, the same bits."""
+    from distributed import Client, LocalCluster
+
+    plan = Plan(scenes.load("case_01"), Setup(("settling_time",)), (Axis(GAIN, 1.0, 9.0, 60),))
+    run(plan, tmp_path / "alone.zarr")
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster, (
+            Client(cluster)) as client:
+        workers = client.run(os.getpid)
+        reached: list[int] = []
+
+        def kill(done: int, _: int) -> None:
+            reached.append(done)
+            if len(reached) == 10:
+                os.kill(next(iter(workers.values())), signal.SIGKILL)
+
+        run(plan, tmp_path / "cluster.zarr", scheduler=cluster.scheduler_address, progress=kill)
+        assert len(set(client.run(os.getpid).values()) - set(workers.values())) <= 1
+    assert reached == list(range(61))
+    assert_same(tmp_path / "cluster.zarr", tmp_path / "alone.zarr")
+
+
+def test_the_command_prints_draws_and_completes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "map.zarr"
+    words = ["map", "case_01", "--set", SHORT, "--x", f"{GAIN}=1:9:4", "--y", f"{LOSS}=0.01:1:3:log", "-o", str(path)]
+    for _ in range(2):
+        assert main(words) == 0
+        printed = capsys.readouterr().out
+        assert "DONE 12" in printed
+    assert (tmp_path / "map_settling_time.png").stat().st_size > 1000
+    sample = ["map", "case_01", "--set", SHORT, "--vary", f"{GAIN}=1:9", "--vary", "object.mass_kg=4:6"]
+    sample += ["--sample", "9", "--outcome", "peak_impact", "-o", str(tmp_path / "sample.zarr")]
+    assert main(sample) == 0
+    assert "peak_impact_left" in capsys.readouterr().out
+
+
+def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for words, answer in (
+        ([], "axes: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
+        (["--x", f"{GAIN}=9:1:4"], "not a range"), (["--x", f"{GAIN}=-1:1:4:log"], "not a range"),
+        (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number > 0"),
+        (["--x", "object.weight=1:2"], "object.weight: not a number of this scene"),
+        (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
+        (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
+        (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
+        (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),
+    ):
+        assert main(["map", "case_01", "--set", SHORT, *words, "-o", str(tmp_path / "new.zarr")]) == 2
+        assert answer in capsys.readouterr().err, words
+
+
+def test_ends_of_an_axis_are_exact() -> None:
+    axis = read_axis("--x", "a.b=0.1:0.3:7:log")
+    assert axis.values[[0, -1]].tolist() == [0.1, 0.3]
+    np.testing.assert_allclose(axis.values, np.geomspace(0.1, 0.3, 7))

@@ -1,0 +1,118 @@
+"""Ensembles: rows are runs of their own, whoever computes them and whatever becomes of the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene, SceneError
+from grasp_ros.simulation import ensemble as ensembles
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
+from grasp_ros.simulation.ensemble import Table, ensemble
+from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.variants import PLACES, Variants
+
+OUTCOMES = ("settling_time", "touches", "last_state")
+ROWS = 24
+
+
+def random_changes(scene: Scene, seed: int = 1, rows: int = ROWS) -> dict[str, np.ndarray]:
+    """Every number of a scene that is not 0 or a time, off by up to 30 %."""
+    rng = np.random.default_rng(seed)
+    return {
+        f"{section}.{key}": value * rng.uniform(0.7, 1.3, rows)
+        for section, numbers in scene.values.items() if section != "time"
+        for key, value in numbers.items() if isinstance(value, float) and value and not key.endswith("_s")
+    }
+
+
+def assert_same(table: Table, other: Table) -> None:
+    for name, values in table.columns.items():
+        np.testing.assert_array_equal(values, other.columns[name], name)
+    np.testing.assert_array_equal(table.status, other.status)
+    assert table.stops == other.stops
+
+
+@pytest.mark.parametrize(("name", "sampled"), [
+    ("case_01", False), ("case_01", True), ("tilt_hold", False), ("pulse", False),
+])
+def test_rows_are_simulations_to_the_last_bit(name: str, sampled: bool) -> None:
+    scene = scenes.load(name, ["time.duration_s=2.0"])
+    changes = random_changes(scene)
+    table = ensemble(scene, changes, OUTCOMES, setup=Setup(accuracy=1e-12, sampled=sampled))
+    for i in range(ROWS):
+        row = scene.changed({key: float(values[i]) for key, values in changes.items()})
+        run = simulate(row, sampled=sampled, accuracy=1e-12)
+        found = [table.columns[column][i] for column in GROUPS["last_state"]]
+        np.testing.assert_array_equal(found, run.state[-1])
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_rows_do_not_depend_on_threads_order_or_chunks(monkeypatch: pytest.MonkeyPatch, sampled: bool) -> None:
+    scene = scenes.load("case_01", ["time.duration_s=1.0"])
+    changes, setup = random_changes(scene), Setup(sampled=sampled)
+    table = ensemble(scene, changes, OUTCOMES, setup=setup, threads=1)
+    turned = ensemble(scene, {key: values[::-1] for key, values in changes.items()}, OUTCOMES, setup=setup, threads=2)
+    for name, values in table.columns.items():
+        np.testing.assert_array_equal(values, turned.columns[name][::-1])
+    monkeypatch.setattr(ensembles, "CHUNK_S", 1e-9)
+    assert_same(table, ensemble(scene, changes, OUTCOMES, setup=setup, threads=3))
+
+
+def test_a_row_that_is_refused_or_stops_takes_nobody_with_it() -> None:
+    scene = scenes.load("case_01", ["time.duration_s=5.0"])
+    gains = np.array([5.0, -50.0, np.nan, 5.0, 2e12, 8.0])
+    key = "left_feedback.position_gain_N_per_m"
+    table = ensemble(scene, {key: gains}, OUTCOMES)
+    assert [STATUSES[code] for code in table.status] == ["DONE", REFUSED, REFUSED, "DONE", REFUSED, "DONE"]
+    for i in (1, 2, 4):
+        with pytest.raises(SceneError) as refusal:
+            scene.changed({key: float(gains[i])})
+        assert table.stops[i] == str(refusal.value)
+        assert np.isnan(table.columns["settling_time"][i])
+    assert table.columns["x_left_end"][0] == table.columns["x_left_end"][3]
+    cut = ensemble(scene, {key: gains[[0, 5]]}, OUTCOMES, setup=Setup(max_work=100))
+    assert [STATUSES[code] for code in cut.status] == ["WORK_BUDGET", "WORK_BUDGET"]
+    assert cut.stops[0] == simulate(scene, max_work=100).stop
+    assert np.isnan(cut.columns["settling_time"]).all()
+    assert np.isfinite(cut.columns["x_left_end"]).all()
+
+
+def test_arrays_are_built_and_refused_like_scenes() -> None:
+    """Every key that has a place in the arrays: the same system, to the last bit, and the same rows refused."""
+    scene = scenes.load("case_01", [
+        "left_feedback.set_point_m=0.01", "right_feedback.set_point_m=0.02", "left_feedback.feed_forward_N=0.3",
+        "right_feedback.feed_forward_N=0.1", "object_friction.viscous_Ns_per_m=0.1", "object_friction.coulomb_N=0.2",
+    ])
+    rng = np.random.default_rng(3)
+    named = {name: rng.normal(1.0, 2.0, 200) for name in PLACES}
+    for name, values in named.items():
+        variants = Variants(scene, {name: values})
+        assert variants.is_plain
+        block, faults = variants.block(), variants.faults()
+        for i in range(variants.rows):
+            if i in faults:
+                with pytest.raises(SceneError) as refusal:
+                    variants.row(i)
+                assert faults[i] == str(refusal.value)
+                continue
+            system = variants.row(i).system
+            np.testing.assert_array_equal(block.closed_loop[i], system.closed_loop)
+            np.testing.assert_array_equal(block.bodies[i], system.bodies)
+            np.testing.assert_array_equal(block.pairs[i], system.pairs)
+            np.testing.assert_array_equal(block.state[i, :, 0], system.state)
+            assert block.coulomb[i, 0, 0] == system.coulomb
+
+
+def test_what_cannot_be_varied_is_refused() -> None:
+    scene = scenes.load("table")
+    for changes, words in (
+        ({"left_arm.weight_kg": [1.0]}, "left_arm.weight_kg: not a number of this scene; allowed: time.duration_s"),
+        ({"left_arm.mass_kg": [1.0], "object.mass_kg": [1.0, 2.0]}, "one length"),
+        ({"left_arm.mass_kg": [[1.0]]}, "one length"),
+    ):
+        with pytest.raises(Refused, match=words):
+            ensemble(scene, changes)
