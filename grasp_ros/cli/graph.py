@@ -35,6 +35,7 @@ def add_to(commands: Any) -> None:
         "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",
         help="follow the wall clock, FACTOR simulated seconds in a second (default 1), instead of lockstep",
     )
+    sub.add_argument("--namespace", default="/", metavar="NS", help="of all names, /clock too; for several graphs")
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
@@ -77,7 +78,7 @@ def _run(options: argparse.Namespace) -> int:
         plant.update(free_running="true", real_time_factor=repr(options.free_running))
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=dict(options.laws),
-        plant=plant, one_process=options.one_process,
+        plant=plant, one_process=options.one_process, namespace=options.namespace,
     )
     begin = time.monotonic()
     try:

@@ -36,14 +36,16 @@ def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> No
     namespace : str
     """
     environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
-    os.execve(sys.executable, [*_command([node], parameters), "-r", f"__ns:={namespace}"], environment)
+    os.execve(sys.executable, _command([node], parameters, namespace), environment)
 
 
-def _command(nodes: Sequence[str], parameters: Mapping[str, str]) -> list[str]:
+def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
     """Command line of a node, or of "together" and the nodes of its process."""
     words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    root = namespace.rstrip("/")
+    names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
     # -P: a checkout in the working directory must not take the place of the package that is running.
-    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", *nodes, "--ros-args", *words]
+    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", *nodes, "--ros-args", *words, *names]
 
 
 class GraphError(RuntimeError):
@@ -72,6 +74,8 @@ class Graph:
         Further parameters of the plant.
     one_process : bool
         Whether all nodes run in one process and one thread.
+    namespace : str
+        Of all names, /clock too where it is not the root.
 
     """
 
@@ -84,6 +88,7 @@ class Graph:
     laws: Mapping[str, str] = field(default_factory=dict)
     plant: Mapping[str, str] = field(default_factory=dict)
     one_process: bool = False
+    namespace: str = "/"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     @property
@@ -139,9 +144,9 @@ class Graph:
     def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
         """Command lines by the names of the processes."""
         if not self.one_process:
-            return {name: _command([name], parameters) for name, parameters in settings.items()}
+            return {name: _command([name], parameters, self.namespace) for name, parameters in settings.items()}
         together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
-        return {"graph": _command(["together", *settings], together)}
+        return {"graph": _command(["together", *settings], together, self.namespace)}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.
