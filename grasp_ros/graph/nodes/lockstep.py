@@ -45,6 +45,7 @@ class Lockstep:
         self._refused = False  # a second source has come
         self._seen = -1  # tick at the last report
         self._timer: Any = None
+        self._going = True  # the timer
         plant.counters.update({"stale commands": 0, "repeated commands": 0, "refused commands": 0})
         self.topics = list(plant.scene.controllers.values())
         self._inputs = {
@@ -97,11 +98,10 @@ class Lockstep:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""
         plant = self._plant
         resetting = self._steering.reset_due
-        if self._timer is not None:  # which would look ten thousand times a second at a plant that stands
-            (self._timer.cancel if self._steering.stands and not resetting else self._timer.reset)()
-        if self._refused or not plant.started or plant.finished or len(self._commands) < len(self.topics):
-            return
-        if plant.monitored and plant.tick - self._recorded > (0 if resetting or plant.at_end else WINDOW):
+        lead = 0 if resetting or plant.at_end else WINDOW
+        ahead = plant.monitored and plant.tick - self._recorded > lead
+        self._let_go_on(not ahead and (resetting or not self._steering.stands))
+        if self._refused or not plant.started or plant.finished or ahead or len(self._commands) < len(self.topics):
             return
         if any(source.get_publisher_count() > 1 for source in self._inputs.values()):
             self._refuse_sources()
@@ -115,6 +115,12 @@ class Lockstep:
                 plant.finish()
             else:
                 plant.step(self._take_commands())
+
+    def _let_go_on(self, going: bool) -> None:
+        """Stop the timer of a scene without controllers while nothing is due: it would keep others from their turn."""
+        if self._timer is not None and going is not self._going:
+            self._going = going
+            (self._timer.reset if going else self._timer.cancel)()
 
     def _refuse_sources(self) -> None:
         """End the run, with the names of the sources as soon as discovery has them."""

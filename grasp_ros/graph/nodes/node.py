@@ -24,7 +24,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import DEPTH, DIAGNOSTICS, Topic
 
-PEER_SECONDS = 0.02
+PEER_SECONDS = 0.05
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0

@@ -27,6 +27,8 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
+UNWATCHED_REPORTS = 4  # in a row without a monitor: its last value may be on the way, and a busy machine stalls
+
 
 class Plant(SteppedNode):
     """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, those of its loop, and those of the scene.
@@ -107,7 +109,7 @@ class Plant(SteppedNode):
         self._insist()
         watched = not self.monitored or not self.started or self.count_publishers(LYAPUNOV.name) > 0
         self._unwatched = 0 if watched else self._unwatched + 1
-        if self._unwatched > 1 and not self.finished:  # at first its last value may still be on the way
+        if self._unwatched >= UNWATCHED_REPORTS and not self.finished:
             self.fail(f"{LYAPUNOV.name}: the monitor that this run waits for has ended")
         self.loop.report()
 
