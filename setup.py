@@ -27,6 +27,7 @@ setup(
         "numpy",
         "rosbags",
         "mcap",
+        "zstandard",
         "numba",
         "matplotlib",
         "tqdm",
@@ -36,9 +37,15 @@ setup(
     extras_require={
         "test": [
             "pytest", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
-            "types-tqdm", "colcon-common-extensions", "scipy",
+            "types-tqdm", "colcon-common-extensions", "scipy", "xarray", "zarr>=3.1", "distributed",
+            "ruamel.yaml",
         ],
-        "study": ["gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark"],
+        "map": ["xarray", "zarr>=3.1", "scipy"],
+        "cluster": ["xarray", "zarr>=3.1", "scipy", "distributed"],
+        "study": [
+            "gmpy2", "mpmath", "scipy", "heyoka", "scikit-sundae", "pytest-benchmark", "xarray", "zarr>=3.1",
+            "ruamel.yaml",
+        ],
     },
     entry_points={
         "console_scripts": [

@@ -11,6 +11,7 @@ from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.verify import Verification, laws_of, verify
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
+from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
@@ -31,9 +32,11 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     """What happened in a simulation."""
     level = trajectory.energy
     method = METHODS[trajectory.method]
+    foreign = [(f"{side} controller", name) for side, name in trajectory.controllers.items()]
     rows = [
         ("scene", trajectory.scene.title),
-        ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled)),
+        ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled, bool(foreign))),
+        *foreign,
         ("status", trajectory.stop or trajectory.status.value),
         ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
         ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
@@ -41,8 +44,9 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
     ]
     if len(trajectory.t):
-        rows.append(("V_c at both ends", _ends(level.V_c)))
-    rows.append(("certificate", trajectory.scene.certificate_in_words(trajectory.sampled)))
+        rows.append((f"energy of {PLANT_ALONE}" if foreign else "V_c at both ends", _ends(level.V_c)))
+    known = trajectory.scene.certificate_in_words(trajectory.sampled)
+    rows.append(("certificate", "none: V_c needs the energy of every controller" if foreign else known))
     if not method.energy_check and len(trajectory.t):
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))

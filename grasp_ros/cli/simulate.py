@@ -21,6 +21,7 @@ from grasp_ros.cli.arguments import (
     prepare,
     whole,
 )
+from grasp_ros.cli.controllers import load_controllers
 from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
@@ -46,6 +47,8 @@ def add_to(commands: Any) -> None:
                      help=f"budget of contact events (default {MAX_EVENTS})")
     sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N",
                      help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
+    sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
+                     help="a callable of tick, time, x and v in place of the scene's feedback; see docs/api.md")
     add_output(sub, "FILE.npz", "write states, events, V and counters")
     add_force(sub)
 
@@ -67,16 +70,17 @@ def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.cli.report import describe_trajectory, table
 
     scene = load_scene(options.scene, options.settings)
-    setting = _setting(options)
-    check_memory(scene, options.sampled, options.grid)
+    setting, controllers = _setting(options), load_controllers(options.controllers)
+    sampled = options.sampled or bool(controllers)
+    check_memory(scene, sampled, options.grid)
     if options.output is not None:
         check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    quick = not (options.sampled or scene.sampled)
+    quick = not (sampled or scene.sampled)
     with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
         trajectory = simulate(
-            scene, grid=grid, sampled=options.sampled, method=options.method, setting=setting,
+            scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,
             progress=lambda reached: bar.update(reached - bar.n),
         )

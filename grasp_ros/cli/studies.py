@@ -6,15 +6,17 @@ import argparse
 from functools import partial
 from typing import Any
 
-from grasp_ros.cli import study_accuracy, study_costs, study_proofs
+from grasp_ros.cli import study_accuracy, study_costs, study_maps, study_proofs
 from grasp_ros.cli.arguments import Command
 from grasp_ros.physics.errors import Refused
 
-PACKAGES = ("gmpy2", "heyoka", "mpmath", "scipy", "sksundae")  # names of modules of the extra `study`
+# names of modules of the extra `study`
+PACKAGES = ("gmpy2", "heyoka", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
 STUDIES = (
     study_accuracy.add_accuracy, study_accuracy.add_advise, study_costs.add_loop, study_accuracy.add_prediction,
     study_accuracy.add_page, study_accuracy.add_speed, study_costs.add_effects, study_proofs.add_certificate,
-    study_proofs.add_hard, study_proofs.add_fuzz, study_costs.add_graph, study_costs.add_recorder,
+    study_proofs.add_hard, study_proofs.add_fuzz, study_proofs.add_doors, study_costs.add_graph,
+    study_costs.add_recorder, study_maps.add_maps, study_maps.add_many,
 )
 
 

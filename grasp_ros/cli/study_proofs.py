@@ -1,4 +1,4 @@
-"""The studies of what is promised: `certificate`, `hard` and `fuzz`."""
+"""The studies of what is promised: `certificate`, `hard`, `fuzz` and `doors`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_output, prepare
+from grasp_ros.cli.arguments import add_command, add_output, prepare, whole
 from grasp_ros.physics.errors import Refused
 
 Parser = argparse.ArgumentParser
@@ -60,9 +60,7 @@ def add_fuzz(commands: Any) -> Parser:
 def _fuzz(options: argparse.Namespace) -> int:
     from grasp_ros.verification import fuzz
 
-    seconds = 60.0 if options.seconds is None and options.draws is None else options.seconds
-    if seconds is not None and not (math.isfinite(seconds) and seconds > 0.0):
-        raise Refused(f"--seconds {seconds!r} is not allowed; allowed: a number > 0")
+    seconds = _seconds(options.seconds, options.draws)
     for name, least in (("draws", 1), ("first", 0), ("seed", 0), ("jobs", 1)):
         value = getattr(options, name)
         if value is not None and value < least:
@@ -70,4 +68,32 @@ def _fuzz(options: argparse.Namespace) -> int:
     prepare()
     broken = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
                       jobs=options.jobs)
+    return 1 if broken else 0
+
+
+def _seconds(seconds: float | None, count: int | None) -> float | None:
+    """For how long random input is tried; None: until it has been enough."""
+    seconds = 60.0 if seconds is None and count is None else seconds
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0.0):
+        raise Refused(f"--seconds {seconds!r} is not allowed; allowed: a number > 0")
+    return seconds
+
+
+def add_doors(commands: Any) -> Parser:
+    """`grasp study doors`."""
+    sub = add_command(commands, "doors", _doors, "damaged scenes, results, bags and journals against their readers")
+    sub.add_argument("--seconds", type=float, help="how long (default 60, or until --count files are tried)")
+    sub.add_argument("--count", type=whole(1), help="how many files")
+    sub.add_argument("--first", type=whole(0), default=0, help="number of the first file (default 0)")
+    sub.add_argument("--seed", type=whole(0), default=0, help="another seed makes other files (default 0)")
+    add_output(sub, "DIRECTORY", "where files that break a reader are written (default doors)", Path("doors"))
+    return sub
+
+
+def _doors(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import doors
+
+    seconds = _seconds(options.seconds, options.count)
+    prepare()
+    broken = doors.run(options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)
     return 1 if broken else 0

@@ -9,15 +9,24 @@ from grasp_ros.exact.flight import FLIGHT_ORDER, expand_flight, flights_of, fly
 from grasp_ros.exact.flight_events import first_root, motion_at, pair_in_flight
 from grasp_ros.exact.friction import slide_in_flight
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, keep_resting, write_penetrations
+from grasp_ros.exact.kinematics import (
+    approach,
+    arm_of,
+    keep_resting,
+    next_derivative,
+    own_acceleration,
+    write_penetrations,
+)
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.observer import notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
-from grasp_ros.exact.records import Candidate, Flights, Integers, Motion, Output, Plant, Settings, State, Tables
+from grasp_ros.exact.records import Array, Candidate, Flights, Integers, Motion, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.rest import parting_time
 from grasp_ros.physics.layout import (
+    DAMPING,
     LEFT,
+    OBJECT,
     RIGHT,
     U_L,
     U_R,
@@ -36,11 +45,30 @@ from grasp_ros.physics.layout import (
 )
 
 
+@inlined
+def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
+    """Whether an open pair cannot touch within a span in s, by a bound that costs less than a search.
+
+    The first step of the search reaches beyond the span then: |u''| is no more than the accelerations and what their
+    rates add, and a hundredth is more than the roundings of both.
+    """
+    x, v, _ = arm_of(y, side)
+    arm, body = plant.bodies[side], plant.bodies[OBJECT]
+    a, a_o = own_acceleration(arm, x, v), own_acceleration(body, y[X_O], y[V_O])
+    j, j_o = next_derivative(arm, v, a), next_derivative(body, y[V_O], a_o)
+    curvature = abs(a) + abs(a_o) + span * (abs(j) + abs(j_o))
+    way = span * (abs(approach(y, side)) + 0.5 * span * curvature)
+    return 1.01 * way < -y[U_L + side] and arm[DAMPING] >= 0.0 and body[DAMPING] >= 0.0
+
+
 @kernel
 def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, span: float, work: Integers) -> Candidate:
     """First event of one pair in a flight of at most `span` seconds."""
     mode, y = state.mode[side], state.y
     if mode in (Pair.RESTING, Pair.ABSENT):
+        return Candidate(math.inf, Transition.TOUCH)
+    if mode == Pair.OPEN and is_far(plant, y, side, span):
+        work[Work.ROOT_ITERATIONS] += 1
         return Candidate(math.inf, Transition.TOUCH)
     pair = pair_in_flight(plant, y, flights, side)
     t, d = 0.0, approach(y, side)

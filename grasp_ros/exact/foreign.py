@@ -1,23 +1,131 @@
-"""Controllers from outside: the kernels call them as C functions, by their address."""
+"""Controllers from outside: the kernels call them as C functions, by their address.
+
+    double command(int64 tick, double time, double x, double v)     s, m, m/s to N
+
+A function that numba has compiled runs at full speed. Any other callable is called through ctypes, which takes the
+interpreter's lock for as long as it runs.
+"""
 
 from __future__ import annotations
 
+import ctypes
+import math
+from collections.abc import Callable
+from functools import lru_cache
+from numbers import Real
 from typing import Any
 
+import numba
 from llvmlite import ir
-from numba.core import types
-from numba.extending import intrinsic
+from numba.core.ccallback import CFunc
+from numba.core.errors import NumbaError
+from numba.core.types import float64, int64
+from numba.extending import intrinsic, is_jitted
 
+from grasp_ros.physics.errors import Refused
+
+Law = Callable[[int, float, float, float], float]  # tick, time in s, measured x in m and v in m/s to N
+SIGNATURE = float64(int64, float64, float64, float64)
+PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double)
 DOUBLE, WORD = ir.DoubleType(), ir.IntType(64)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def call(_: Any, address: Any, tick: Any, time: Any, x: Any, v: Any) -> Any:
-    """The command in N of the function at an address: double (int64 tick, double time, double x, double v)."""
-    signature = types.float64(types.int64, types.int64, types.float64, types.float64, types.float64)
-
+    """The command of the function at an address."""
     def emit(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
         function = ir.FunctionType(DOUBLE, [WORD, DOUBLE, DOUBLE, DOUBLE])
         return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
 
-    return signature, emit
+    return float64(int64, int64, float64, float64, float64), emit
+
+
+@lru_cache(maxsize=64)
+def _compiled(law: Any) -> Any:
+    """A C function that answers NaN where the law raises, which is not for a kernel to hear about."""
+    inner = numba.njit(law.__wrapped__) if isinstance(law, CFunc) else law
+
+    def command(tick, time, x, v):  # type: ignore[no-untyped-def]  # numba infers its types
+        try:
+            return inner(tick, time, x, v)
+        except Exception:
+            return math.nan
+
+    return numba.cfunc(SIGNATURE)(command)
+
+
+if numba.config.DISABLE_JIT:
+
+    def call(address: int, tick: int, time: float, x: float, v: float) -> float:
+        """The command of the function at an address."""
+        return float(PROTOTYPE(address)(tick, time, x, v))
+
+
+class Foreign:
+    """A controller from outside, as the kernels call it.
+
+    Parameters
+    ----------
+    side : str
+        Whose arm it controls; what messages say.
+    law : callable
+        From tick, time in s, and what is measured of the arm, x in m and v in m/s, to its command in N.
+
+    Attributes
+    ----------
+    name : str
+        Module and name of the law, or of its class.
+    address : int
+        Of the C function; it lives as long as this object.
+
+    Raises
+    ------
+    Refused
+        If it cannot be called, or has been compiled for other arguments.
+    """
+
+    def __init__(self, side: str, law: Law) -> None:
+        if not callable(law):
+            raise Refused(f"controllers: {side}: {law!r} is not allowed; allowed: a callable of tick, time, x and v")
+        compiled = is_jitted(law) or isinstance(law, CFunc)
+        named = getattr(law, "__wrapped__", law) if compiled else law
+        named = named if hasattr(named, "__qualname__") else type(named)
+        self.name = f"{named.__module__}:{named.__qualname__}"
+        self._side, self._law = side, law
+        self._error: BaseException | None = None
+        try:
+            function: Any = _compiled(law) if compiled else PROTOTYPE(self._answer)
+        except NumbaError as error:
+            words = " ".join(str(error).split())
+            raise Refused(f"controllers: {side}: {self.name} cannot be compiled for a whole number and three floats,"
+                          f" with a float as its answer: {words}") from None
+        self._function = function  # which must not go before the address does
+        self.address: int = function.address if compiled else ctypes.cast(function, ctypes.c_void_p).value or 0
+
+    def _answer(self, tick: int, time: float, x: float, v: float) -> float:
+        """What a callable of Python answers; NaN for what is kept for `failure`."""
+        try:
+            return self._number(self._law(tick, time, x, v), tick, time)
+        except BaseException as error:  # ctypes would print it and go on
+            self._error = error
+            return math.nan
+
+    def _number(self, answer: object, tick: int, time: float) -> float:
+        if isinstance(answer, Real) and math.isfinite(answer):
+            return float(answer)
+        raise Refused(f"{self._side} controller {self.name}: it answered {answer!r} at tick {tick}, t = {time!r} s;"
+                      " allowed: a finite number of N")
+
+    def failure(self, tick: int, time: float, x: float, v: float) -> BaseException:
+        """Why the answer to a measurement is no command: what the law raised, or a refusal of its answer."""
+        error, self._error = self._error, None
+        if error is None:  # a compiled law has no memory: it does the same again
+            try:
+                self._number(self._law(tick, time, x, v), tick, time)
+            except BaseException as again:
+                error = again
+        if error is None:
+            return Refused(f"{self._side} controller {self.name}: no finite command at tick {tick}, t = {time!r} s")
+        if not isinstance(error, Refused):
+            error.add_note(f"{self._side} controller {self.name}, tick {tick}, t = {time!r} s")
+        return error

@@ -111,12 +111,17 @@ def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
 
 @kernel
 def product(f: Array, a: int, b: int, out: int, n: int) -> None:
-    """Cauchy product up to the order n of two series that begin at a and b in f."""
+    """Cauchy product up to the order n of two series that begin at a and b in f, and not at `out`.
+
+    The terms of a coefficient are added in their order, but those of the others in between: no sum waits for the last.
+    """
+    first, second, product = f[a : a + n + 1], f[b : b + n + 1], f[out : out + n + 1]
     for k in range(n + 1):
-        total = 0.0
-        for j in range(k + 1):
-            total += f[a + j] * f[b + k - j]
-        f[out + k] = total
+        product[k] = 0.0
+    for j in range(n + 1):
+        factor = first[j]
+        for k in range(n + 1 - j):
+            product[j + k] += factor * second[k]
 
 
 @kernel

@@ -10,7 +10,7 @@ from grasp_ros.exact.clock import until
 from grasp_ros.exact.contact import contact_segment
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.jit import door
 from grasp_ros.exact.kinematics import is_clamped
 from grasp_ros.exact.loop import answer_end, close_interval, enter_interval, open_interval
 from grasp_ros.exact.modes import leave_together, settle_resting
@@ -21,7 +21,7 @@ from grasp_ros.exact.start import must_start, start_segment
 from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Outcome, Pair, Place
 
 
-@kernel
+@door
 def advance(
     c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
     given: Array, bodies: Array, pairs: Array, coulomb: float,

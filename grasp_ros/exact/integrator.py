@@ -95,8 +95,7 @@ class Integrator:
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
         self._bodies = self._given.copy()
-        self._pairs = system.pairs
-        self._coulomb = float(system.coulomb)
+        self._plant = self._given, self._bodies, system.pairs, float(system.coulomb)
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._events: list[Array] = []
@@ -105,7 +104,7 @@ class Integrator:
 
     def watch(self, wanted: Wanted, bound: float) -> Watcher:
         """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
-        plant = Plant(self._given, self._bodies, self._pairs, self._coulomb)
+        plant = Plant(*self._plant)
         self._watcher = Watcher(plant, State(self._y, self._mode, self._clock), wanted)
         self._watcher.set_system(self._system, self._continuous)
         self._watcher.begin(bound)
@@ -176,7 +175,7 @@ class Integrator:
         loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
         return self.run(loop, times)
 
-    def run(self, loop: Loop, grid: Array) -> Array:
+    def run(self, loop: Loop, grid: Array, rows: Array | None = None) -> Array:
         """Integrate over the intervals of a loop.
 
         Parameters
@@ -185,14 +184,16 @@ class Integrator:
             What drives the run; `Place.INTERVAL` in its `place` counts the intervals done.
         grid : array (n,), s
             Output times, ascending within each interval and counted from its beginning.
+        rows : array (n, 6), optional
+            Where to write the states. Default: a new array.
 
         Returns
         -------
         array (n, 6)
-            States at the grid; only the rows reached, if `status` is not DONE afterwards, or if a controller gave no
-            number: then the intervals done are not all of them.
+            States at the grid; only the rows reached, if `status` is not DONE afterwards or a controller has failed.
         """
-        out, filled = np.empty((len(grid), 6)), np.zeros(len(Filled), dtype=np.int64)
+        out = np.empty((len(grid), 6)) if rows is None else rows
+        filled = np.zeros(len(Filled), dtype=np.int64)
         clock, outcome = self._clock, Outcome.GO_ON
         with workspace(self._accuracy) as (tables, event_rows):
             if self._watcher is not None:
@@ -200,8 +201,7 @@ class Integrator:
             while self.status is Status.DONE:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
                 most = min(self._spent + BREATH, self._max_work)
-                own = (*tables[:-1], *tables.start, self._given, self._bodies, self._pairs, self._coulomb,
-                       self._y, self._mode, clock)
+                own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, clock)
                 if outcome == Outcome.SQUEEZED:
                     k = int(loop.place[Place.INTERVAL])
                     outcome = creep(*own, loop.lengths[k], self._accuracy, most, grid[: loop.bounds[k + 1]], out,

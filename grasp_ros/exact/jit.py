@@ -14,6 +14,7 @@ from types import FunctionType
 from typing import Any
 
 import numba
+from numba.core.registry import CPUDispatcher
 
 # Off by default in numba; it turns the eight independent sums of `series.convolve` into vector instructions, which
 # makes a contact several times faster. It never reorders a floating-point sum.
@@ -51,12 +52,24 @@ COMPILING = "compiling the kernels; this happens once after an installation and 
 CACHE_DIRECTORY = _cache_directory(Path(__file__).parent)
 
 
+class Kernel(CPUDispatcher):  # type: ignore[misc]
+    """A function that other kernels call; for Python it is compiled once more.
+
+    A call from Python goes through a wrapper that unpacks the arguments, as large as many a kernel: without it
+    compiling takes a sixth less. Nothing but a test calls such a function.
+    """
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function returns."""
+        return _door(self.py_func)(*arguments)
+
+
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile a function to machine code at its first call and keep the result on disk.
+    """A function that kernels call, compiled to machine code at its first call and kept on disk.
 
     It may not make arrays: without them nothing counts references, which makes a kernel a quarter faster.
     """
-    return _compiled(function, counts=False, inline=False)
+    return _compiled(function, door=False, inline=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
@@ -64,12 +77,22 @@ def inlined(function: Callable[..., Any]) -> Any:
 
     Handing over many arrays can cost as much as a short function.
     """
-    return _compiled(function, counts=False, inline=True)
+    return _compiled(function, door=False, inline=True)
+
+
+def door(function: Callable[..., Any]) -> Any:
+    """A kernel that Python calls, or C by its address."""
+    return _compiled(function, door=True)
 
 
 def allocating(function: Callable[..., Any]) -> Any:
-    """A kernel that may make arrays."""
-    return _compiled(function, counts=True, inline=False)
+    """A door that may make arrays."""
+    return _compiled(function, door=True, counts=True)
+
+
+@cache
+def _door(function: Callable[..., Any]) -> Any:
+    return door(function)
 
 
 def with_deep_stack(function: Callable[[], None]) -> Callable[[], None]:
@@ -89,18 +112,22 @@ def compiled_address(function: Any, signature: str) -> int:
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
 
 
-def _compiled(function: Callable[..., Any], *, counts: bool, inline: bool) -> Any:
+def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False, inline: bool = False) -> Any:
     """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_cache_directory(Path(function.__code__.co_filename).parent))
+    before, room = numba.config.CACHE_DIR, _cache_directory(Path(function.__code__.co_filename).parent)
+    numba.config.CACHE_DIR = str(room / "doors" if door else room)  # a function may have machine code of both kinds
     try:
-        options = {"error_model": "numpy", "nogil": True, "_nrt": counts, "forceinline": inline}
-        compiled = numba.njit(cache=not inline, **options)(function)
+        found = numba.njit(
+            cache=not inline, error_model="numpy", nogil=True, _nrt=counts, forceinline=inline,
+            no_cpython_wrapper=not door, no_cfunc_wrapper=not door,
+        )(function)
     finally:
         numba.config.CACHE_DIR = before
-    if hasattr(compiled, "_cache"):  # not with NUMBA_DISABLE_JIT
-        compiled._cache.save_overload = _where_there_is_room(compiled._cache.save_overload)
-    return compiled
+    if not numba.config.DISABLE_JIT:
+        found._cache.save_overload = _where_there_is_room(found._cache.save_overload)
+        if not door:
+            found.__class__ = Kernel
+    return found
 
 
 def _where_there_is_room(save: Callable[..., None]) -> Callable[..., None]:

@@ -13,14 +13,14 @@ import numpy as np
 
 from grasp_ros.exact.control import feedback, limited, measured
 from grasp_ros.exact.foreign import call
-from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of
 from grasp_ros.exact.modes import begin_interval
 from grasp_ros.exact.records import Array, Integers, Loop, Output, Plant, State
 from grasp_ros.physics.layout import FORCE, LEFT, OBJECT, RIGHT, Answer, Filled, Outcome, Place
 
 
-@kernel
+@inlined
 def answer(state: State, loop: Loop, k: int) -> bool:
     """Write what the controllers answer to the state at the begin of interval k; whether all of it is a number.
 
@@ -43,7 +43,7 @@ def answer(state: State, loop: Loop, k: int) -> bool:
     return True
 
 
-@kernel
+@inlined
 def set_inputs(plant: Plant, own: Array, loop: Loop, k: int) -> None:
     """Let the commands that arrive at the begin of interval k act, and the external forces."""
     held, pushed, delay = loop.answers.shape[0] > 0, loop.external.shape[0] > 0, loop.waiting.shape[0]

@@ -73,10 +73,14 @@ class Loop(NamedTuple):
     waiting: Array = np.zeros((0, 3))  # (delay, 3) commands on their way, N by body: a ring; updated in place
 
 
+_FIRST = np.array([-1 if entry == Place.FAILED else 0 for entry in Place])
+
+
 def new_place(tick: int = 0) -> Integers:
     """Where a loop begins; the tick is that of its first interval."""
-    place = np.zeros(len(Place), dtype=np.int64)
-    place[Place.TICK] = tick
+    place = _FIRST.copy()
+    if tick:
+        place[Place.TICK] = tick
     return place
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.core import types
 
+from grasp_ros.exact import jit
 from grasp_ros.exact.hybrid import advance
 from grasp_ros.exact.integrator import BREATH, compile_kernels
 from grasp_ros.exact.jit import kernel
@@ -143,7 +144,7 @@ def count_events(rows: Rows, i: int, room: Room) -> int:
     return int(count)
 
 
-@kernel
+@jit.door
 def run_rows(door: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watch: Watch, limits: Limits) -> int:
     """Integrate the rows; returns how many, fewer only if a stop was asked for."""
     n = rows.state.shape[0]

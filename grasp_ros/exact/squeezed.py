@@ -16,7 +16,7 @@ from grasp_ros.exact.contact import free_flight, place_free, write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.friction import slide_in_contact, slip_candidate
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
-from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.jit import door, inlined, kernel
 from grasp_ros.exact.kinematics import is_clamped, keep_resting
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.observer import leave_step, notify
@@ -154,7 +154,7 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     return t
 
 
-@kernel
+@door
 def creep(
     c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
     given: Array, bodies: Array, pairs: Array, coulomb: float,

@@ -40,6 +40,7 @@ NONE = -1  # power of a pair that does not begin
 POWERS = 4  # s^4 = t / T
 ROWS = 4  # of each pair in the table of factors: W, U W, 1 + p u', and the product of the last two
 DECIDES = 0.5  # of the leading term: what all others together may come to
+SETTLED = 0.95  # part of a reach that the next one has: what moves grows with up to its 25th power
 MAX_PASSES = 100
 
 
@@ -57,7 +58,7 @@ def own_factors(f: Array, c: Array, n: int, k: int, side: Body, a: int, loss: fl
     else:
         for j in range(1, k):
             total -= f[root + j] * f[root + k - j]
-        f[root + k] = total / (2.0 * f[root])
+        f[root + k] = total / (2.0 * f[root]) if f[root] > 0.0 else 0.0  # what has underflowed pushes nothing
     cubed = 0.0
     for j in range(k + 1):
         cubed += c[LANES * (j + a) + lane] * f[root + k - j]
@@ -149,7 +150,7 @@ def reach_of(c: Array, n: int, settings: Settings, tail: int) -> float:
     reach = reach_beside(c, n, settings, tail, 1.0)
     for _ in range(MAX_PASSES):
         again = reach_beside(c, n, settings, tail, reach) if reach < math.inf else reach
-        if again >= DECIDES * reach:
+        if again >= SETTLED * reach:
             return min(again, reach)
         reach = again
     return reach

@@ -15,16 +15,15 @@ from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.recorder import LOST_RECORD, OWN_RECORD, Recorder
+from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.rosbag2 import INFORMATION, METADATA_KEY, METADATA_RECORD, BagError, decode, names_of
+from grasp_ros.graph.rosbag2 import BagError, decode, names_of
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding, read_text
-from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 
 __all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
@@ -125,12 +124,11 @@ def read(path: Path) -> Recording:
 
 
 def _check_metadata(path: Path, storage: Storage) -> None:
-    """Refuse a metadata.yaml that says something else than the copy of it within the closed file."""
+    """Refuse a metadata.yaml that is not the one that was written when the bag was closed."""
     file = path / "metadata.yaml"
-    if storage.closed and path.is_dir() and file.exists():
-        inside = load_yaml(storage.records[METADATA_RECORD][METADATA_KEY])
-        if load_yaml(read_text(file)) != {INFORMATION: inside}:
-            raise BagError(f"{file}: does not describe this bag; `grasp recover` makes a new one")
+    there = storage.closed and path.is_dir() and file.exists()
+    if there and checksum(read_text(file, BagError)) != storage.records[LOST_RECORD][BESIDE]:
+        raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
 
 class _Columns:
@@ -216,6 +214,6 @@ def _recording(path: Path, scene: scenes.Scene, columns: _Columns, changes: _Cha
 def _lost(storage: Storage) -> dict[str, str]:
     """What the bag says about its end; in place of a word that it does not have, what its reader has seen."""
     if storage.closed:
-        return storage.records[LOST_RECORD]
+        return {key: word for key, word in storage.records[LOST_RECORD].items() if key != BESIDE}
     left_out = sum(size for _, size, _ in storage.left_out)
     return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}

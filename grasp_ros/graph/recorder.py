@@ -30,13 +30,19 @@ from grasp_ros.scene.topics import CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, 
 
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
-OWN_RECORD, LOST_RECORD, DIGEST = "grasp_ros", "grasp_ros/lost", "digest"
+OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
+DIGEST, BESIDE = "digest", "digest of metadata.yaml"  # keys of checksums in these records
+
+
+def checksum(text: str) -> str:
+    """SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def signed(record: Mapping[str, str]) -> dict[str, str]:
     """A metadata record with its checksum: MCAP itself has none before the file is closed."""
     content = {key: value for key, value in record.items() if key != DIGEST}
-    return {**content, DIGEST: hashlib.sha256(repr(sorted(content.items())).encode()).hexdigest()}
+    return {**content, DIGEST: checksum(repr(sorted(content.items())))}
 
 
 def ranges(ticks: Iterable[tuple[int, int]]) -> str:
@@ -241,10 +247,11 @@ class Recorder:
         """Write what was lost, the index, and the metadata."""
         self._closed = True
         self._reserve.release()
-        lost = {"end": why, "ticks that are missing": ranges(self._gaps), **counters}
         document = rosbag2.metadata(
             f"{self._path.name}.mcap", self._counts, self._names, self._last_ns, self._custom
         )
+        text = dump(document)
+        lost = {"end": why, "ticks that are missing": ranges(self._gaps), **counters, BESIDE: checksum(text)}
         self._writer.add_metadata(LOST_RECORD, signed(lost))
         self._writer.add_metadata(rosbag2.METADATA_RECORD, {
             rosbag2.METADATA_KEY: dump(document[rosbag2.INFORMATION]).strip()
@@ -253,5 +260,5 @@ class Recorder:
         os.fsync(self._sink.file)
         whole = self._path / "metadata.yaml"
         part = whole.with_suffix(".part")
-        part.write_text(dump(document), encoding="utf-8")
+        part.write_text(text, encoding="utf-8")
         part.replace(whole)

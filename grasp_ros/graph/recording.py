@@ -10,7 +10,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.running import Running
-from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.force import SECTIONS
@@ -94,13 +94,18 @@ class Recording:
         return bool((self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0).all())
 
     @property
+    def energy_of(self) -> str:
+        """What `energy` is the energy of."""
+        return PLANT_AND_FEEDBACK if self.closed else PLANT_ALONE
+
+    @property
     def energy(self) -> Energy:
         """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force.
 
         Of the plant alone, without its controllers, unless `closed`.
         """
         if not self.closed:
-            return energy(self.scene.system.alone, self.state)
+            return energy(self.scene.system, self.state, feedback=False)
         scene, begins = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
         parts = []
         for begin, end in pairwise(begins):

@@ -10,6 +10,7 @@ import mmap
 import struct
 import zlib
 from collections.abc import Iterator
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -121,7 +122,7 @@ class Storage:
                 raise McapError("the checksum of the metadata is wrong")
             self.records[found.name] = {key: text for key, text in found.metadata.items() if key != DIGEST}
         elif opcode == Opcode.CHUNK:
-            yield from self._unpack(Chunk.read(stream))
+            yield from self._messages(unpack(body))
         elif opcode == Opcode.MESSAGE_INDEX:
             stream.read2()
             if len(body) != 6 + stream.read4():
@@ -129,11 +130,8 @@ class Storage:
         elif opcode != Opcode.HEADER:
             raise McapError(f"record {opcode} is not one of a bag")
 
-    def _unpack(self, chunk: Chunk) -> Iterator[Stored]:
-        """Messages of a chunk, after its checksum."""
-        data = decompress(chunk)
-        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-            raise McapError("the checksum of a chunk is wrong")
+    def _messages(self, data: bytes) -> Iterator[Stored]:
+        """Messages of the content of a chunk."""
         offset, found = 0, []
         while offset < len(data):
             opcode, length = HEAD.unpack_from(data, offset)
@@ -176,12 +174,9 @@ class Storage:
             offset = mark - CHUNK_MARK_AT
             end = self._end_of(offset)
             if end is not None and self._data[offset] == Opcode.CHUNK:
-                try:
-                    chunk = Chunk.read(ReadDataStream(BytesIO(self._data[offset + HEAD.size : end])))
-                    if zlib.crc32(decompress(chunk)) == chunk.uncompressed_crc:
-                        return offset
-                except DAMAGE:
-                    pass
+                with suppress(*DAMAGE):
+                    unpack(self._data[offset + HEAD.size : end])
+                    return offset
             offset += 1
         return None
 
@@ -211,14 +206,15 @@ class Storage:
         raise BagError(f"{self.path}: damaged: {why}; `grasp recover` makes a new bag of what is whole")
 
 
-def decompress(chunk: Chunk) -> bytes:
-    """Content of a chunk, of the size that it claims and not too large.
+def unpack(body: bytes) -> bytes:
+    """Content of a chunk's record, of the size and with the checksum that it claims, and not too large.
 
     Raises
     ------
-    McapError, zstandard.ZstdError
-        If it is neither.
+    McapError, zstandard.ZstdError, struct.error, UnicodeDecodeError, OverflowError
+        If it is not.
     """
+    chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     allowed = min(RECORD_BYTES, RATIO * (len(chunk.data) + 1000))
     if chunk.uncompressed_size > allowed:
         raise McapError(f"a chunk of {chunk.uncompressed_size} bytes; allowed: at most {allowed}")
@@ -230,4 +226,6 @@ def decompress(chunk: Chunk) -> bytes:
         raise McapError(f"compression {chunk.compression!r}; allowed: zstd")
     if len(data) != chunk.uncompressed_size:
         raise McapError("a chunk is not as long as it claims")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise McapError("the checksum of a chunk is wrong")
     return data

@@ -168,7 +168,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
     for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
         if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield _Column(topic, "force", recording.outputs[topic][rows], external[:, body])
-    alone = energy(system.alone, states)
+    alone = energy(system, states, feedback=False)
     for name, values in (("V_plant", alone.V_c), ("mode", alone.mode.astype(float))):
         yield _Column(LYAPUNOV.name, name, recording.lyapunov[rows, LYAPUNOV_NAMES.index(name)], values)
 

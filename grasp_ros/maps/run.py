@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -48,19 +50,27 @@ def run(plan: Plan, path: Path, *, workers: int = 0, scheduler: str = "", progre
     progress(done, plan.rows)
     if not spans:
         return store
-    if workers or scheduler:
-        with cluster.connect(workers, scheduler) as client:
-            for span, chunk in cluster.on_cluster(client, plan, spans):
+    begin = time.monotonic()
+    try:
+        with _source(plan, spans, workers, scheduler) as found:
+            for span, chunk in found:
                 store.write(span, chunk)
                 done += span[1] - span[0]
                 progress(done, plan.rows)
-        return store
+    finally:
+        store.add_seconds(time.monotonic() - begin)
+    return store
 
+
+@contextmanager
+def _source(plan: Plan, spans: Sequence[Span], workers: int, scheduler: str) -> Iterator[Iterator[tuple[Span, Chunk]]]:
+    """Chunks as they are done, here or on a cluster."""
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(plan.variants(*span), plan.setup, stop)
 
-    for span, chunk in in_threads(work, spans):
-        store.write(span, chunk)
-        done += span[1] - span[0]
-        progress(done, plan.rows)
-    return store
+    if workers or scheduler:
+        with cluster.connect(workers, scheduler) as client:
+            yield cluster.on_cluster(client, plan, spans)
+    else:
+        with closing(in_threads(work, spans)) as found:
+            yield found

@@ -85,6 +85,17 @@ class Store:
             self._group[MARKS][span[0] // self.chunk] = 1
 
 
+    @property
+    def seconds(self) -> float:
+        """Time in s that went into it so far."""
+        return float(self._group.attrs["seconds"])
+
+    def add_seconds(self, seconds: float) -> None:
+        """Count time that went into it."""
+        with _writing(self.path):
+            self._group.attrs["seconds"] = self.seconds + seconds
+
+
 def _create(path: Path, plan: Plan, document: dict[str, Any], rows: int) -> Any:
     """A new file: columns without values, coordinates, and all that the values depend on."""
     import zarr
@@ -96,7 +107,7 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], rows: int) -> Any:
     parent.mkdir(parents=True, exist_ok=True)
     group = zarr.create_group(path, zarr_format=3, attributes={
         "format": FORMAT, "plan": document, "versions": versions(), "chunk_rows": height * lines,
-        "statuses": list(STATUSES),
+        "statuses": list(STATUSES), "seconds": 0.0,
     })
     chunks = (height, *plan.shape[1:])
     for column in find(plan.setup.outcomes):
@@ -128,7 +139,7 @@ def open_group(path: Path, mode: str = "r") -> Any:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
         parts = (MARKS, STATUS, *(axis["name"] for axis in group.attrs["plan"]["axes"]))
         missing = [name for name in parts if not (path / name / "zarr.json").is_file()]
-        missing += [name for name in ("versions", "chunk_rows") if name not in group.attrs]
+        missing += [name for name in ("versions", "chunk_rows", "seconds") if name not in group.attrs]
         if missing:
             raise Refused(f"{path}: a damaged map: without {', '.join(missing)}; allowed: a whole one")
     except Refused:

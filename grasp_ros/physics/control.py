@@ -66,10 +66,17 @@ def limited(row: Any, force: float) -> Any:
     return limit if force > limit else force
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def normals(seed: int, side: int, block: int) -> Array:
     """Standard normal numbers (BLOCK, 2) of one block of ticks: the same for whoever asks, in whatever order."""
     return np.random.default_rng([seed, side, block]).standard_normal((BLOCK, 2))
+
+
+def normals_over(seed: tuple[int, int], first: int, count: int) -> Array:
+    """Standard normal numbers (count, 2) of the ticks from the first on; seed and side."""
+    blocks = range(first // BLOCK, (first + count - 1) // BLOCK + 1)
+    drawn = np.concatenate([normals(*seed, block) for block in blocks])
+    return drawn[first % BLOCK :][:count]
 
 
 class ControlLaw:
@@ -120,7 +127,11 @@ class ControlLaw:
         """Standard normal numbers (2,) of a tick; 0 without noise."""
         return NO_NOISE if self.seed is None else normals(*self.seed, tick // BLOCK)[tick % BLOCK]
 
+    def measured(self, tick: int, x: float, v: float) -> tuple[float, float]:
+        """What its sensor makes of the state (x, v) of a tick."""
+        return measured(self.row.tolist(), self.noise(tick).tolist(), x, v)  # plain floats overflow without a warning
+
     def command(self, tick: int, x: float, v: float) -> float:
         """Command in N that answers the state (x, v) of a tick."""
-        row = self.row.tolist()  # plain floats overflow without a warning
-        return float(limited(row, feedback(row, *measured(row, self.noise(tick).tolist(), x, v))))
+        row = self.row.tolist()
+        return float(limited(row, feedback(row, *self.measured(tick, x, v))))

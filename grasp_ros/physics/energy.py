@@ -20,6 +20,8 @@ from grasp_ros.physics.system import COLUMN, System
 FLAGS: dict[int, Mode] = {LEFT: Mode.LEFT, RIGHT: Mode.RIGHT}
 ROUNDING = 1e-12  # part of the energy that the roundings of some hundred steps may add in one control period
 
+PLANT_AND_FEEDBACK, PLANT_ALONE = "plant and feedback", "the plant alone"  # what V and V_c are the energy of
+
 
 class Energy(NamedTuple):
     """The paper's V (16), its continuous repair V_c, the rate V' (18) and the contact mode."""
@@ -34,7 +36,7 @@ _OVERFLOW = np.errstate(over="ignore", invalid="ignore")  # the energy of a stat
 
 
 @_OVERFLOW
-def energy(system: System, state: Array, external: Array | None = None) -> Energy:
+def energy(system: System, state: Array, external: Array | None = None, *, feedback: bool = True) -> Energy:
     """V, V_c, V' and the contact mode of states (..., 6) under continuous feedback.
 
     V drops the elastic term of a pair that separates faster than 1/p while u > 0 and takes it up again later, so it
@@ -48,9 +50,11 @@ def energy(system: System, state: Array, external: Array | None = None) -> Energ
         x_l, v_l, x_o, v_o, x_r, v_r; columns of bodies that are not there are not read.
     external : array (3,), N, optional
         External forces by body; only V' depends on them.
+    feedback : bool
+        False: of the plant alone, without the terms of the controllers.
     """
     state = np.asarray(state, dtype=float)
-    bodies = system.closed_loop
+    bodies = system.closed_loop if feedback else system.bodies
     V = _mechanical(system, bodies, state)
     V_c = V
     V_rate = _power(system, bodies, state, external)

@@ -8,7 +8,7 @@ pairs are rows LEFT, RIGHT of an array (2, 2).
 from enum import IntEnum
 
 EPS = 2.220446049250313e-16  # distance from 1.0 to the next double
-BLOCK = 1024  # ticks that a sampled run makes at once, and whose noise is drawn at once
+BLOCK = 1024  # ticks whose noise is drawn at once
 
 
 class Body(IntEnum):
@@ -99,7 +99,7 @@ class Place(IntEnum):
     INTERVAL = 0  # done so far in this call
     BEGUN = 1  # whether the inputs of the next one act already
     TICK = 2  # at which the first one begins
-    FAILED = 3  # side whose controller gave no number
+    FAILED = 3  # side whose controller gave no number; -1: none
 
 
 class Filled(IntEnum):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -100,13 +99,6 @@ class System:
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
         return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZIAN] > 0.0]
-
-    @property
-    def alone(self) -> System:
-        """The same without controllers."""
-        system = copy(self)
-        system.laws = {}
-        return system
 
     @property
     def closed_loop(self) -> Array:

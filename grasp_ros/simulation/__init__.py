@@ -1,7 +1,9 @@
 """Running a scene without ROS, and what comes of it."""
 
+from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
 from grasp_ros.simulation.trajectory import Trajectory, load
 
-__all__ = ["GRID_POINTS", "SampledPlant", "Trajectory", "load", "simulate"]
+__all__ = ["GRID_POINTS", "SampledPlant", "Setup", "Table", "Trajectory", "ensemble", "load", "simulate"]

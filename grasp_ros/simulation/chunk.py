@@ -22,8 +22,9 @@ from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import lyapunov
 from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
+from grasp_ros.simulation.lyapunov import check as check_lyapunov
+from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
 from grasp_ros.simulation.variants import SET_POINT, Variants
 
@@ -101,7 +102,7 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
     if any(column.name == LYAPUNOV for column in columns):
-        lyapunov.check(scene, setup.sampled or scene.sampled)
+        check_lyapunov(scene, setup.sampled or scene.sampled)
     return columns
 
 
@@ -164,7 +165,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
     if wanted:
         watcher = integrator.watch(wanted, setup.settled)
     if sampled:
-        SampledLoop(scene, NO_GRID, {}, None).drive(integrator)
+        SampledLoop(scene, NO_GRID, {}, None, {}).drive(integrator)
     elif system.external:
         drive_external(scene, NO_GRID, integrator)
     else:
@@ -175,7 +176,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
         seen = watcher.seen.copy()
     growth = np.nan
     if integrator.status is Status.DONE and any(column.name == LYAPUNOV for column in columns):
-        growth = lyapunov.exponent(system, scene.duration, setup.accuracy)
+        growth = exponent(system, scene.duration, setup.accuracy)
     touched = integrator.event_table[integrator.event_table[:, EVENT_KIND] == Transition.TOUCH, EVENT_BODY]
     touches = np.array([(touched == side).sum() for side in (LEFT, RIGHT)], dtype=float)
     return _Row(seen, integrator.state, touches, growth, integrator.status, integrator.stop)

@@ -4,31 +4,52 @@ from __future__ import annotations
 
 import time
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby, islice
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.exact.foreign import Foreign, Law
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
+from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import BLOCK, LEFT, RIGHT
+from grasp_ros.physics.layout import MASS, OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.simulation.sampled_plant import NO_INTERVAL, Outputs, Record, SampledPlant
 from grasp_ros.simulation.trajectory import Loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
-SHORTEST = 16  # ticks of the first block
+SHORTEST, LONGEST = 16, 8192  # ticks of the first block, and of any
 Changes = Mapping[int, Mapping[str, float]]
 
 
-def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
+def foreign_controllers(scene: Scene, controllers: Mapping[str, Law]) -> dict[int, Foreign]:
+    """Controllers from outside by side, as the kernels call them.
+
+    Raises
+    ------
+    Refused
+        If there is no such arm, or what is to control it cannot be called.
+    """
+    found = {}
+    arms = [side for side, body in SIDES.items() if scene.system.bodies[body, MASS] > 0.0]
+    for side, law in controllers.items():
+        if side not in arms:
+            allowed = " or ".join(arms) or "none, without an arm"
+            raise Refused(f"controllers: {side!r} is not allowed; allowed: {allowed}")
+        found[int(SIDES[side])] = Foreign(side, law)
+    return found
+
+
+def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[str] = ()) -> None:
     """Refuse changes that a running graph would refuse.
 
     Raises
@@ -40,9 +61,11 @@ def check_changes(scene: Scene, held: bool, changes: Changes) -> None:
         return
     if not held:
         raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
-    live = scene.live
+    live, replaced = scene.live, tuple(f"{side}_feedback." for side in foreign)
     for tick, numbers in changes.items():
         for name in numbers:
+            if name.startswith(replaced):
+                raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
             if name not in live or not 0 <= tick <= scene.ticks:
                 raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
@@ -59,11 +82,19 @@ class SampledLoop:
         Numbers of the controllers that are set while it runs, by the tick from which they act.
     progress : callable or None
         Called with the time reached, in s.
+    foreign : mapping of int to Foreign, optional
+        Controllers from outside, by side.
     """
 
-    def __init__(self, scene: Scene, grid: Array, changes: Changes, progress: Progress) -> None:
+    def __init__(
+        self, scene: Scene, grid: Array, changes: Changes, progress: Progress,
+        foreign: Mapping[int, Foreign] = MappingProxyType({}),
+    ) -> None:
         self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
-        self._records: list[Record] = []  # at the output times
+        self._foreign = foreign
+        self._states, self._inputs = np.empty((len(grid), 6)), np.full((len(grid), 3), np.nan)
+        self._command = np.empty((len(grid), 2))
+        self._rows = 0  # filled
 
     def drive(self, integrator: Integrator) -> Array:
         """States (n, 6) at the output times; only the rows reached, if the integrator stops. To be called once."""
@@ -73,44 +104,55 @@ class SampledLoop:
             if plant.tick in self._changes:
                 self._scene = self._scene.changed(self._changes[plant.tick])
             outputs, interval = _outputs(self._grid, ticks, scene.period_ns)
-            record = plant.run(self._scene.system.laws, outputs)
-            reached = interval[: len(record.states)]
-            self._records.append(Record(record.states, record.answers[reached], record.inputs[reached]))
+            rows = self._states[self._rows : self._rows + len(interval)]
+            record = plant.run(self._laws, outputs, self._foreign, rows)
+            self._keep(record, interval[: len(record.states)])
             if plant.status is not Status.DONE:
                 break
             if self._progress is not None:
                 self._progress(plant.time)
         else:
             self._end(plant)
-        return np.concatenate([record.states for record in self._records])
+        return self._states[: self._rows]
+
+    def _keep(self, record: Record, interval: NDArray[np.int64]) -> None:
+        """Keep what was answered and what acted in the intervals of the next output times."""
+        rows = slice(self._rows, self._rows + len(interval))
+        self._command[rows] = record.answers[interval, :OBJECT]
+        if len(record.inputs):
+            self._inputs[rows] = record.inputs[interval]
+        self._rows += len(interval)
+
+    @property
+    def _laws(self) -> dict[int, ControlLaw]:
+        """Laws as they are now; those of foreign controllers measure and limit as the scene says."""
+        return {**{side: ControlLaw(0.0, 0.0) for side in self._foreign}, **self._scene.system.laws}
 
     def _blocks(self) -> Iterator[NDArray[np.int64]]:
-        """Ticks of the run, ascending, in blocks that end where a law changes, and with the block of the noise.
+        """Ticks of the run, ascending, in blocks that end where a law changes.
 
         Between them the progress shows and Ctrl-C acts: a run whose ticks are slow has shorter ones.
         """
         last, first, size = self._scene.ticks, 0, SHORTEST
         changes = sorted({*self._changes, last})
         while first < last:
-            end = min(first + size, first - first % BLOCK + BLOCK, changes[bisect_right(changes, first)])
+            end = min(first + size, changes[bisect_right(changes, first)])
             begin = time.monotonic()
             yield np.arange(first, end + 1)
             first = end
-            size = min(2 * size, BLOCK) if time.monotonic() - begin < PATIENCE else max(size // 2, 1)
+            size = min(4 * size, LONGEST) if time.monotonic() - begin < PATIENCE else max(size // 4, 1)
 
     def _end(self, plant: SampledPlant) -> None:
         """The output times of the last tick and later; nothing acts there."""
         if plant.tick in self._changes:
             self._scene = self._scene.changed(self._changes[plant.tick])
-        record = plant.run(self._scene.system.laws, NO_INTERVAL)
-        states = _rest(self._grid, plant.tick, self._scene.period_ns, plant.state)
-        shape = (len(states), 3)
-        self._records.append(Record(states, np.broadcast_to(record.answers, shape), np.full(shape, np.nan)))
+        record = plant.run(self._laws, NO_INTERVAL, self._foreign)
+        self._states[self._rows :] = plant.state
+        self._keep(record, np.zeros(len(self._grid) - self._rows, dtype=np.int64))
 
     def record(self) -> Loop:
         """What was answered and what acted, at the output times that were reached."""
-        answers, inputs = (np.concatenate([record[part] for record in self._records]) for part in (1, 2))
-        return Loop(answers[:, [LEFT, RIGHT]], inputs)
+        return Loop(self._command[: self._rows], self._inputs[: self._rows])
 
 
 def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
@@ -122,7 +164,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     system = scene.system
     changes = (force.changes(scene.ticks) for force in system.external)
     following = (tick for tick, _ in groupby(merge([0], *changes, [scene.ticks])))
-    rows, block = [], list(islice(following, BLOCK + 1))
+    rows, block = [], list(islice(following, LONGEST + 1))
     while len(block) > 1:
         ticks = np.array(block)
         outputs, _ = _outputs(grid, ticks, scene.period_ns)
@@ -133,7 +175,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
         rows.append(integrator.run(loop, outputs.offsets))
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
-        block = [block[-1], *islice(following, BLOCK)]
+        block = [block[-1], *islice(following, LONGEST)]
     return np.concatenate([*rows, _rest(grid, scene.ticks, scene.period_ns, integrator.state)])
 
 

@@ -12,7 +12,7 @@ which one is next.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -123,7 +123,7 @@ def chunks(rows: int, size: int) -> list[tuple[int, int]]:
 
 
 def in_threads(work: Callable[[Span, NDArray[np.int64]], Chunk], spans: Iterable[Span], threads: int | None = None
-               ) -> Iterator[tuple[Span, Chunk]]:
+               ) -> Generator[tuple[Span, Chunk], None, None]:
     """Do chunks in threads, and hand each over when it is done; no more are begun than threads can soon take up.
 
     The work is handed what it is to look at now and then: not 0 asks it to stop, after a Ctrl-C say.

@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from grasp_ros.physics.energy import Energy
+from grasp_ros.physics.energy import PLANT_ALONE, Energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
@@ -45,6 +45,10 @@ class Motion(Protocol):
     @property
     def command(self) -> Array:
         """Input forces (n, 2) in N."""
+
+    @property
+    def energy_of(self) -> str:
+        """Whose energy that is."""
 
     @property
     def energy(self) -> Energy:
@@ -78,7 +82,7 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
         if not np.isnan(motion.state[:, column]).all():
             top.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
     for side, label, color in ((LEFT, "$f_l$", LEFT_COLOR), (RIGHT, "$f_r$", RIGHT_COLOR)):
-        if side in motion.scene.system.laws:
+        if side in motion.scene.system.laws or motion.command[:, side].any():
             middle.plot(motion.t, motion.command[:, side], label=label, color=color, linewidth=1.0)
     top.set_ylabel("displacement, m")
     middle.set_ylabel("input, N")
@@ -124,8 +128,10 @@ def _limits(axes: Axes, paper: tuple[float, float], values: Array) -> None:
 
 def _draw_energy(axes: Axes, motion: Motion) -> None:
     level = motion.energy
-    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$")
-    axes.plot(motion.t, level.V, color="#cc79a7", linewidth=1.0, linestyle="--", label="$V$ of the paper")
+    known = motion.energy_of != PLANT_ALONE
+    axes.plot(motion.t, level.V_c, color="black", linewidth=1.2, label="$V_c$" if known else f"of {PLANT_ALONE}")
+    if known:
+        axes.plot(motion.t, level.V, color="#cc79a7", linewidth=1.0, linestyle="--", label="$V$ of the paper")
     if 0.0 < level.V_c.min() < 0.3 * level.V_c.max():
         axes.set_yscale("log")
     elif level.V_c.min() >= 0.0:

@@ -8,12 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.exact.foreign import Foreign
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place
-from grasp_ros.physics.control import ControlLaw, normals
-from grasp_ros.physics.layout import BLOCK, Answer, Place
+from grasp_ros.physics.control import ControlLaw, normals_over
+from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import System
+from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import NANOSECONDS
 
 NO_TIMES = np.zeros(0)
@@ -47,6 +48,7 @@ class Record(NamedTuple):
     states: Array  # (m, 6) at the output times
     answers: Array  # (k, 3) commands of the controllers, N by body
     inputs: Array  # (k, 3) forces that acted, N by body
+    failed: int | None = None  # side whose controller gave no finite number
 
 
 class SampledPlant:
@@ -140,16 +142,28 @@ class SampledPlant:
         outputs = Outputs(np.zeros(count), np.arange(count + 1))
         return self._go(outputs, np.ascontiguousarray(answers, dtype=float)).states
 
-    def run(self, laws: Mapping[int, ControlLaw], outputs: Outputs) -> Record:
-        """Advance by one control period for each interval of the outputs, all within one block of ticks.
+    def run(
+        self, laws: Mapping[int, ControlLaw], outputs: Outputs, foreign: Mapping[int, Foreign] | None = None,
+        rows: Array | None = None,
+    ) -> Record:
+        """Advance by one control period for each interval of the outputs.
 
         Without intervals the controllers answer the state of the current tick, and nothing acts.
 
         Parameters
         ----------
         laws : mapping of int to ControlLaw
-            What answers at every tick, by side.
+            What answers at every tick, by side; also the sensor and the actuator of a side with another controller.
         outputs : Outputs
+        foreign : mapping of int to Foreign, optional
+            Controllers from outside that answer in place of the feedback of a law.
+        rows : array (m, 6), optional
+            Where to write the states. Default: a new array.
+
+        Raises
+        ------
+        Refused
+            If a controller from outside answers what is no finite number. What it raises itself passes through.
         """
         count = max(len(outputs.bounds) - 1, 1)
         law = KernelLaw(_DEFAULT["laws"].copy(), np.zeros(2, dtype=np.int64), _DEFAULT["normals"])
@@ -158,11 +172,17 @@ class SampledPlant:
             if own.seed:
                 if law.normals is _DEFAULT["normals"]:
                     law = law._replace(normals=np.zeros((2, count, 2)))
-                block, first = divmod(self.tick, BLOCK)
-                law.normals[side] = normals(*own.seed, block)[first : first + count]
-        return self._go(outputs, np.zeros((count, 3)), law)
+                law.normals[side] = normals_over(own.seed, self.tick, count)
+        for side, other in (foreign or {}).items():
+            law.callee[side] = other.address
+        record = self._go(outputs, np.zeros((count, 3)), law, rows)
+        if foreign and record.failed is not None:
+            x, v = self.state[COLUMN[record.failed] :][:2].tolist()
+            x, v = laws[record.failed].measured(self.tick, x, v)
+            raise foreign[record.failed].failure(self.tick, self.time, x, v)
+        return record
 
-    def _go(self, outputs: Outputs, answers: Array, law: KernelLaw = GIVEN) -> Record:
+    def _go(self, outputs: Outputs, answers: Array, law: KernelLaw = GIVEN, rows: Array | None = None) -> Record:
         """Advance under answers that are given, or those of a law."""
         count = len(outputs.bounds) - 1
         ticks = np.arange(self.tick, self.tick + len(answers))
@@ -171,8 +191,9 @@ class SampledPlant:
             np.full(count, self._period), ticks * self._period_ns / NANOSECONDS, outputs.bounds, new_place(self.tick),
             np.empty((count, 3)), external, answers, law.callee, law.rows, law.normals, self._waiting,
         )
-        states = self._integrator.run(loop, outputs.offsets)
+        states = self._integrator.run(loop, outputs.offsets, rows)
         done = int(loop.place[Place.INTERVAL])
         self.tick += done
         begun = done + int(loop.place[Place.BEGUN])
-        return Record(states, answers[: begun if count else 1], loop.inputs[:begun])
+        failed = int(loop.place[Place.FAILED])
+        return Record(states, answers[: begun if count else 1], loop.inputs[:begun], failed if failed >= 0 else None)

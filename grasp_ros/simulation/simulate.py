@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from operator import length_hint
 from types import MappingProxyType
 
 import numpy as np
 
+from grasp_ros.exact.foreign import Law
 from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK
 from grasp_ros.methods import registry
 from grasp_ros.methods.contract import ACCURACY_KNOB, Problem
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.closed_loop import Changes, Progress, SampledLoop, check_changes, drive_external
+from grasp_ros.simulation.closed_loop import (
+    Changes,
+    Progress,
+    SampledLoop,
+    check_changes,
+    drive_external,
+    foreign_controllers,
+)
 from grasp_ros.simulation.trajectory import Trajectory, tick_times
 
 GRID_POINTS = 2001
@@ -33,6 +42,7 @@ def simulate(
     max_events: int = MAX_EVENTS,
     max_work: int = MAX_WORK,
     changes: Changes = MappingProxyType({}),
+    controllers: Mapping[str, Law] = MappingProxyType({}),
     progress: Progress = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
@@ -59,17 +69,23 @@ def simulate(
     changes : mapping of int to mapping of str to float
         Numbers of the scene by "section.key" that were set while it ran, by the tick from which they act; only for
         sampled feedback.
+    controllers : mapping of str to callable
+        Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
+        sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
+        as the scene says. The loop is sampled. Each is called once for every tick, the last one included. A function
+        that numba has compiled runs at full speed.
     progress : callable, optional
         Called with the time reached, in s.
 
     Raises
     ------
     Refused
-        If the grid is not ascending within the horizon, the changes are not those of a running graph, or the method
-        cannot do what is asked, see `methods.registry.check`.
+        If the grid is not ascending within the horizon, the changes are not those of a running graph, the method
+        cannot do what is asked, see `methods.registry.check`, or a controller cannot be called or answers what is no
+        finite number. What a controller raises passes through, with a note of the tick.
     """
-    sampled = sampled or scene.sampled
-    check_changes(scene, sampled, changes)
+    sampled = sampled or scene.sampled or bool(controllers)
+    check_changes(scene, sampled, changes, controllers)
     if setting is None and registry.find(method).knob == ACCURACY_KNOB:
         setting = accuracy
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
@@ -78,7 +94,8 @@ def simulate(
     grid = np.asarray(grid, dtype=float)
     _check_grid(scene, grid)
     _check_ticks(scene, sampled, max_work)
-    loop = SampledLoop(scene, grid, changes, progress) if sampled else None
+    foreign = foreign_controllers(scene, controllers)
+    loop = SampledLoop(scene, grid, changes, progress, foreign) if sampled else None
     drive = loop.drive if loop else partial(drive_external, scene, grid) if scene.system.external else None
     problem = Problem(scene.system, scene.duration, grid, setting, max_events, max_work, sampled, drive)
     found = METHODS[method].solve(problem)
@@ -88,7 +105,7 @@ def simulate(
     record = None if loop is None else loop.record()
     return Trajectory(
         scene, grid[:reached], found.state, record, found.event_table, found.work, found.status, method, setting,
-        found.stop,
+        found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()},
     )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,13 +14,13 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.events import Event, to_events
 from grasp_ros.exact.integrator import ACCURACY, Status
 from grasp_ros.methods.registry import EXACT, METHODS, find
-from grasp_ros.physics.energy import Energy, energy
+from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.files import decoding, replacing
 from grasp_ros.scene.npz import TEXT, Field, read_npz
 
@@ -67,6 +68,8 @@ class Trajectory:
         Its accuracy, step in s, or tolerance.
     stop : str
         Why and where a run of `exact` stopped, with time, contact mode and state; empty if it did not.
+    controllers : mapping of str to str
+        Names of the controllers that acted in place of the scene's feedback, by side.
     """
 
     scene: Scene
@@ -79,6 +82,7 @@ class Trajectory:
     method: str = EXACT
     setting: float = ACCURACY
     stop: str = ""
+    controllers: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def sampled(self) -> bool:
@@ -122,8 +126,17 @@ class Trajectory:
 
     @property
     def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode at the output times."""
-        return energy(self.scene.system, self.state)
+        """V, V_c, V' and the contact mode at the output times; see `energy_of`."""
+        return energy(self.scene.system, self.state, feedback=not self.controllers)
+
+    @property
+    def energy_of(self) -> str:
+        """What `energy` is the energy of: the plant with its feedback, or the plant alone.
+
+        Nobody knows the energy of a controller that is any function: then V and V_c have no term of feedback, of
+        neither side, and V' is the rate without any command.
+        """
+        return PLANT_ALONE if self.controllers else PLANT_AND_FEEDBACK
 
     @property
     def events(self) -> list[Event]:
@@ -153,7 +166,8 @@ class Trajectory:
                 events=self.event_table, work=self.work,
                 work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
                 method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
-                scene_name=self.scene.name, scene=self.scene.to_yaml(),
+                scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
+                controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
             )
 
 
@@ -161,11 +175,12 @@ _ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate")}
 _TIMES = {
     f"{kind}_{side}": Field("<f8", (f"{kind} {side}",)) for kind in ("touch", "release") for side in ("left", "right")
 }
-_WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene")}
+_WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene", "energy_of")}
 FIELDS = {
     **_ROW, "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
     "mode": Field("<i8", ("n",)), **_TIMES, "events": Field("<f8", ("events", 5)), "work": Field("<i8", ("work",)),
     "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
+    "controllers": Field(TEXT, (2,)),
 }
 
 
@@ -187,7 +202,10 @@ def load(path: Path) -> Trajectory:
         found = Trajectory(
             scene, data["t"], data["state"], loop, data["events"], data["work"], Status[words["status"]], method.name,
             float(data["setting"]), words["stop"],
+            {side: name for side, name in zip(SIDES, data["controllers"].tolist(), strict=True) if name},
         )
+        if found.energy_of != words["energy_of"]:
+            raise Refused(f"energy_of: {words['energy_of']}; allowed with these controllers: {found.energy_of}")
         _check(found)
         for side, name in ((LEFT, "left"), (RIGHT, "right")):
             for kind in (Transition.TOUCH, Transition.RELEASE):

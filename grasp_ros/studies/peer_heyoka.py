@@ -39,7 +39,7 @@ LADDER = (1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15
 def contenders(variants: Sequence[dict[str, bool]] = VARIANTS[:2]) -> list[Contender]:
     """Ways of heyoka to generate code, over its tolerance; by default the two that are worth their compile time."""
     return [
-        Contender("heyoka", "_".join(["heyoka", *options]), "tolerance", LADDER, partial(_HeyokaGrasp, options))
+        Contender("heyoka", "_".join(["heyoka", *options]), "tolerance", LADDER, partial(HeyokaGrasp, options))
         for options in variants
     ]
 
@@ -130,7 +130,7 @@ def heyoka_system(hy: Any, grasp: Grasp, left: bool, right: bool) -> tuple[list[
     return equations, events
 
 
-class _Leg:
+class Leg:
     """heyoka's integrator for one mode: the six states, then w of each side in contact, then the time since its start.
 
     The arrays are views into heyoka's memory.
@@ -179,7 +179,7 @@ class _Leg:
         return outcome, read_series(tables, np.array(lengths), self.clock, begin, arrived, grid, out, row)
 
 
-class _HeyokaGrasp:
+class HeyokaGrasp:
     """One scene's flights and contacts, built for one tolerance; call it with the output times."""
 
     def __init__(self, options: dict[str, bool], scene: Scene, tolerance: float) -> None:
@@ -189,11 +189,12 @@ class _HeyokaGrasp:
         self._start = scene.initial_state
         hertzian = max(scene.grasp.left_contact.hertzian, scene.grasp.right_contact.hertzian)
         self._ballistic_s = BALLISTIC_S * (BALLISTIC_HERTZ / hertzian) ** 0.4
-        self._legs = [_Leg(hy, scene.grasp, mode, settings) for mode in range(4)]
+        self._legs = [Leg(hy, scene.grasp, mode, settings) for mode in range(4)]
         flight, _ = heyoka_system(hy, scene.grasp, False, False)
         self._ballistic = hy.taylor_adaptive(flight, [0.0] * 6, **settings)
 
     def __call__(self, grid: Array) -> Answer:
+        """States at the output times."""
         out, row, mode, begin, touches = np.empty((len(grid), 6)), 0, 0, 0.0, [0, 0]
         state, w = self._start, [0.0, 0.0]
         while True:

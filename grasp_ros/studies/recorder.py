@@ -32,7 +32,7 @@ Tick = tuple[int, list[tuple[Topic, bytes]], list[float]]
 
 def ticks_of(run: Trajectory) -> Iterator[Tick]:
     """What a monitor would record of a sampled run: time in ns, messages, and its own values."""
-    scene, level, alone = run.scene, run.energy, energy(run.scene.system.alone, run.state).V_c
+    scene, level, alone = run.scene, run.energy, energy(run.scene.system, run.state, feedback=False).V_c
     bodies = [body for body in (LEFT, OBJECT, RIGHT) if body not in scene.system.absent]
     effort = np.vstack([np.zeros(3), run.inputs[:-1]])
     for tick, state in enumerate(run.state):

@@ -20,6 +20,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.files import decoding, read_text, writing
 
 KIND = "the journal of a study"
+LARGE = 2**63  # no count of a study is
 MOST_BYTES = 2**26  # of a journal
 T = TypeVar("T")
 PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "heyoka")
@@ -179,6 +180,8 @@ def _fits(value: Any, hint: Any) -> bool:
         return isinstance(value, list) and all(_fits(one, inner[0]) for one in value)
     if inner:
         return any(_fits(value, one) for one in inner)
+    if isinstance(value, int) and abs(value) >= LARGE:
+        return False
     return isinstance(value, (int, float) if hint is float else hint) and (hint is bool or not isinstance(value, bool))
 
 

@@ -30,6 +30,18 @@ def test_simulate_writes_what_the_function_returns(command: Any, tmp_path: Path)
     assert loaded.status is expected.status
 
 
+def test_simulate_with_a_controller_of_a_module_here(command: Any, tmp_path: Path) -> None:
+    (tmp_path / "laws.py").write_text("def soft(tick, time, x, v):\n    return -5.0 * x - 0.5 * v\n")
+    words = ("simulate", "case_01", "--set", "time.duration_s=1", "--controller", "left=laws:soft", "-o", "o.npz")
+    result = command(*words)
+    assert result.returncode == 0, result.stderr
+    assert "left controller            laws:soft\n" in result.stdout
+    loaded = simulation.load(tmp_path / "o.npz")
+    assert loaded.controllers == {"left": "laws:soft"}
+    expected = simulation.simulate(scene.load("case_01", ["time.duration_s=1"]), sampled=True)
+    assert loaded.state.tobytes() == expected.state.tobytes()
+
+
 def test_a_reader_that_stops_early_is_no_error() -> None:
     program = f"{shlex.quote(sys.executable)} -m grasp_ros.cli scenes | head -n 1; exit ${{PIPESTATUS[0]}}"
     result = subprocess.run(["bash", "-c", program], capture_output=True, text=True, timeout=60, check=False)

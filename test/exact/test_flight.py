@@ -13,6 +13,7 @@ from oracles import first_touch_from_rest, flight, flight_array
 
 from grasp_ros.exact.flight import fly, launch
 from grasp_ros.exact.flight_events import first_root, pair_in_flight
+from grasp_ros.exact.flight_segment import is_far
 from grasp_ros.exact.kinematics import bound
 from grasp_ros.exact.records import Flights, Motion, Plant, Regime
 from grasp_ros.physics.layout import LEFT, MASS, OBJECT, RIGHT, U_L, Transition, Work
@@ -379,3 +380,27 @@ def test_the_bound_holds_and_is_not_idle(body: Body) -> None:
             limit = bound(np.array(body), q, q_rate, span)
             assert largest <= limit * (1 + 1e-14)
             assert limit <= 30.0 * largest
+
+
+def test_where_a_bound_says_far_the_search_needs_one_step_and_finds_nothing() -> None:
+    """Random flights, half of them near the edge of the bound; sides, signs and sizes of all kinds."""
+    draw = np.random.default_rng(12)
+    far = 0
+    for _ in range(2000):
+        rows = np.zeros((3, 4))
+        rows[:, MASS] = 10.0 ** draw.uniform(-3.0, 3.0, 3)
+        rows[:, 1:3] = 10.0 ** draw.uniform(-3.0, 4.0, (3, 2)) * (draw.random((3, 2)) < 0.7)
+        rows[:, 3] = draw.normal(0.0, 10.0, 3) * (draw.random(3) < 0.5)
+        sign = draw.choice((-1.0, 1.0))
+        side = LEFT if sign > 0.0 else RIGHT
+        x_o, (v, v_o), span = draw.normal(), draw.normal(0.0, 3.0, 2), 10.0 ** draw.uniform(-6.0, 0.0)
+        y = np.zeros(8)
+        gap = span * abs(v - v_o) * draw.uniform(1.0, 1.2) if draw.random() < 0.5 else 10.0 ** draw.uniform(-9.0, 1.0)
+        lane = 0 if side == LEFT else 4
+        y[lane], y[lane + 1], y[2], y[3] = x_o - sign * gap, v, x_o, v_o
+        y[U_L + side] = sign * (y[lane] - x_o)
+        if not is_far(Plant(rows, rows, np.zeros((2, 2)), 0.0), y, side, span):
+            continue
+        far += 1
+        assert root(tuple(rows[side]), tuple(rows[OBJECT]), (y[lane], v, x_o, v_o), span, sign=sign) == (math.inf, 1)
+    assert 200 < far < 1800

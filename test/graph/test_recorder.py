@@ -134,15 +134,12 @@ def test_every_flipped_bit_is_noticed(tmp_path: Path, closed: Path, run: Traject
         with pytest.raises(bag.BagError, match=r"bag\.mcap"):
             bag.read(closed)
     storage(closed).write_bytes(whole)
-    for place in rng.integers(8 * len(text), size=15).tolist():
+    for place in rng.integers(8 * len(text), size=60).tolist():
         content = bytearray(text)
         content[place // 8] ^= 1 << place % 8
         (closed / "metadata.yaml").write_bytes(content)
-        try:
+        with pytest.raises(bag.BagError, match=r"metadata\.yaml"):
             bag.read(closed)
-        except bag.BagError:
-            continue
-        assert yaml.safe_load(content.decode()) == yaml.safe_load(text)  # a blank that is another blank
 
 
 def test_what_is_whole_is_recovered_around_damage(tmp_path: Path, closed: Path, run: Trajectory) -> None:
@@ -193,6 +190,22 @@ def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajec
     recording = bag.read(tmp_path / "bag")
     assert recording.lost == {"end": "closed", "ticks that are missing": "0, 7, 100-102", "lost messages": "5"}
     assert recording.versions == {"python": "3"}
+
+
+def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:
+    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
+    for time_ns, messages, own in study.ticks_of(run):
+        recorder.write_tick(time_ns, messages[:1] + messages[2:], own)
+    recorder.close()
+    recording = bag.read(tmp_path / "bag")
+    assert np.isnan(recording.command[:, 0]).all()
+    assert recording.missing["left/effort_command"] == len(run.t)
+    result = command("inspect", "bag")
+    assert result.returncode == 0
+    assert f"lost                  left/effort_command {len(run.t)}" in result.stdout
+    with pytest.raises(bag.BagError, match="nothing can be recovered: it holds no complete tick"):
+        recover(tmp_path / "bag", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
 
 
 def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path, run: Trajectory) -> None:

@@ -21,7 +21,6 @@ from grasp_ros.maps.plan import Axis, Plan, read_axis, relative
 from grasp_ros.maps.run import run
 from grasp_ros.maps.store import MARKS, Store, columns_of, open_group, read
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation import ensemble as ensembles
 from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
 from grasp_ros.simulation.ensemble import ensemble
 
@@ -44,7 +43,7 @@ def assert_same(path: Path, other: Path) -> None:
 
 @pytest.fixture
 def tiny_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ensembles, "CHUNK_S", 1e-9)
+    monkeypatch.setattr(sys.modules[ensemble.__module__], "CHUNK_S", 1e-9)
 
 
 def test_a_map_is_an_ensemble_over_two_axes(tmp_path: Path, tiny_chunks: None) -> None:
@@ -73,7 +72,7 @@ def test_a_sample_does_not_depend_on_chunks(tmp_path: Path, monkeypatch: pytest.
     plan = Plan(scene, Setup(OUTCOMES), relative(scene, 0.3), 20, 7, quasi)
     assert len(plan.axes) == 17
     run(plan, tmp_path / "whole.zarr")
-    monkeypatch.setattr(ensembles, "CHUNK_S", 1e-9)
+    monkeypatch.setattr(sys.modules[ensemble.__module__], "CHUNK_S", 1e-9)
     run(plan, tmp_path / "pieces.zarr")
     assert_same(tmp_path / "pieces.zarr", tmp_path / "whole.zarr")
     values = read(tmp_path / "whole.zarr")["object.mass_kg"].values
@@ -89,7 +88,7 @@ def test_it_goes_on_after_a_kill_and_computes_only_the_rest(
     plan = Plan(scenes.load("case_01"), Setup(("touches",)), (Axis(GAIN, 1.0, 9.0, 120),))
     code = (
         "from pathlib import Path; import json, sys; from grasp_ros.maps.plan import Plan;"
-        "from grasp_ros.maps.run import run; from grasp_ros.simulation import ensemble; ensemble.CHUNK_S = 1e-9;"
+        "from grasp_ros.maps.run import run; sys.modules['grasp_ros.simulation.ensemble'].CHUNK_S = 1e-9;"
         "run(Plan.from_document(json.loads(sys.argv[1])), Path(sys.argv[2]))"
     )
     process = subprocess.Popen([sys.executable, "-c", code, json.dumps(plan.to_document()), str(path)])

@@ -21,7 +21,7 @@ from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.scene import npz
 from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
-from grasp_ros.studies.records import Journal, Record
+from grasp_ros.studies.records import Journal, Record, digest
 
 SECONDS = 10.0  # no door takes longer
 CASE = scenes.load("case_01").to_yaml()
@@ -245,6 +245,11 @@ def test_a_line_of_a_journal_that_was_changed_is_refused(tmp_path: Path) -> None
     assert Journal(tmp_path).get("b", Record) is None
     path = tmp_path / "journal.jsonl"
     line = json.loads(path.read_text())
+    for name, other in (("setting", 10**400), ("setting", True), ("there_are", [1]), ("status", None), ("x", 1)):
+        value = {**line["value"], name: other}
+        path.write_text(json.dumps({**line, "value": value, "sum": digest("a", json.dumps(value))}) + "\n")
+        with pytest.raises(Refused, match="not what a study writes"):
+            Journal(tmp_path).get("a", Record)
     path.write_text(json.dumps({**line, "value": {**line["value"], "setting": 2.0}}) + "\n")
     with pytest.raises(Refused, match="line 1: its checksum is wrong"):
         Journal(tmp_path)

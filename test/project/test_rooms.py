@@ -26,6 +26,9 @@ BELOW = {  # what the files of a room may import beside their own room
     "cli": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification", "studies"),
 }
 ROOMS = tuple(BELOW)
+DRAW = (
+    "simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py", "studies/map_figures.py",
+)
 
 
 def imports(name: str) -> set[str]:
@@ -89,7 +92,7 @@ def test_each_library_has_its_place(name: str) -> None:
         assert "rosbags" not in found
     if name not in ("graph/recorder.py", "graph/storage.py"):
         assert "mcap" not in found
-    if name not in ("simulation/plots.py", "maps/figures.py", "studies/figures.py", "studies/page_figures.py"):
+    if name not in DRAW:
         assert "matplotlib" not in found
     if not name.startswith("exact/"):
         assert "numba" not in found

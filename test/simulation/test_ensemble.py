@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene, SceneError
-from grasp_ros.simulation import ensemble as ensembles
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
 from grasp_ros.simulation.ensemble import Table, ensemble
@@ -58,7 +59,7 @@ def test_rows_do_not_depend_on_threads_order_or_chunks(monkeypatch: pytest.Monke
     turned = ensemble(scene, {key: values[::-1] for key, values in changes.items()}, OUTCOMES, setup=setup, threads=2)
     for name, values in table.columns.items():
         np.testing.assert_array_equal(values, turned.columns[name][::-1])
-    monkeypatch.setattr(ensembles, "CHUNK_S", 1e-9)
+    monkeypatch.setattr(sys.modules[ensemble.__module__], "CHUNK_S", 1e-9)
     assert_same(table, ensemble(scene, changes, OUTCOMES, setup=setup, threads=3))
 
 

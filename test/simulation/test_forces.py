@@ -102,7 +102,7 @@ def test_intervals_are_the_same_in_blocks_of_any_length(monkeypatch: pytest.Monk
     grid = np.sort(np.concatenate([np.linspace(0.0, 0.5, 777), tick_times(scene)[::7], [0.5, 0.5]]))
     runs = []
     for block in (2, 3, 499, 500, 10**6):
-        monkeypatch.setattr(closed_loop, "BLOCK", block)
+        monkeypatch.setattr(closed_loop, "LONGEST", block)
         runs.append([simulate(scene, grid=grid, sampled=sampled).state.tobytes() for sampled in (False, True)])
     assert all(run == runs[0] for run in runs)
 

@@ -57,7 +57,8 @@ def test_progress_is_reported() -> None:
     seen: list[float] = []
     simulate(case_of(duration=10.0), sampled=True, progress=seen.append)
     assert seen == sorted(seen)
-    assert len(seen) >= 10
+    assert len(seen) >= 5
+    assert seen[-1] == 10.0
 
 
 @pytest.mark.parametrize("sampled", [False, True])

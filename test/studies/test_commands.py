@@ -46,3 +46,14 @@ def test_advise_answers_with_a_command(command: Any) -> None:
     neither = command(*wish)
     assert neither.returncode == 2
     assert "--error, --budget: allowed: exactly one of them" in neither.stderr
+
+
+def test_maps_quick_writes_its_page_and_figures(command: Any, tmp_path: Path) -> None:
+    for _ in range(2):  # the second time from what is there
+        result = command("study", "maps", "--quick", "--docs", "docs", "-o", "runs")
+        assert result.returncode == 0, result.stderr
+    text = (tmp_path / "docs" / "maps.md").read_text()
+    for title in ("Where the grasp of case 3 settles", "Control period, delay and noise", "Robustness"):
+        assert title in text
+    for name in ("settling", "limits", "robustness"):
+        assert (tmp_path / "docs" / "maps" / f"{name}.png").stat().st_size > 1000

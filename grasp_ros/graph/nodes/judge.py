@@ -36,7 +36,6 @@ class Judge:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._plant = scene.system.alone
         self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
         self._acting = dict.fromkeys(SIDES, -1)  # time in ns of the last announcement that acts
         self._known: set[str] = set()
@@ -108,7 +107,7 @@ class Judge:
             balance = energy_balance(system, self._before[1], state, inputs + self._before[2])
             work, residual, alarm = float(balance.work), float(balance.residual), float(balance.alarm)
         self._before = time_ns, state, external
-        alone = energy(self._plant, state, external)
+        alone = energy(system, state, external, feedback=False)
         closed = not self.unknown and self._explains(tick, state, commands)
         level = energy(system, state, external) if closed else None
         V = [float(value) for value in level[:3]] if level else [np.nan] * 3
