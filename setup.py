@@ -13,12 +13,12 @@ setup(
     license="Apache-2.0",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    # grasp_ros/config is a link to config: the scenes are part of the package however it is installed.
-    package_data={NAME: ["config/*.yaml", "py.typed", "studies/paper/templates/*"]},
+    # grasp_ros/config is a link to config: scenes and layouts are part of the package however it is installed.
+    package_data={NAME: ["config/*", "py.typed", "studies/paper/templates/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
-        (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{NAME}/config", sorted(glob("config/*"))),
         (f"lib/{NAME}", sorted(glob("resource/lib/*"))),  # where `ros2 run` looks
     ],
     install_requires=[
@@ -33,6 +33,7 @@ setup(
         "tqdm",
         "PyYAML",
         "jinja2",
+        "rich",
     ],
     extras_require={
         "test": [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import signal
 import sys
 import time
@@ -10,9 +11,10 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError
+from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError, become
+from grasp_ros.graph.running import Running
 
 
 def add_to(commands: Any) -> None:
@@ -21,13 +23,48 @@ def add_to(commands: Any) -> None:
     add_scene(sub)
     add_accuracy(sub)
     add_output(sub, "DIRECTORY", "new directory for the scene and the bag")
+    sub.add_argument(
+        "--without", action="append", default=[], metavar="CONTROLLER",
+        help="do not start left_controller or right_controller; wait for another one on its topic",
+    )
+    sub.add_argument(
+        "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT", type=_law,
+        help="a law of your own in place of the scene's: called with tick, time, x and v it returns the force",
+    )
+    sub.add_argument(
+        "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",
+        help="follow the wall clock, FACTOR simulated seconds in a second (default 1), instead of lockstep",
+    )
+    sub.add_argument("--namespace", default="/", metavar="NS", help="of all names, /clock too; for several graphs")
+    sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
+    sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
     sub.add_argument("bag", type=Path)
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
-    add_accuracy(sub)
+    sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
+    sub.add_argument("bag", type=Path)
+    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub = add_command(commands, "watch", _watch, "watch a running graph, or a bag, in the terminal")
+    sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
+    sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
+    sub = add_command(commands, "ctl", _ctl, "pause, resume, step or reset a running graph, or ask for its status")
+    sub.add_argument("action", choices=("pause", "resume", "step", "reset", "status"))
+    sub.add_argument("steps", type=whole(1), nargs="?", default=1, metavar="N", help="control periods of step")
+    sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
+    sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
+    sub.add_argument("bag", type=Path)
+
+
+def _law(words: str) -> tuple[str, str]:
+    """Name of a controller and its law."""
+    side, _, law = words.partition("=")
+    if not side or not law:
+        raise argparse.ArgumentTypeError(f"{words} is not allowed; allowed: left=module:object, right=module:object")
+    return f"{side}_controller", law
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -35,7 +72,14 @@ def _run(options: argparse.Namespace) -> int:
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
     prepare()
-    graph = Graph(scene, directory, options.accuracy, progress=True)
+    plant = {"paused": str(options.paused).lower()}
+    if options.free_running is not None:
+        Running(real_time_factor=options.free_running)  # refuses what is wrong
+        plant.update(free_running="true", real_time_factor=repr(options.free_running))
+    graph = Graph(
+        scene, directory, options.accuracy, progress=True, without=options.without, laws=dict(options.laws),
+        plant=plant, one_process=options.one_process, namespace=options.namespace,
+    )
     begin = time.monotonic()
     try:
         stopped = _live(graph)
@@ -74,7 +118,7 @@ def _report(graph: Graph, stopped: bool, seconds: float) -> int:
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording), True
     if not stopped:
-        comparison = compare_recording(recording, graph.accuracy)
+        comparison = compare_recording(recording)
         whole = comparison.equal and not recording.alarms and not any(recording.missing.values())
         figure = graph.directory / "figure.png"
         plots.draw(recording, figure, graph.scene.feedback_in_words(sampled=True))
@@ -104,7 +148,42 @@ def _inspect(options: argparse.Namespace) -> int:
     rows, equal = report.describe_recording(recording), True
     if options.replay:
         prepare()
-        comparison = compare_recording(recording, options.accuracy)
+        comparison = compare_recording(recording)
         rows, equal = rows + comparison.rows, comparison.equal
     print(report.table(rows))
     return 0 if equal else 1
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from grasp_ros.graph import bag
+
+    bag.names(options.bag)  # refuses what is none
+    become("player", {"bag": json.dumps(str(options.bag)), "rate": repr(options.rate)})
+
+
+def _watch(options: argparse.Namespace) -> int:
+    if options.bag is None:
+        become("watch", {}, options.namespace)
+    from grasp_ros.cli.watch import play
+    from grasp_ros.graph import bag
+
+    play(bag.read(options.bag), options.rate)
+    return 0
+
+
+def _ctl(options: argparse.Namespace) -> int:
+    become("remote", {"action": options.action, "steps": str(options.steps)}, options.namespace)
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from grasp_ros.cli import report
+    from grasp_ros.graph import bag
+    from grasp_ros.graph.verify import laws_of, verify
+
+    recording = bag.read(options.bag)
+    prepare()
+    found = verify(recording)
+    laws = [(f"{side} controller", law) for side, law in laws_of(recording).items()]
+    rows = [("bag", str(recording.path)), ("run", recording.running.words), *laws, ("verified", found.words)]
+    print(report.table(rows))
+    return 0 if found.holds else 1

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from grasp_ros.graph.bag import Recording
+from grasp_ros.graph.recording import Recording
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
@@ -14,6 +14,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.quantities import (
     SETTLED,
@@ -98,11 +99,13 @@ def describe_recording(recording: Recording) -> list[Row]:
     """What is in a bag."""
     scene = recording.scene
     per_topic = ", ".join(f"{name} {count}" for name, count in recording.counts.items())
+    resets = len(recording.starts) - 1
     missing = {name: count for name, count in recording.missing.items() if count}
     rows = [
         ("bag", str(recording.path)),
         ("scene", scene.title),
         ("feedback", scene.feedback_in_words(sampled=True)),
+        ("run", recording.running.words + (f", {resets} resets" if resets > 0 else "")),
         ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
         ("messages", per_topic),
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
@@ -112,13 +115,18 @@ def describe_recording(recording: Recording) -> list[Row]:
     for tick, numbers in recording.changes.items():
         rows.append((f"set at {scene.time_of(tick):g} s", ", ".join(f"{name} {n:g}" for name, n in numbers.items())))
     if len(recording.tick):
-        mode = recording.lyapunov[:, 3]
+        named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
+        mode, level = named["mode"], recording.energy
+        of = "" if recording.closed else " of the plant alone"
         begun = [_beginnings(mode, flag) for flag in (Mode.LEFT, Mode.RIGHT)]
-        rows.insert(5, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
-        rows.insert(6, ("V at both ends", _ends(recording.lyapunov[:, 0])))
-        rows.insert(7, ("V_c at both ends", _ends(recording.lyapunov[:, 1])))
-        rows.insert(8, ("certificate", scene.certificate_in_words(sampled=True)))
-        rows.insert(9, ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"))
+        rows.insert(6, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
+        rows.insert(7, (f"V{of}", _ends(level.V)))
+        rows.insert(8, (f"V_c{of}", _ends(level.V_c)))
+        rows.insert(9, ("certificate", scene.certificate_in_words(sampled=True) if recording.closed else
+                        "none: the law of a controller is not known"))
+        rows.insert(10, ("work of the held forces", f"{0.5 * float(np.nansum(named['work'])):.6g} J"))
+        alarms = f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"
+        rows.insert(11, ("energy balance", alarms))
     return _with_words(scene, rows)
 
 

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass, field
-from itertools import pairwise
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,121 +14,22 @@ import numpy as np
 from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph import running as runnings
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
-from grasp_ros.graph.rosbag2 import BagError, decode, topics_of
+from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.rosbag2 import BagError, decode, names_of
+from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
-from grasp_ros.physics.energy import PLANT_AND_FEEDBACK, Energy, energy
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.scene.files import decoding, read_text
-from grasp_ros.scene.topics import (
-    CHANGES,
-    EXTERNAL_FORCES,
-    JOINT_STATES,
-    LYAPUNOV,
-    LYAPUNOV_NAMES,
-    SCENE,
-    Topic,
-    state_of,
-)
+from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 
-__all__ = ["BagError", "Recorder", "Recording", "open_storage", "read", "scene_of"]
+__all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
 KIND = "a bag of this package"
 VERSION = "version "  # how the keys of versions begin
-WIDTH = {JOINT_STATES: 8, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
-
-
-@dataclass(frozen=True)
-class Recording:
-    """What is in a bag.
-
-    Attributes
-    ----------
-    path : Path
-    scene : Scene
-    versions : dict of str to str
-        What the recording process ran with.
-    counts : dict of str to int
-        Messages by topic, of those that have one per tick.
-    tick : int array (n,)
-        Ticks whose state is in the bag.
-    state : array (n, 6), m and m/s
-        NaN for a body that is not there.
-    effort, command : arrays (n, 2), N
-        Forces of the controllers that acted until the tick, commands answered to it, which act later if there is a
-        delay; 0 without a controller, NaN where missing.
-    outputs : dict of str to array (n,), N
-        Impact and external forces by topic; NaN where missing.
-    lyapunov : array (n, 6)
-        What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
-    changes : dict of int to dict of str to float
-        Numbers that were set while the graph ran, by the tick from which they act.
-    lost : dict of str to str
-        How the recording ended and what is missing from it, as the bag itself says; if it was not closed, what the
-        reader has found.
-    """
-
-    path: Path
-    scene: scenes.Scene
-    versions: dict[str, str]
-    counts: dict[str, int]
-    tick: np.ndarray
-    state: Array
-    effort: Array
-    command: Array
-    outputs: dict[str, Array]
-    lyapunov: Array
-    changes: dict[int, dict[str, float]]
-    lost: dict[str, str] = field(default_factory=dict)
-
-    @property
-    def t(self) -> Array:
-        """Times in s."""
-        return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
-
-    @property
-    def inputs(self) -> Array:
-        """What acted on the bodies from each tick to the next: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
-
-        The commands that had arrived, which the next tick names as its effort, and the external forces. NaN where the
-        bag does not hold the next tick: at its end, and before a gap. `simulation.Trajectory.inputs` is the same.
-        """
-        inputs = np.zeros((len(self.tick), 3))
-        inputs[:-1, [LEFT, RIGHT]] = self.effort[1:]
-        external = {body: EXTERNAL_FORCES[name].name for name, body in SECTIONS.items()}
-        if any(topic in self.outputs for topic in external.values()):
-            nothing = np.zeros(len(self.tick))
-            inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
-        inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
-        return inputs
-
-    @property
-    def energy_of(self) -> str:
-        """What `energy` is the energy of: the controllers of a graph are those of its scene."""
-        return PLANT_AND_FEEDBACK
-
-    @property
-    def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force."""
-        scene, starts = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
-        parts = []
-        for begin, end in pairwise(starts):
-            scene = scene.changed(self.changes.get(begin, {}))
-            parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
-        return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-    @property
-    def alarms(self) -> int:
-        """Ticks at which the monitor found energy that the held forces do not explain."""
-        return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
-
-    @property
-    def missing(self) -> dict[str, int]:
-        """Ticks up to the last one recorded that have no message, by topic."""
-        ticks = int(self.tick.max(initial=-1)) + 1
-        return {name: ticks - count for name, count in self.counts.items()}
+WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
 def open_storage(path: Path, salvage: bool = False) -> Storage:
@@ -160,6 +60,38 @@ def scene_of(storage: Storage, path: Path) -> scenes.Scene:
     return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))
 
 
+def running_of(storage: Storage) -> Running:
+    """How the plant of a bag ran, once its first record has been read."""
+    return runnings.parse(storage.records[OWN_RECORD]["run"])
+
+
+def names(path: Path) -> dict[str, Topic]:
+    """Topics of a bag by their full names in the graph that it was recorded from.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag.
+    """
+    storage = open_storage(path)
+    with decoding(path, KIND, BagError, (SerdeError,)):
+        next(storage.messages())
+        scene = scene_of(storage, path)
+        return {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
+
+
+def raw(path: Path) -> Iterator[Stored]:
+    """Everything in a bag, in the order of time, as it lies in the file.
+
+    Raises
+    ------
+    BagError
+        If the path is not such a bag, or if it is damaged.
+    """
+    with decoding(path, KIND, BagError):
+        yield from open_storage(path).messages()
+
+
 def read(path: Path) -> Recording:
     """Read a bag that the monitor recorded, also one that was not closed.
 
@@ -174,13 +106,16 @@ def read(path: Path) -> Recording:
         for stored in storage.messages():
             if scene is None:
                 scene = scene_of(storage, path)
-                known = {f"/{topic.name}": topic for topic in topics_of(scene)}
+                known = {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
+                held = () if running_of(storage).lockstep else scene.controllers.values()
             topic = known.get(stored.topic)
             if topic is None or topic.type != stored.type:
                 raise BagError(f"{path}: {stored.topic}: {stored.type} is not a topic of its scene")
             if topic in CHANGES.values():
                 changes.add(topic, stored, scene)
-            elif topic != SCENE:
+            elif topic in held:  # as they came, not one for each tick
+                columns.held[topic] = columns.held.get(topic, 0) + 1
+            elif topic in scene.topics:
                 columns.add(topic, stored, scene)
         if scene is None or not columns.ticks.get(JOINT_STATES):
             raise BagError(f"{path}: holds no tick")
@@ -202,17 +137,23 @@ class _Columns:
     def __init__(self) -> None:
         self.ticks: dict[Topic, array[int]] = {}
         self.values: dict[Topic, array[float]] = {}
+        self.held: dict[Topic, int] = {}  # numbers of messages
 
     def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
         tick, rest = divmod(stored.time_ns, scene.period_ns)
         ticks = self.ticks.setdefault(topic, array("q"))
-        if rest or tick > scene.ticks or (ticks and ticks[-1] >= tick):
-            raise BagError(f"{stored.topic}: {stored.time_ns} ns; allowed: ticks of the scene in their order")
         row = _values(topic, decode(topic, stored.cdr))
         if row.shape != (WIDTH.get(topic, 1),):
             raise BagError(f"{stored.topic}: {row.size} numbers; allowed: {WIDTH.get(topic, 1)}")
+        beyond = topic == JOINT_STATES and row[-1] > scene.ticks * scene.period_ns
+        if rest or beyond or (ticks and ticks[-1] >= tick):
+            raise BagError(f"{stored.topic}: {stored.time_ns} ns; allowed: ticks of the scene in their order")
         ticks.append(tick)
         self.values.setdefault(topic, array("d")).extend(row.tolist())
+
+    def count(self, topic: Topic) -> int:
+        """Messages of a topic."""
+        return self.held.get(topic, len(self.ticks.get(topic, ())))
 
     def of(self, topic: Topic) -> tuple[np.ndarray, Array]:
         """Ticks (n,) and rows (n, k) of a topic."""
@@ -222,27 +163,34 @@ class _Columns:
 
 
 class _Changes(dict[int, dict[str, float]]):
-    """Numbers that were set, by the tick from which they act."""
+    """Numbers that differ from those in force before, by the tick of the bag from which they act."""
+
+    def __init__(self) -> None:
+        self._now: dict[str, float] = {}
 
     def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
-        message = decode(topic, stored.cdr)
-        stamp = message.header.stamp  # a monitor that came late has recorded it late
-        tick = (stamp.sec * NANOSECONDS + stamp.nanosec) // scene.period_ns
+        message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
-        if not 0 <= tick <= scene.ticks or not numbers.keys() <= set(scene.live):
-            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(scene.live)}")
-        self.setdefault(tick, {}).update(numbers)
+        known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
+        if not numbers.keys() <= known.keys():
+            raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(known)}")
+        now = {**known, **self._now}
+        if new := {name: number for name, number in numbers.items() if now[name] != number}:
+            self.setdefault(tick, {}).update(new)
+            self._now.update(new)
 
 
 def _values(topic: Topic, message: Any) -> Array:
     if topic == JOINT_STATES:
         state, inputs = state_of(message)
-        return np.concatenate([state, inputs[[LEFT, RIGHT]]])
+        stamp = message.header.stamp
+        return np.concatenate([state, inputs[[LEFT, RIGHT]], [stamp.sec * NANOSECONDS + stamp.nanosec]])
     return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
 
 
 def _recording(path: Path, scene: scenes.Scene, columns: _Columns, changes: _Changes, storage: Storage) -> Recording:
     ticks, joints = columns.of(JOINT_STATES)
+    joints, stamps = joints[:, :8], joints[:, 8]
 
     def aligned(topic: Topic) -> Array:
         found, values = columns.of(topic)
@@ -257,9 +205,9 @@ def _recording(path: Path, scene: scenes.Scene, columns: _Columns, changes: _Cha
     own = storage.records[OWN_RECORD]
     return Recording(
         path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
-        {topic.name: len(columns.ticks.get(topic, ())) for topic in scene.topics}, ticks, joints[:, :6], joints[:, 6:],
-        command, {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-        dict(changes), _lost(storage),
+        {topic.name: columns.count(topic) for topic in scene.topics}, ticks, joints[:, :6], joints[:, 6:], command,
+        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
+        dict(changes), running_of(storage), ticks[stamps == 0.0], _lost(storage),
     )
 
 

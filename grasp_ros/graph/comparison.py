@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.graph.bag import Recording
+from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.verify import Verification, laws_of, verify
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
 
@@ -14,13 +15,19 @@ from grasp_ros.simulation import Trajectory, simulate
 class Comparison(NamedTuple):
     """A recorded motion beside the same scene without ROS."""
 
-    equal: bool  # to the sampled simulation, bit for bit
+    equal: bool  # every bit is as it should be
+    own: bool  # whether all commands are those of the scene's laws, in lockstep and without a reset
     offset: Array | None  # (6,), largest distance from continuous feedback, m and m/s; None if it has none of its own
+    verification: Verification
+    laws: dict[str, str]  # whose commands these are, by side
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """For `table`."""
-        rows = [("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL")]
+        rows = [(f"{side} controller", law) for side, law in self.laws.items()]
+        rows.append(("verified", self.verification.words))
+        if self.own:
+            rows.append(("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL"))
         if self.offset is not None:
             far = ", ".join(
                 f"{name} {distance:.3g}"
@@ -31,15 +38,26 @@ class Comparison(NamedTuple):
         return rows
 
 
-def compare_recording(recording: Recording, accuracy: float) -> Comparison:
-    """Simulate a recorded scene without ROS, with commands that are held and with the paper's continuous feedback."""
-    times, scene = recording.t, recording.scene
+def compare_recording(recording: Recording) -> Comparison:
+    """Simulate a recorded scene again: with its recorded inputs, and with the scene's laws if it was these that ran.
+
+    With the scene's laws also under the paper's continuous feedback, to say how far from it the held commands lead.
+    """
+    times, scene, accuracy = recording.t, recording.scene, recording.running.accuracy
+    verification, laws = verify(recording), laws_of(recording)
+    own = recording.running.lockstep and len(recording.starts) <= 1 and not any(map(_foreign, laws.values()))
+    if not own:
+        return Comparison(verification.holds, own, None, verification, laws)
     same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
-    equal = _equal(same, recording)
+    equal = verification.difference is None and _equal(same, recording)
     if scene.sampled or recording.changes:
-        return Comparison(equal, None)
+        return Comparison(equal, own, None, verification, laws)
     ideal = simulate(scene, grid=times, accuracy=accuracy)
-    return Comparison(equal, np.abs(ideal.state - recording.state).max(axis=0))
+    return Comparison(equal, own, np.abs(ideal.state - recording.state).max(axis=0), verification, laws)
+
+
+def _foreign(law: str) -> bool:
+    return law.startswith("foreign")
 
 
 def _equal(same: Trajectory, recording: Recording) -> bool:

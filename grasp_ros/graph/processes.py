@@ -9,10 +9,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NoReturn
 
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 
@@ -20,6 +22,30 @@ STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
+    """Turn this process into one that runs a node: its signals and its exit status are the node's own.
+
+    Parameters
+    ----------
+    node : str
+        Name of the node, as `graph.nodes.start` knows it.
+    parameters : mapping of str to str
+        Its parameters, as `-p` takes them.
+    namespace : str
+    """
+    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
+    os.execve(sys.executable, _command([node], parameters, namespace), environment)
+
+
+def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
+    """Command line of a node, or of "together" and the nodes of its process."""
+    words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
+    root = namespace.rstrip("/")
+    names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
+    # -P: a checkout in the working directory must not take the place of the package that is running.
+    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", *nodes, "--ros-args", *words, *names]
 
 
 class GraphError(RuntimeError):
@@ -40,6 +66,16 @@ class Graph:
         Whether the plant shows a progress bar on the terminal.
     errors : int, optional
         Where the processes' messages go, as in `subprocess.Popen`; default: the terminal.
+    without : sequence of str
+        Controllers that somebody else starts.
+    laws : mapping of str to str
+        Laws of the user's own, "module:object", by controller.
+    plant : mapping of str to str
+        Further parameters of the plant.
+    one_process : bool
+        Whether all nodes run in one process and one thread.
+    namespace : str
+        Of all names, /clock too where it is not the root.
 
     """
 
@@ -48,6 +84,11 @@ class Graph:
     accuracy: float
     progress: bool = False
     errors: int | None = None
+    without: Sequence[str] = ()
+    laws: Mapping[str, str] = field(default_factory=dict)
+    plant: Mapping[str, str] = field(default_factory=dict)
+    one_process: bool = False
+    namespace: str = "/"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     @property
@@ -61,8 +102,12 @@ class Graph:
         Raises
         ------
         Refused
-            If the directory exists or cannot be written.
+            If the directory exists or cannot be written, or the scene has no such controller.
         """
+        for name in (*self.without, *self.laws):
+            if name not in self.scene.controllers:
+                allowed = ", ".join(self.scene.controllers) or "none, this scene has no controller"
+                raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
         scene_file = self.directory / f"{self.scene.name}.yaml"
         with writing(self.directory):
             self.directory.mkdir(parents=True)
@@ -74,26 +119,34 @@ class Graph:
         }
         settings = {
             "monitor": {"bag": json.dumps(str(self.bag))},
-            **{name: {"wait_for_monitor": "true"} for name in self.scene.controllers},
+            **{
+                name: {"wait_for_monitor": "true", "law": json.dumps(self.laws.get(name, ""))}
+                for name in self.scene.controllers if name not in self.without
+            },
             "plant": {
                 "scene": json.dumps(str(scene_file)),
                 "accuracy": repr(float(self.accuracy)),
                 "wait_for_monitor": "true",
                 "progress": str(self.progress).lower(),
+                **self.plant,
             },
         }
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         try:
-            for name, parameters in settings.items():
-                words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
-                # -P: a checkout in the working directory must not take the place of the package that is running.
-                command = [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", name, "--ros-args", *words]
+            for name, command in self._commands(settings).items():
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stderr=self.errors
                 )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
+        """Command lines by the names of the processes."""
+        if not self.one_process:
+            return {name: _command([name], parameters, self.namespace) for name, parameters in settings.items()}
+        together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
+        return {"graph": _command(["together", *settings], together, self.namespace)}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.
@@ -105,8 +158,9 @@ class Graph:
             together.
         """
         deadline = math.inf
-        while not received and (running := [n for n in ("plant", "monitor") if self.processes[n].poll() is None]):
-            if len(running) == 1:
+        awaited = [name for name in self.processes if not name.endswith("controller")]
+        while not received and (running := [name for name in awaited if self.processes[name].poll() is None]):
+            if len(running) < len(awaited):
                 deadline = min(deadline, time.monotonic() + TOGETHER_SECONDS)
             if time.monotonic() > deadline:
                 raise GraphError(f"{running[0]}: still runs although its counterpart has ended")

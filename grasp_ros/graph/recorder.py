@@ -7,7 +7,6 @@ bag is closed, not cut off.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import os
 import resource
@@ -20,20 +19,19 @@ import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph import rosbag2
+from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Reserve, Sink
 from grasp_ros.graph.rosbag2 import BagError
+from grasp_ros.graph.running import Running
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import writing
 from grasp_ros.scene.strict_yaml import dump
-from grasp_ros.scene.topics import LYAPUNOV, LYAPUNOV_NAMES, SCENE, Topic
+from grasp_ros.scene.topics import CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, Topic
 
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
-CHUNK_BYTES = 2**18  # a chunk ends at this size, too
-RESERVE_BYTES = 4 * CHUNK_BYTES  # kept free for the last chunk, its index, and metadata.yaml
 INDEX_BYTES = 256  # at most what the index holds of one chunk
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
 DIGEST, BESIDE = "digest", "digest of metadata.yaml"  # keys of checksums in these records
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def checksum(text: str) -> str:
@@ -52,62 +50,6 @@ def ranges(ticks: Iterable[tuple[int, int]]) -> str:
     return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in ticks) or "none"
 
 
-class _Reserve:
-    """Space on the disk that is given back when it is needed."""
-
-    def __init__(self, path: Path) -> None:
-        self._path, self._size = path, 0
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-
-    def hold(self, size: int) -> None:
-        """Have at least this many bytes; grows in steps."""
-        if size > self._size:
-            os.posix_fallocate(self._file, 0, size + RESERVE_BYTES)
-            self._size = size + RESERVE_BYTES
-
-    def release(self) -> None:
-        """Give the space back; does nothing the second time."""
-        if self._file >= 0:
-            os.close(self._file)
-            self._path.unlink(missing_ok=True)
-            self._file = -1
-
-
-class _Sink:
-    """Unbuffered output file that takes the reserve when the disk is full."""
-
-    def __init__(self, path: Path, reserve: _Reserve) -> None:
-        self.file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        self._reserve, self._size, self.full = reserve, 0, False
-
-    def write(self, data: bytes) -> int:
-        rest = memoryview(data)
-        while rest:
-            try:
-                done = os.write(self.file, rest)
-            except OSError as error:
-                if self.full or error.errno not in FULL:
-                    raise
-                self.full = True
-                self._reserve.release()
-                continue
-            self._size += done
-            rest = rest[done:]
-        return len(data)
-
-    def tell(self) -> int:
-        return self._size
-
-    def flush(self) -> None:
-        """Nothing waits here."""
-
-    def close(self) -> None:
-        """Close the file; does nothing the second time."""
-        if self.file >= 0:
-            os.close(self.file)
-            self.file = -1
-
-
 class Recorder:
     """Writes one bag: the scene and the versions first, then ticks.
 
@@ -119,6 +61,10 @@ class Recorder:
         Its topics get a connection each.
     versions : mapping of str to str
         Stored in the bag's metadata.
+    names : mapping of Topic to str, optional
+        Full names of the topics in the graph; of those without a name here, the one without a namespace.
+    running : Running, optional
+        How the plant runs; default: in lockstep.
 
     Raises
     ------
@@ -127,7 +73,10 @@ class Recorder:
         file, has come to its end, the bag has been closed and is whole up to the last tick.
     """
 
-    def __init__(self, path: Path, scene: Scene, versions: Mapping[str, str]) -> None:
+    def __init__(
+        self, path: Path, scene: Scene, versions: Mapping[str, str], names: Mapping[Topic, str] | None = None,
+        running: Running | None = None,
+    ) -> None:
         self._path, self._period_ns = path, scene.period_ns
         self._counts = dict.fromkeys(rosbag2.topics_of(scene), 0)
         self._last_ns = self._next = 0
@@ -136,11 +85,13 @@ class Recorder:
         self._closed, self._error = False, ""
         self._lock, self._stop = threading.Lock(), threading.Event()
         words = {f"version {name}": word for name, word in sorted(versions.items())}
-        self._custom = {"scene": scene.to_yaml(), **words}
+        topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
+        self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
+        self._names = rosbag2.names_of(scene, self._custom)
         with writing(path, BagError):
             path.mkdir(parents=True)
-            self._reserve = _Reserve(path / ".reserve")
-            self._sink = _Sink(path / f"{path.name}.mcap", self._reserve)
+            self._reserve = Reserve(path / ".reserve")
+            self._sink = Sink(path / f"{path.name}.mcap", self._reserve)
             self._begin()
         if self._error:
             raise BagError(self._error)
@@ -161,12 +112,13 @@ class Recorder:
         }
         self._channels = {
             topic: self._writer.register_channel(
-                f"/{topic.name}", rosbag2.ENCODING, schemas[topic.type],
+                self._names[topic], rosbag2.ENCODING, schemas[topic.type],
                 {"offered_qos_profiles": dump(rosbag2.qos_profiles(topic)).strip()},
             )
             for topic in self._counts
         }
-        self._add(SCENE, 0, rosbag2.text_message(self._custom["scene"]))
+        for topic, key in ((SCENE, "scene"), (RUN, "run")):
+            self._add(topic, 0, rosbag2.text_message(self._custom[key]))
         self._flush()
         directory = os.open(self._path, os.O_RDONLY)
         try:
@@ -174,27 +126,35 @@ class Recorder:
         finally:
             os.close(directory)
 
-    def write_tick(self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float]) -> None:
-        """Append all of one tick: it is in the bag as a whole, or not at all.
+    def write_tick(
+        self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float],
+        stamp_ns: int | None = None,
+    ) -> None:
+        """Append all of one tick, and its /clock: it is in the bag as a whole, or not at all.
 
         Parameters
         ----------
         time_ns : int, ns
-            Simulated time, not before that of the last tick.
+            Time in the bag, not before that of the last tick; goes on where a reset puts simulated time back.
         messages : iterable of Topic and bytes
             Serialized messages.
         lyapunov : sequence of float
             The monitor's own values, see `topics.LYAPUNOV_NAMES`.
+        stamp_ns : int, ns, optional
+            Simulated time, where it is another one.
 
         Raises
         ------
         BagError
             If the bag could not be written up to here, or ends with this tick.
         """
-        own = rosbag2.list_message(time_ns, LYAPUNOV_NAMES, np.array(lyapunov, dtype=float))
+        stamp_ns = time_ns if stamp_ns is None else stamp_ns
+        own = rosbag2.list_message(stamp_ns, LYAPUNOV_NAMES, np.array(lyapunov, dtype=float))
+        clock = rosbag2.clock_message(stamp_ns)
         with self._lock, writing(self._path, BagError):
             if self._closed:
                 raise BagError(self._error or f"{self._path}: is closed")
+            self._add(CLOCK, time_ns, clock)
             for topic, cdr in messages:
                 self._add(topic, time_ns, cdr)
             self._add(LYAPUNOV, time_ns, own)
@@ -206,6 +166,12 @@ class Recorder:
                 self._flush()
         if self._error:
             raise BagError(self._error)
+
+    def write(self, topic: Topic, cdr: bytes) -> None:
+        """Append what does not come with every tick, at the time of the last one; nothing once the bag is closed."""
+        with self._lock, writing(self._path, BagError):
+            if not self._closed:
+                self._add(topic, self._last_ns, cdr)
 
     def _add(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
         self._writer.add_message(self._channels[topic], time_ns, cdr, time_ns, self._counts[topic])
@@ -282,7 +248,7 @@ class Recorder:
         self._closed = True
         self._reserve.release()
         document = rosbag2.metadata(
-            f"{self._path.name}.mcap", self._counts, self._last_ns, self._custom
+            f"{self._path.name}.mcap", self._counts, self._names, self._last_ns, self._custom
         )
         text = dump(document)
         lost = {"end": why, "ticks that are missing": ranges(self._gaps), **counters, BESIDE: checksum(text)}

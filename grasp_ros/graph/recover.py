@@ -11,11 +11,14 @@ from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
+from grasp_ros.graph import running as runnings
 from grasp_ros.graph.recorder import OWN_RECORD, Recorder
-from grasp_ros.graph.rosbag2 import BagError, decode, topics_of
+from grasp_ros.graph.rosbag2 import BagError, decode, names_of
+from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
+from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding
-from grasp_ros.scene.topics import LYAPUNOV, SCENE, Topic
+from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
 
 
 class Recovery(NamedTuple):
@@ -52,12 +55,18 @@ def recover(path: Path, new: Path) -> Recovery:
     begin = next(ticks, None)
     if begin is None:
         raise BagError(f"{path}: nothing can be recovered: it holds no complete tick")
+    running = runnings.parse(custom["run"]) if "run" in custom else Running()
     versions = {key.removeprefix(bag.VERSION): word for key, word in custom.items() if key.startswith(bag.VERSION)}
-    recorder, written = Recorder(new, scene, versions), 0
+    recorder, written = Recorder(new, scene, versions, names_of(scene, custom), running), 0
     try:
-        for time_ns, tick in chain([begin], ticks):
-            values = decode(LYAPUNOV, tick.pop(LYAPUNOV)).position.tolist()
-            recorder.write_tick(time_ns, tick.items(), values)
+        for time_ns, tick, beside in chain([begin], ticks):
+            own = decode(LYAPUNOV, tick.pop(LYAPUNOV))
+            stamp_ns = own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec
+            if stamp_ns > scene.ticks * scene.period_ns:
+                continue
+            recorder.write_tick(time_ns, tick.items(), own.position.tolist(), stamp_ns)
+            for topic, cdr in beside:
+                recorder.write(topic, cdr)
             written += 1
     finally:
         places = "; ".join(f"{size} at {offset}: {why}" for offset, size, why in storage.left_out)
@@ -66,15 +75,23 @@ def recover(path: Path, new: Path) -> Recovery:
 
 
 def _ticks(storage: Storage, first: Stored, following: Iterator[Stored], scene: scenes.Scene
-           ) -> Iterator[tuple[int, dict[Topic, bytes]]]:
-    """Time and messages by topic of every tick of which all are there, in ascending order."""
-    known = {(f"/{topic.name}", topic.type): topic for topic in topics_of(scene)}
+           ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
+    """Time, messages by topic, and what lies beside them, of every tick of which all are there, in ascending order."""
+    custom = storage.records.get(OWN_RECORD, {})
+    known = {(name, topic.type): topic for topic, name in names_of(scene, custom).items()}
+    lockstep = "run" not in custom or runnings.parse(custom["run"]).lockstep
+    wanted = {topic for topic in scene.topics if lockstep or topic not in scene.controllers.values()}
     before = -1
     with decoding(storage.path, bag.KIND, BagError, (SerdeError,)):
         for time_ns, group in groupby(chain([first], following), lambda stored: stored.time_ns):
-            tick = {known[stored[:2]]: stored.cdr for stored in group if stored[:2] in known}
-            tick.pop(SCENE, None)
-            on_time = time_ns % scene.period_ns == 0 and before < time_ns <= scene.ticks * scene.period_ns
-            if on_time and tick.keys() >= set(scene.topics):
+            tick: dict[Topic, bytes] = {}
+            beside = []
+            for stored in group:
+                topic = known.get(stored[:2], SCENE)
+                if topic in wanted or topic in CHANGES.values():
+                    tick[topic] = stored.cdr
+                elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
+                    beside.append((topic, stored.cdr))
+            if time_ns % scene.period_ns == 0 and before < time_ns and tick.keys() >= wanted:
                 before = time_ns
-                yield time_ns, tick
+                yield time_ns, tick, beside

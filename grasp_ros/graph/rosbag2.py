@@ -13,11 +13,12 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import CHANGES, FORCE, NAMED_LIST, SCENE, Topic
+from grasp_ros.scene.topics import CHANGES, CLOCK, DIAGNOSTICS, FORCE, NAMED_LIST, RUN, SCENE, TIMING, Topic
 
 VERSION = 9  # of the metadata
 PROFILE, ENCODING, SCHEMA_ENCODING = "ros2", "cdr", "ros2msg"
 METADATA_RECORD, METADATA_KEY = "rosbag2", "serialized_metadata"  # where rosbag2 looks within an MCAP file
+TOPIC = "topic "  # how the keys of topics' full names begin
 INFORMATION = "rosbag2_bagfile_information"
 _TYPES = get_typestore(Stores.ROS2_JAZZY)
 NOTHING = np.zeros(0)
@@ -30,7 +31,12 @@ class BagError(Refused):
 
 def topics_of(scene: Scene) -> list[Topic]:
     """Topics of a bag, in the order of their connections."""
-    return [SCENE, *scene.topics, *CHANGES.values()]
+    return [SCENE, RUN, CLOCK, *scene.topics, *CHANGES.values(), TIMING, DIAGNOSTICS]
+
+
+def names_of(scene: Scene, custom: Mapping[str, str]) -> dict[Topic, str]:
+    """Full names of the topics of a bag; where it says nothing of one, without a namespace."""
+    return {topic: custom.get(f"{TOPIC}{topic.name}", f"/{topic.name.lstrip('/')}") for topic in topics_of(scene)}
 
 
 def qos_profiles(topic: Topic) -> list[dict[str, Any]]:
@@ -50,7 +56,7 @@ def definition(kind: str) -> bytes:
 
 
 def metadata(
-    file: str, counts: Mapping[Topic, int], last_ns: int, custom: Mapping[str, str]
+    file: str, counts: Mapping[Topic, int], names: Mapping[Topic, str], last_ns: int, custom: Mapping[str, str]
 ) -> dict[str, Any]:
     """Document of metadata.yaml.
 
@@ -60,6 +66,8 @@ def metadata(
         Name of the storage file.
     counts : mapping of Topic to int
         Messages by topic.
+    names : mapping of Topic to str
+        Full names.
     last_ns : int, ns
         Last time; the first is 0.
     custom : mapping of str to str
@@ -73,7 +81,7 @@ def metadata(
         "topics_with_message_count": [
             {
                 "topic_metadata": {
-                    "name": f"/{topic.name}", "type": topic.type, "serialization_format": ENCODING,
+                    "name": names[topic], "type": topic.type, "serialization_format": ENCODING,
                     "offered_qos_profiles": qos_profiles(topic),
                     "type_description_hash": _TYPES.hash_rihs01(topic.type),
                 },
@@ -109,6 +117,11 @@ def force_message(time_ns: int, force: float) -> bytes:
     vector = partial(kind["geometry_msgs/msg/Vector3"], y=0.0, z=0.0)
     wrench = kind["geometry_msgs/msg/Wrench"](force=vector(x=float(force)), torque=vector(x=0.0))
     return bytes(_TYPES.serialize_cdr(kind[FORCE](header=_header(time_ns), wrench=wrench), FORCE))
+
+
+def clock_message(time_ns: int) -> bytes:
+    """Simulated time, serialized."""
+    return bytes(_TYPES.serialize_cdr(_TYPES.types[CLOCK.type](clock=_header(time_ns).stamp), CLOCK.type))
 
 
 def _header(time_ns: int) -> Any:

@@ -146,6 +146,13 @@ class Scene:
             for key in self.values[effect.section]
         ]
 
+    def numbers_of(self, node: str) -> dict[str, float]:
+        """Numbers by "section.key" that belong to a node."""
+        return {
+            f"{effect.section}.{key}": value for effect in self.effects if effect.node == node
+            for key, value in self.values[effect.section].items()
+        }
+
     def certificate_in_words(self, sampled: bool) -> str:
         """Whether V_c can rise in this scene, and why."""
         held = [HELD] if sampled and not self.sampled and self.system.laws else []

@@ -31,14 +31,18 @@ LEFT_CONTACT = Topic("contact/left", FORCE)
 RIGHT_CONTACT = Topic("contact/right", FORCE)
 LYAPUNOV = Topic("lyapunov", NAMED_LIST)
 SCENE = Topic("scene", "std_msgs/msg/String", latched=True, depth=1)
+RUN = Topic("run", "std_msgs/msg/String", latched=True, depth=1)
+TIMING = Topic("timing", NAMED_LIST)
+MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", depth=1)
+ROBOT_DESCRIPTION = Topic("robot_description", "std_msgs/msg/String", latched=True, depth=1)
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock")
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 
 COMMANDS = {"left": LEFT_COMMAND, "right": RIGHT_COMMAND}
 CONTACTS = {"left": LEFT_CONTACT, "right": RIGHT_CONTACT}
 EXTERNAL_FORCES = {name: Topic(f"external_force/{name}", FORCE) for name in ("left_arm", "object", "right_arm")}
-CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True) for side in ("left", "right")}
-LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm"]
+CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True, depth=1) for side in ("left", "right")}
+LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm", "V_plant", "work", "closed"]
 
 
 def state_of(message: Any) -> tuple[Array, Array]:

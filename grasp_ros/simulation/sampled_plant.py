@@ -54,7 +54,8 @@ class Record(NamedTuple):
 class SampledPlant:
     """Bodies and contacts under commands that are held over control periods, with delay and external forces.
 
-    `step` takes the commands from outside, for one period; `run` lets the controllers of a system answer, for many.
+    `step` takes the commands from outside, for one period, `follow` for many; `run` lets the controllers of a system
+    answer.
 
     Parameters
     ----------
@@ -124,6 +125,22 @@ class SampledPlant:
         record = self._go(Outputs(times, np.array([0, len(times)])), np.array([commands], dtype=float))
         self.inputs = record.inputs[0]
         return record.states
+
+    def follow(self, answers: Array) -> Array:
+        """Advance by one control period for each row of answers that are known beforehand.
+
+        Parameters
+        ----------
+        answers : array (k, 3), N by body
+
+        Returns
+        -------
+        array (k, 6)
+            States at the begin of each period; only those reached, if `status` is not DONE afterwards.
+        """
+        count = len(answers)
+        outputs = Outputs(np.zeros(count), np.arange(count + 1))
+        return self._go(outputs, np.ascontiguousarray(answers, dtype=float)).states
 
     def run(
         self, laws: Mapping[int, ControlLaw], outputs: Outputs, foreign: Mapping[int, Foreign] | None = None,

@@ -17,6 +17,7 @@ from tqdm import tqdm
 from grasp_ros.graph import bag, rosbag2
 from grasp_ros.graph.recorder import FLUSH_SECONDS, Recorder
 from grasp_ros.graph.recover import recover
+from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -31,7 +32,7 @@ Tick = tuple[int, list[tuple[Topic, bytes]], list[float]]
 
 def ticks_of(run: Trajectory) -> Iterator[Tick]:
     """What a monitor would record of a sampled run: time in ns, messages, and its own values."""
-    scene, level = run.scene, run.energy
+    scene, level, alone = run.scene, run.energy, energy(run.scene.system, run.state, feedback=False).V_c
     bodies = [body for body in (LEFT, OBJECT, RIGHT) if body not in scene.system.absent]
     effort = np.vstack([np.zeros(3), run.inputs[:-1]])
     for tick, state in enumerate(run.state):
@@ -43,7 +44,7 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
         states = rosbag2.list_message(
             time_ns, [NAMES[body] for body in bodies], state[column], state[column + 1], effort[tick, bodies]
         )
-        own = [level.V[tick], level.V_c[tick], level.V_rate[tick], level.mode[tick], 0.0, 0.0]
+        own = [level.V[tick], level.V_c[tick], level.V_rate[tick], level.mode[tick], 0.0, 0.0, alone[tick], 0.0, 1.0]
         rest = [(topic, rosbag2.force_message(time_ns, force)) for topic, force in forces.items()]
         yield time_ns, [(JOINT_STATES, states), *rest], [float(value) for value in own]
 
@@ -82,7 +83,7 @@ def cost(scene: Scene) -> Cost:
         recorder.close()
         seconds = time.process_time() - begin
         size = (path / "bag.mcap").stat().st_size
-    values = rosbag2.list_message(0, LYAPUNOV_NAMES, np.zeros(6))
+    values = rosbag2.list_message(0, LYAPUNOV_NAMES, np.zeros(len(LYAPUNOV_NAMES)))
     raw = sum(len(values) + sum(len(cdr) for _, cdr in messages) for _, messages, _ in ticks)
     return Cost(raw / len(ticks), size / len(ticks), seconds / len(ticks))
 

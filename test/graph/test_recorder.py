@@ -72,13 +72,13 @@ def test_three_readers_take_it(closed: Path, run: Trajectory) -> None:
         store = get_typestore(Stores.ROS2_JAZZY)
         states = [connection for connection in reader.connections if connection.topic == "/joint_states"]
         found = [store.deserialize_cdr(raw, "sensor_msgs/msg/JointState") for _, _, raw in reader.messages(states)]
-        assert reader.message_count == 6 * len(run.t) + 1
+        assert reader.message_count == 7 * len(run.t) + 2
         assert [message.position[0] for message in found] == run.state[:, 0].tolist()
     with storage(closed).open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()], validate_crcs=True)
         summary = reader.get_summary()
         assert summary is not None
-        assert summary.statistics.message_count == 6 * len(run.t) + 1
+        assert summary.statistics.message_count == 7 * len(run.t) + 2
         rows = list(reader.iter_decoded_messages(topics=["/left/effort_command"]))
         assert [decoded.wrench.force.x for _, _, _, decoded in rows] == run.command[:, 0].tolist()
 
@@ -173,8 +173,8 @@ def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, 
     assert f"{ticks} ticks written to killed_recovered" in result.stdout
     assert 0 < ticks < len(run.t)
     with Reader(tmp_path / "killed_recovered") as reader:
-        assert reader.message_count == 6 * ticks + 1
-        assert sum(1 for _ in reader.messages()) == 6 * ticks + 1
+        assert reader.message_count == 7 * ticks + 2
+        assert sum(1 for _ in reader.messages()) == 7 * ticks + 2
     assert {entry.name for entry in path.iterdir()} == {"bag.mcap"}
     again = command("recover", "killed")
     assert again.returncode == 2
@@ -202,7 +202,7 @@ def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: 
     assert recording.missing["left/effort_command"] == len(run.t)
     result = command("inspect", "bag")
     assert result.returncode == 0
-    assert f"lost                  left/effort_command {len(run.t)}" in result.stdout
+    assert re.search(rf"^lost +left/effort_command {len(run.t)}$", result.stdout, re.M)
     with pytest.raises(bag.BagError, match="nothing can be recovered: it holds no complete tick"):
         recover(tmp_path / "bag", tmp_path / "new")
     assert not (tmp_path / "new").exists()
@@ -255,12 +255,13 @@ def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Pat
     child.join(SECONDS)
     assert "files may not be larger; the bag is closed, and whole up to there" in sentence
     recording = bag.read(tmp_path / "bag")
-    assert len(recording.tick) in (number, number + 1)  # the tick that ends the bag may be in it
-    assert np.array_equal(recording.tick, np.arange(len(recording.tick)))
+    ticks = len(recording.tick)
+    assert ticks in (number, number + 1)  # with the tick that was refused, unless the bag had been closed before it
+    assert np.array_equal(recording.tick, np.arange(ticks))
     assert recording.lost["end"] == "files may not be larger"
     assert storage(tmp_path / "bag").stat().st_size <= LIMIT
     with Reader(tmp_path / "bag") as reader:
-        assert reader.message_count == 6 * len(recording.tick) + 1
+        assert reader.message_count == 7 * ticks + 2
 
 
 FULL = """

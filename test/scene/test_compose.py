@@ -188,4 +188,4 @@ def test_a_graph_runs_a_scene_with_sections_without_numbers(tmp_path: Path) -> N
     assert set(statuses.values()) == {0}
     recording = bag.read(graph.bag)
     assert recording.scene.values == scene.values
-    assert compare_recording(recording, ACCURACY).equal
+    assert compare_recording(recording).equal

@@ -1,4 +1,4 @@
-"""The controllers: linear state feedback of one arm, (4), (5), from state to command."""
+"""The controllers: from the state of one arm to its command, by the law of the scene or one of the user's own."""
 
 from __future__ import annotations
 
@@ -8,59 +8,94 @@ from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.node import GraspNode, run
+from grasp_ros.graph.nodes.law import OwnLaw
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE
 from grasp_ros.scene.validation import SceneError
 
+ANNOUNCE_SECONDS = 2.0
+
 
 class Controller(GraspNode):
-    """Node `left_controller` or `right_controller`; parameter wait_for_monitor, and those of the scene.
+    """Node `left_controller` or `right_controller`; parameters law, wait_for_monitor, and those of the scene.
 
     It takes its law from the scene that the plant announces and answers every state with a command of the same
-    stamp. Numbers that are set while it runs act from the next state on: it announces them with that stamp, and the
-    frame_id of its commands counts them.
+    stamp. It announces the numbers of its law before the first command that rests on them: at the beginning, after a
+    reset, and when they were set while it runs. With a law of the user's own it announces nothing. When a plant comes
+    with another scene it goes on with that.
+
+    Parameters
+    ----------
+    name : str
+        The executable: left_controller or right_controller.
+    options
+        As in `rclpy.node.Node`.
     """
 
     why_read_only = "it is fixed for a run, so that the bag and a replay agree; set it in the scene"
+    stays = True
 
-    def __init__(self, name: str) -> None:
-        super().__init__(name)
+    def __init__(self, name: str, **options: Any) -> None:
+        super().__init__(name, **options)
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor", False, "answer only once a monitor listens")
+        law = self.read_only("law", "", "a law of your own in place of the scene's, module:object")
+        self._own = OwnLaw(law) if law else None
         self._commands = self.publisher(COMMANDS[self._side])
         self._announcements = self.publisher(CHANGES[self._side])
         self._scene: Scene | None = None
         self._law: ControlLaw | None = None
         self._staged: dict[str, float] = {}
-        self._revision = 0
+        self._answered = -1  # time in ns of the last state answered; -1: none of this run
+        self._ready_to_answer = self._listening = False
+        self._held: Any = None  # the state that came before this node was ready
         self.counters["answered states"] = 0
+        self.add_on_set_parameters_callback(self._on_set)
         self.subscribe(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
     def _on_scene(self, message: Any) -> None:
-        if self._scene is not None:  # one run, one scene
+        """A plant has come: the first one, or one after another."""
+        first, self._scene = not self._listening, None
+        try:
+            self._take(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
+        except Refused as error:
+            if first:
+                raise
+            self.state = f"waits for another scene: {error}"
+            self.concern = "this scene is not answered"
+            self.get_logger().error(self.state)
             return
-        scene = scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}")
+        if self._ready_to_answer:  # this node stays; those that listen may be new
+            self._ready_to_answer = False
+            self.when(self._ready, self._start)
+
+    def _take(self, scene: Scene) -> None:
+        """Work with a scene from now on."""
         name = self._executable
         if name not in scene.controllers:
             raise SceneError(f"{SCENE.name}: has no {name}; allowed: {', '.join(scene.controllers) or 'none'}")
+        self.forget_scene()
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
-        self._scene = scene
+        self._scene, self._answered, self.concern = scene, -1, ""
         self._law = scene.system.laws[SIDES[self._side]]
-        self.add_on_set_parameters_callback(self._on_set)
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
-        assert self._scene is not None
         wanted = {parameter.name: parameter.value for parameter in parameters if "." in parameter.name}
+        if self._scene is None or not wanted:
+            return SetParametersResult(successful=True)
         try:
             self._scene.changed({**self._staged, **wanted})
         except SceneError as error:
@@ -70,46 +105,61 @@ class Controller(GraspNode):
 
     def _ready(self) -> bool:
         listeners = [JOINT_STATES, LYAPUNOV] if self._monitored else [JOINT_STATES]
-        return self._scene is not None and self.linked(self._commands, listeners)
+        informed = not self._monitored or self.linked(self._announcements, [LYAPUNOV])
+        return self._scene is not None and informed and self.linked(self._commands, listeners)
 
     def _start(self) -> None:
-        # Listening is what tells the plant that this controller is ready, so it comes last.
-        self.state = "running"
-        self.subscribe(JOINT_STATES, self._on_state)
+        self.state = f"running with {self._own.words}" if self._own else "running"
+        if not self._listening:  # this tells the plant that the controller is ready, so it comes last
+            self._listening = True
+            self.subscribe(JOINT_STATES, self._on_state)
+        self._ready_to_answer = True
+        if self._held is not None:
+            held, self._held = self._held, None
+            self._on_state(held)
 
-    def _apply(self, time_ns: int) -> None:
+    def _begin(self, time_ns: int) -> None:
+        """Let the numbers that were set act from a time on, and let all know before the command does."""
         assert self._scene is not None
+        if time_ns <= self._answered and self._own:
+            self._own.reset()
         before, self._scene = self._scene, self._scene.changed(self._staged)
         for warning in self._scene.warnings:
             if warning not in before.warnings:
                 self.get_logger().warning(warning)
-        self._law = self._scene.system.laws[SIDES[self._side]]
-        self._revision += 1
-        names, values = list(self._staged), list(self._staged.values())
-        self._announcements.publish(messages.named_list(time_ns, names, values, str(self._revision)))
         self._staged.clear()
+        self._law = self._scene.system.laws[SIDES[self._side]]
+        if self._own is None:
+            numbers = self._scene.numbers_of(self._executable)
+            self._announcements.publish(messages.named_list(time_ns, list(numbers), list(numbers.values())))
+            # What a reader has received before it receives the command, it also sees before.
+            if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
+                self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
 
     def _on_state(self, message: Any) -> None:
-        assert self._scene is not None
-        assert self._law is not None
-        time_ns = messages.to_ns(message.header.stamp)
-        if self._staged:
-            self._apply(time_ns)
-        row = message.name.index(self._side)
-        force = self._law.command(time_ns // self._scene.period_ns, message.position[row], message.velocity[row])
-        if not math.isfinite(force):  # the plant would not take it, and all would wait
-            self._fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
+        if not self._ready_to_answer:
+            self._held = message
             return
-        self._commands.publish(messages.wrench(time_ns, force, str(self._revision) if self._revision else ""))
+        if self._scene is None:
+            return
+        time_ns = messages.to_ns(message.header.stamp)
+        if self._staged or time_ns <= self._answered or self._answered < 0:
+            self._begin(time_ns)
+        assert self._law is not None
+        self._answered = time_ns
+        row, tick = message.name.index(self._side), time_ns // self._scene.period_ns
+        x, v = message.position[row], message.velocity[row]
+        if self._own:
+            force = self._own.command(self._law, tick, self._scene.time_of(tick), x, v)
+        else:
+            force = self._law.command(tick, x, v)
+        if not math.isfinite(force):  # the plant would not take it, and all would wait
+            self.fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
+            return
+        self._commands.publish(messages.wrench(time_ns, force))
         self.count("answered states")
-
-    def _fail(self, reason: str) -> None:
-        self.state = reason
-        self.get_logger().fatal(reason)
-        self.exit_code = 1
-        self.finished = True
 
 
 def main(name: str, received: Sequence[int]) -> int:
     """Run `left_controller` or `right_controller`."""
-    return run(partial(Controller, name), received)
+    return run([partial(Controller, name)], received)

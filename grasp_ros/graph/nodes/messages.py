@@ -9,6 +9,7 @@ from __future__ import annotations
 import struct
 from array import array
 from collections.abc import Mapping, Sequence
+from enum import Enum
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -17,6 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from visualization_msgs.msg import MarkerArray
 
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -29,16 +31,25 @@ TYPES = {
     "std_msgs/msg/String": String,
     "rosgraph_msgs/msg/Clock": Clock,
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
+    "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
 _STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
 _CDR_HEADER = 4
-_TEXT_LENGTH = struct.Struct("<I")  # of the frame_id behind the stamp, with the final zero
+FRAME = "line"  # in which the forces are given: x along the line on which all moves
 
 
-def qos(topic: Topic) -> QoSProfile:
-    """Reliable everywhere: a lost message would stop the lockstep."""
+class Level(Enum):
+    """Health of a node, as `DiagnosticStatus` has it."""
+
+    OK = DiagnosticStatus.OK
+    WARN = DiagnosticStatus.WARN
+    ERROR = DiagnosticStatus.ERROR
+
+
+def qos(topic: Topic, depth: int = 0) -> QoSProfile:
+    """Reliable everywhere: a lost message would stop the lockstep. A reader keeps more than a writer may."""
     return QoSProfile(
-        depth=topic.depth,
+        depth=max(depth, topic.depth),
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE,
     )
@@ -60,14 +71,6 @@ def raw_stamp_ns(cdr: bytes) -> int:
     return int(sec * NANOSECONDS + nanosec)
 
 
-def raw_frame_id(cdr: bytes) -> str:
-    """frame_id of a serialized stamped message, without deserializing it."""
-    begin = _CDR_HEADER + _STAMP.size
-    (length,) = _TEXT_LENGTH.unpack_from(cdr, begin)
-    begin += _TEXT_LENGTH.size
-    return cdr[begin : begin + length - 1].decode()
-
-
 def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array) -> JointState:
     """State (6,) of some bodies, and the input forces (3,) in N by body."""
     message = JointState(name=[NAMES[body] for body in bodies])
@@ -78,20 +81,19 @@ def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array
     return message
 
 
-def wrench(time_ns: int, force: float, frame_id: str = "") -> WrenchStamped:
+def wrench(time_ns: int, force: float) -> WrenchStamped:
     """A force along the line in N."""
     message = WrenchStamped()
     message.header.stamp = to_time(time_ns)
-    message.header.frame_id = frame_id
+    message.header.frame_id = FRAME
     message.wrench.force.x = float(force)
     return message
 
 
-def named_list(time_ns: int, names: Sequence[str], values: Sequence[float], frame_id: str = "") -> JointState:
+def named_list(time_ns: int, names: Sequence[str], values: Sequence[float]) -> JointState:
     """A stamped list of numbers with names, which plotters show by name."""
     message = JointState(name=list(names))
     message.header.stamp = to_time(time_ns)
-    message.header.frame_id = frame_id
     message.position = array("d", [float(value) for value in values])
     return message
 
@@ -111,10 +113,10 @@ def text(content: str) -> String:
     return String(data=content)
 
 
-def diagnostics(stamp: Time, name: str, summary: str, healthy: bool, values: Mapping[str, object]) -> DiagnosticArray:
+def diagnostics(stamp: Time, name: str, summary: str, level: Level, values: Mapping[str, object]) -> DiagnosticArray:
     """One node's health."""
     status = DiagnosticStatus(
-        level=DiagnosticStatus.OK if healthy else DiagnosticStatus.WARN,
+        level=level.value,
         name=name,
         message=summary,
         hardware_id="grasp_ros",

@@ -1,33 +1,30 @@
-"""What every node of the graph shares: parameters, health, the wait for its peers, and its life in a process."""
+"""What every node of the graph shares: parameters, health, and the wait for its peers."""
 
 from __future__ import annotations
 
-import sys
 import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-import rclpy
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
-from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
-from rclpy.signals import SignalHandlerOptions
+from rclpy.subscription import Subscription
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.messages import Level
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.topics import DIAGNOSTICS, Topic
+from grasp_ros.scene.topics import DEPTH, DIAGNOSTICS, Topic
 
-POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
-PEER_SECONDS = 0.02
+PEER_SECONDS = 0.05
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0
@@ -35,16 +32,37 @@ UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 
 
 class GraspNode(Node):
-    """A node with parameters, counters on /diagnostics and an end."""
+    """A node with parameters, counters on /diagnostics and an end.
+
+    Parameters
+    ----------
+    name : str
+    options
+        As in `rclpy.node.Node`: context, namespace, parameter_overrides and so on.
+
+    Attributes
+    ----------
+    finished : bool
+        Whether there is nothing left to do; `run` and `spin` end then.
+    exit_code : int
+        0, or 1 after a failure.
+    state : str
+        What it does or waits for, in words; the message of its /diagnostics.
+    counters : dict of str to number or text
+        The values of its /diagnostics.
+    """
 
     why_read_only = "set at the start only, with -p or a parameter file"
+    stays = False  # whether it goes on when a run is over
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, **options: Any) -> None:
         with _refusing():
-            super().__init__(name)
+            super().__init__(name, **options)
         self.finished = False
         self.exit_code = 0
         self.counters: dict[str, int | float | str] = {}
+        self._ended = False
+        self.concern = ""  # what is not as it should be, although the node goes on
         self.state = "waiting for peers"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
@@ -93,23 +111,42 @@ class GraspNode(Node):
             raise Refused(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
         return given
 
+    def forget_scene(self) -> None:
+        """Take back what `declare_scene` declared; rclpy itself does not let go of what is read-only."""
+        for name in [name for name in self._parameters if "." in name]:
+            del self._parameters[name], self._descriptors[name]
+
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
         """Set parameters; integers become floating-point numbers, and a refusal says why."""
         numbers = []
         for parameter in parameter_list:
             if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
                 return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
-            whole = isinstance(parameter.value, int) and not isinstance(parameter.value, bool)
+            whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
             numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
         return super().set_parameters_atomically(numbers)
+
+    def _is_whole(self, name: str) -> bool:
+        """Whether a parameter was declared as an integer for good."""
+        if not self.has_parameter(name) or self.describe_parameter(name).dynamic_typing:
+            return False
+        return bool(self.get_parameter(name).type_ == RosParameter.Type.INTEGER)
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the graph."""
         return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
 
-    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> None:
+    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
         """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
-        self.create_subscription(messages.TYPES[topic.type], topic.name, callback, messages.qos(topic), raw=raw)
+        qos = messages.qos(topic, DEPTH)
+        return self.create_subscription(messages.TYPES[topic.type], topic.name, callback, qos, raw=raw)
+
+    def sources(self, topic: Topic) -> list[str]:
+        """Full names of the nodes that publish on a topic, as far as discovery has them."""
+        return sorted(
+            f"{writer.node_namespace.rstrip('/')}/{writer.node_name}"
+            for writer in self.get_publishers_info_by_topic(topic.name)
+        )
 
     def wall_timer(self, seconds: float, callback: Callable[[], None]) -> Any:
         """Timer on wall time: simulated time waits for the nodes, so no node may wait for it."""
@@ -141,9 +178,13 @@ class GraspNode(Node):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
 
-    def count(self, counter: str) -> None:
-        """Add one to a counter."""
-        self.counters[counter] = int(self.counters[counter]) + 1
+    def delivered(self, publisher: Publisher) -> bool:
+        """Whether every reader that is matched has what was published; what it received it will also see first."""
+        return bool(publisher.wait_for_all_acked(Duration(seconds=0)))
+
+    def count(self, counter: str, number: int = 1) -> None:
+        """Add to a counter."""
+        self.counters[counter] = int(self.counters[counter]) + number
 
     def flush(self, *publishers: Publisher) -> None:
         """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
@@ -154,10 +195,26 @@ class GraspNode(Node):
     def report(self) -> None:
         """Publish the counters."""
         stamp = self.get_clock().now().to_msg()
-        healthy = self.exit_code == 0 and not any(self.counters[key] for key in self.counters if key.startswith("lost"))
+        lost = any(self.counters[key] for key in self.counters if key.startswith("lost"))
+        level = Level.ERROR if self.exit_code else Level.WARN if lost or self.concern else Level.OK
+        summary = f"{self.state}; {self.concern}" if self.concern else self.state
         self._diagnostics.publish(
-            messages.diagnostics(stamp, self.get_fully_qualified_name(), self.state, healthy, self.counters)
+            messages.diagnostics(stamp, self.get_fully_qualified_name(), summary, level, self.counters)
         )
+
+    def fail(self, reason: str) -> None:
+        """End with a sentence, and with the exit status 1."""
+        self.state = reason
+        self.get_logger().fatal(reason)
+        self.exit_code = 1
+        self.finished = True
+
+    def end(self) -> None:
+        """Close and destroy, once."""
+        if not self._ended:
+            self._ended = True
+            self.close()
+            self.destroy_node()
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
@@ -181,43 +238,3 @@ def _descriptor(parameter: Parameter) -> ParameterDescriptor:
     if not parameter.whole and not parameter.several:
         descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
     return descriptor
-
-
-def run(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
-    """Run one node until it has finished or a signal has been received; returns the exit status of the process.
-
-    0 after a finished run or a signal, 2 if the node refuses its parameters, otherwise the node's own status.
-    The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
-    raises.
-    """
-    try:
-        return _live(make, received)
-    except Refused as error:
-        print(error, file=sys.stderr)
-        return 2
-
-
-def _live(make: Callable[[], GraspNode], received: Sequence[int]) -> int:
-    node = None
-    try:
-        _init()
-        node = make()
-        executor = EventsExecutor()
-        executor.add_node(node)
-        while not (node.finished or received):
-            executor.spin_once(timeout_sec=POLL_SECONDS)
-        executor.shutdown()
-    finally:
-        if node is not None:
-            node.close()
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return node.exit_code
-
-
-def _init() -> None:
-    """Start rclpy with the arguments of the process."""
-    try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # the base of what rcl raises
-        raise Refused(f"--ros-args: {error}") from None

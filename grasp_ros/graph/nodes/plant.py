@@ -1,7 +1,6 @@
 """The plant: owner of time. It integrates the collision dynamics and publishes the states.
 
-Lockstep: publish state k, wait for both commands stamped k, advance exactly one period with them. The result does
-not depend on the load of the machine.
+When it advances is decided by one of two loops, `lockstep` (the default) and `free_running`, and by those who steer it.
 """
 
 from __future__ import annotations
@@ -9,151 +8,175 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
-import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, Integrator, Status, compile_kernels
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
 from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.node import GraspNode, run
+from grasp_ros.graph.nodes.free_running import FreeRunning
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.lockstep import Lockstep
+from grasp_ros.graph.nodes.steering import Steering
+from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.running import Running
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
-from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, SCENE, WINDOW
+from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
-UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
+UNWATCHED_REPORTS = 4  # in a row without a monitor: its last value may be on the way, and a busy machine stalls
 
 
-class Plant(GraspNode):
-    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, and those of the scene."""
+class Plant(SteppedNode):
+    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, those of its loop, and those of the scene.
+
+    Parameters
+    ----------
+    options
+        As in `rclpy.node.Node`.
+    """
 
     why_read_only = "it describes what is simulated, which does not change in a run; set it in the scene or with -p"
 
-    def __init__(self) -> None:
-        super().__init__("plant")
+    def __init__(self, **options: Any) -> None:
+        super().__init__("plant", **options)
         name = self.read_only("scene", "case_01", "name of a scene of the package, or path of a .yaml file")
-        accuracy = self.read_only("accuracy", ACCURACY, "relative size of the first neglected term of a contact")
-        self._monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
+        self._accuracy = self.read_only("accuracy", ACCURACY, "relative size of the first neglected term of a contact")
+        self.monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
         progress = self.read_only("progress", False, "show a progress bar on the terminal")
+        free = self.read_only("free_running", False, "follow the wall clock instead of waiting for the commands")
+        steering = Steering(self)
         scene = scenes.load(name)
-        self._scene = scene.changed(self.declare_scene(scene, "plant"))
-        for warning in self._scene.warnings:
+        running = self._read_running(free, list(scene.controllers.values()))
+        self.scene = scene.changed(self.declare_scene(scene, "plant"))
+        for warning in self.scene.warnings:
             self.get_logger().warning(warning)
-        self._system = self._scene.system
         if not kernels_on_disk():
             self.get_logger().info(COMPILING)
         compile_kernels()
-        integrator = Integrator(self._system, continuous=False, accuracy=accuracy)
-        self._plant = SampledPlant(self._system, self._scene.period_ns, integrator)
-        self._recorded = -1  # last tick that the monitor has complete
-        self._commands: dict[int, float] = {}
+        self._plant = self._new_plant()
+        self.resets = 0
         self._begin = math.nan
-        self.counters.update(tick=0, **{"stale commands": 0, "repeated commands": 0, "refused commands": 0})
-        self._bar = tqdm(total=self._scene.ticks, unit="tick", desc=self._scene.name, disable=not progress)
+        self.counters.update(tick=0, resets=0)
+        self._bar = tqdm(total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=not progress)
         self._states = self.publisher(JOINT_STATES)
-        self._forces = [(self.publisher(output.topic), output.value) for output in self._scene.outputs]
+        self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
         self._simulated = self.publisher(CLOCK)
-        self._description = self.publisher(SCENE)
-        self._description.publish(messages.text(self._scene.to_yaml()))
-        for side, topic in zip(self._system.laws, self._scene.controllers.values(), strict=True):
-            self.subscribe(topic, partial(self._on_command, side))
+        self._descriptions = [self.publisher(RUN), self.publisher(SCENE)]
+        for publisher, text in zip(self._descriptions, (running.to_yaml(), self.scene.to_yaml()), strict=True):
+            publisher.publish(messages.text(text))
+        self.loop = FreeRunning(self, steering, running) if free else Lockstep(self, steering)
         self._unwatched = 0  # reports in a row without a monitor
-        if self._monitored:
-            self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         if progress:
             self.wall_timer(0.1, self._show)
         self.when(self._ready, self._start)
+
+    def _read_running(self, free: bool, topics: Sequence[Any]) -> Running:
+        """How it runs, from its parameters; those of the free-running loop exist only there."""
+        if not free:
+            return Running(self._accuracy)
+        factor = self.read_only("real_time_factor", 1.0, "simulated seconds in a second")
+        if not factor:
+            raise Refused("real_time_factor: 0.0 is not allowed; allowed: a number > 0, or free_running:=false")
+        timeouts, reactions = {}, {}
+        for topic in topics:
+            side = topic.name.split("/")[0]
+            timeouts[side] = self.read_only(f"{side}_timeout_s", 0.1, "simulated time without a command, s")
+            reactions[side] = self.read_only(f"{side}_on_timeout", "zero", "what then acts: hold, zero or stop")
+        return Running(self._accuracy, factor, timeouts, reactions)
+
+    def _new_plant(self) -> SampledPlant:
+        system = self.scene.system
+        integrator = Integrator(system, continuous=False, accuracy=self._accuracy)
+        return SampledPlant(system, self.scene.period_ns, integrator)
+
+    @property
+    def tick(self) -> int:
+        """Control periods done since the start or the last reset."""
+        return self._plant.tick
+
+    @property
+    def started(self) -> bool:
+        """Whether the first state has been published."""
+        return not math.isnan(self._begin)
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant and that the monitor is still there."""
         super().report()
         self._insist()
-        watched = not self._monitored or math.isnan(self._begin) or self.count_publishers(LYAPUNOV.name) > 0
+        watched = not self.monitored or not self.started or self.count_publishers(LYAPUNOV.name) > 0
         self._unwatched = 0 if watched else self._unwatched + 1
-        if self._unwatched > 1 and not self.finished:  # at first its last value may still be on the way
-            self._fail(f"{LYAPUNOV.name}: the monitor that this run waits for has ended")
+        if self._unwatched >= UNWATCHED_REPORTS and not self.finished:
+            self.fail(f"{LYAPUNOV.name}: the monitor that this run waits for has ended")
+        self.loop.report()
 
     def _insist(self) -> None:
-        if self.count_publishers(self._states.topic_name) > 1:
+        others = self.sources(JOINT_STATES)
+        if len(others) > 1:
             topic = self._states.topic_name
-            self._fail(f"{topic}: another plant publishes here; use another ROS_DOMAIN_ID or namespace")
+            self.fail(f"{topic}: another plant publishes here, sources {', '.join(others)};"
+                      " use another ROS_DOMAIN_ID or namespace")
 
     def _ready(self) -> bool:
         self._insist()
-        monitor = [LYAPUNOV] if self._monitored else []
-        return self.linked(self._states, [*self._scene.controllers.values(), *monitor]) and all(
+        missing = self.loop.missing()
+        monitor = [LYAPUNOV] if self.monitored else []
+        missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
+        self.state = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
+        # Who has been here with another plant must have this scene before its first state.
+        known = all(publisher.get_subscription_count() >= self.count_subscribers(publisher.topic_name)
+                    and self.delivered(publisher) for publisher in self._descriptions)
+        return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _ in self._forces
         )
 
     def _start(self) -> None:
         self.state = "running"
         self._begin = time.monotonic()
-        self._publish()
-        if not self._system.laws:  # no command will ever come
-            self.wall_timer(UNCONTROLLED_SECONDS, self._advance)
+        self.publish_state()
+        self.loop.start()
 
-    def _publish(self) -> None:
+    def publish_state(self) -> None:
+        """Send the state of the current tick and what belongs to it."""
         tick, state = self._plant.tick, self._plant.state
-        time_ns = tick * self._scene.period_ns
+        time_ns = tick * self.scene.period_ns
         self._simulated.publish(messages.clock(time_ns))
         for publisher, value in self._forces:
-            publisher.publish(messages.wrench(time_ns, value(self._system, tick, state)))
-        self._states.publish(messages.joint_state(time_ns, self._system.present, state, self._plant.effort))
+            publisher.publish(messages.wrench(time_ns, value(self.scene.system, tick, state)))
+        self._states.publish(messages.joint_state(time_ns, self.scene.system.present, state, self._plant.effort))
 
-    def _on_command(self, side: int, message: Any) -> None:
-        force = message.wrench.force.x
-        if messages.to_ns(message.header.stamp) != self._plant.tick * self._scene.period_ns:
-            self.count("stale commands")
-        elif not math.isfinite(force):
-            self.count("refused commands")
-        elif side in self._commands:
-            self.count("repeated commands")
-        else:
-            self._commands[side] = force
-            self._advance()
+    def advance(self) -> None:
+        """Do what its loop finds due."""
+        self.loop.advance()
 
-    def _on_lyapunov(self, cdr: bytes) -> None:
-        self._recorded = max(self._recorded, messages.raw_stamp_ns(cdr) // self._scene.period_ns)
-        self._advance()
-
-    def _advance(self) -> None:
-        tick = self._plant.tick
-        last = tick == self._scene.ticks
-        lead = 0 if last else WINDOW
-        complete = len(self._commands) == len(self._system.laws)
-        if self.finished or not complete or (self._monitored and tick - self._recorded > lead):
-            return
-        if last:
-            self._finish()
-            return
-        self._plant.step(self._take_commands())
+    def step(self, forces: Array) -> None:
+        """Advance one period with the answers (3,) in N by body to the current state; publish the next."""
+        self._plant.step(forces)
         if self._plant.status is not Status.DONE:
-            self._fail(self._plant.stop)
+            self.fail(self._plant.stop)
             return
         self.counters["tick"] = self._plant.tick
-        self._publish()
+        self.publish_state()
 
-    def _take_commands(self) -> Array:
-        forces = np.zeros(3)
-        for side, force in self._commands.items():
-            forces[side] = force
-        self._commands.clear()
-        return forces
+    def restart(self) -> None:
+        """Put time and state back to the beginning of the scene, and publish the first state again."""
+        self.get_logger().info(f"reset at tick {self.tick}")
+        self._plant = self._new_plant()
+        self.resets += 1
+        self.counters.update(tick=0, resets=self.resets)
+        self._begin = time.monotonic()
+        self._bar.reset()
+        self.publish_state()
 
-    def _finish(self) -> None:
+    def finish(self) -> None:
+        """End: the horizon has been reached and answered."""
         self.state = "finished"
         self.finished = True
-        speed = self._scene.ticks / (time.monotonic() - self._begin)
-        self.get_logger().info(f"finished {self._scene.ticks} ticks at {speed:.1f} ticks/s")
-
-    def _fail(self, reason: str) -> None:
-        self.state = reason
-        self.get_logger().fatal(reason)
-        self.exit_code = 1
-        self.finished = True
+        speed = self.scene.ticks / (time.monotonic() - self._begin)
+        self.get_logger().info(f"finished {self.scene.ticks} ticks at {speed:.1f} ticks/s")
 
     def _show(self) -> None:
         self._bar.update(self._plant.tick - self._bar.n)
@@ -168,4 +191,4 @@ class Plant(GraspNode):
 
 def main(_: str, received: Sequence[int]) -> int:
     """Run the plant."""
-    return run(Plant, received)
+    return run([Plant], received)

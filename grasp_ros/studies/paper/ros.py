@@ -35,7 +35,7 @@ def through_the_graph(cases: Cases) -> list[tuple[str, ...]]:
             finally:
                 graph.stop()
             recording = bag.read(graph.bag)
-            found = compare_recording(recording, ACCURACY)
+            found = compare_recording(recording)
         far = "" if found.offset is None else f"{float(found.offset[0::2].max()):.3g}"
         equal = "equal, bit for bit" if found.equal else "NOT EQUAL"
         rows.append((f"No. {number}", str(len(recording.t)), equal, far))

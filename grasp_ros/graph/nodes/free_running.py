@@ -1,0 +1,174 @@
+"""Free-running: the plant follows the wall clock, and the last command of each controller is held.
+
+A period is computed when its wall time has passed, with the commands that are there then. So a controller that answers
+within a period acts as in lockstep; a later one acts later, and its age says by how much.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.steering import Steering
+from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.nodes.timing import Timing
+from grasp_ros.graph.running import Running
+from grasp_ros.physics.model import Array
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.topics import TIMING
+
+SHORTEST_SECONDS = 5e-4  # between looks at the clock
+BURST_SECONDS = 0.05  # of catching up at a time, so that commands and services get their turn
+PATIENCE_SECONDS = 0.5  # further behind than this the plant gives up wall time, never a state
+
+
+class Held:
+    """The command of one controller that is held.
+
+    Attributes
+    ----------
+    force : float, N
+    answers : int
+        Tick of the state that it answers; the tick of its arrival where it carries no stamp.
+    arrival : int
+        Tick at which it came, for the timeout.
+    late : bool
+        Whether the timeout has passed.
+    """
+
+    def __init__(self) -> None:
+        self.force, self.answers, self.arrival, self.late = 0.0, 0, 0, False
+
+
+class FreeRunning:
+    """Advances the plant with the wall clock.
+
+    Parameters
+    ----------
+    plant : SteppedNode
+    steering : Steering
+    running : Running
+        Real-time factor, timeouts and reactions.
+
+    Attributes
+    ----------
+    topics : list of Topic
+        None: it waits for no controller.
+    """
+
+    def __init__(self, plant: SteppedNode, steering: Steering, running: Running) -> None:
+        self._plant, self._steering, self._running = plant, steering, running
+        self.topics: list[Any] = []
+        self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
+        self._timeouts = {
+            side: max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
+            for side, seconds in running.timeouts.items()
+        }
+        plant.counters.update({"stale commands": 0, "refused commands": 0, "timeouts": 0})
+        commands = plant.scene.controllers.values()
+        self._sides = [topic.name.split("/")[0] for topic in commands]
+        self._held = {side: Held() for side in self._sides}
+        self._timing = Timing(self._sides, self._period)
+        self._quality = plant.publisher(TIMING)
+        self._sources = {
+            topic: plant.subscribe(topic, partial(self._on_command, side))
+            for topic, side in zip(commands, self._sides, strict=True)
+        }
+        self._anchor = math.nan  # wall time of tick 0
+
+    def missing(self) -> list[str]:
+        """Nothing: it begins without controllers."""
+        return []
+
+    def start(self) -> None:
+        """Begin at the current tick."""
+        self._set_anchor()
+        self._plant.wall_timer(max(self._period, SHORTEST_SECONDS), self.advance)
+
+    def _set_anchor(self) -> None:
+        self._anchor = time.monotonic() - self._plant.tick * self._period
+
+    def _on_command(self, side: str, message: Any) -> None:
+        force, stamp = message.wrench.force.x, messages.to_ns(message.header.stamp)
+        plant, held = self._plant, self._held[side]
+        tick = stamp // plant.scene.period_ns if stamp else plant.tick
+        if not math.isfinite(force) or tick > plant.tick:
+            plant.count("refused commands")
+        elif tick < held.answers:
+            plant.count("stale commands")
+        else:
+            held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
+
+    def advance(self) -> None:
+        """Compute the periods that are over."""
+        plant = self._plant
+        if plant.finished or math.isnan(self._anchor):
+            return
+        if self._steering.reset_due:
+            self._held = {side: Held() for side in self._sides}
+            self._steering.reset_done()
+            self._set_anchor()
+        if self._steering.steps:  # asked for: not with the clock
+            while not plant.finished and self._steering.steps and self._steering.go_on():
+                self._step()
+        if self._steering.stands:
+            self._set_anchor()
+            return
+        self._catch_up()
+
+    def _catch_up(self) -> None:
+        plant, begin = self._plant, time.monotonic()
+        if begin - self._anchor - plant.tick * self._period > PATIENCE_SECONDS:
+            self._timing.lost += begin - self._anchor - plant.tick * self._period
+            self._set_anchor()
+        while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
+            due = self._anchor + (plant.tick + 1) * self._period
+            if now < due:
+                return
+            if plant.at_end:
+                plant.finish()
+                return
+            self._timing.period(now, now - due)
+            self._step()
+
+    def _step(self) -> None:
+        forces: Array = np.zeros(3)
+        for number, side in zip(self._plant.scene.system.laws, self._sides, strict=True):
+            held = self._held[side]
+            if self._plant.tick - held.arrival >= self._timeouts[side]:
+                self._time_out(side, held)
+            forces[number] = held.force
+            self._timing.age(side, self._plant.tick - held.answers)
+        if not self._plant.finished:
+            self._plant.step(forces)
+
+    def _time_out(self, side: str, held: Held) -> None:
+        if held.late:
+            return
+        held.late = True
+        self._plant.count("timeouts")
+        reaction = self._running.reactions[side]
+        words = f"{side}: no command for {self._running.timeouts[side]:g} s at tick {self._plant.tick}: {reaction}"
+        if reaction == "stop":
+            self._plant.fail(words)
+            return
+        self._plant.get_logger().warning(words)
+        if reaction == "zero":
+            held.force = 0.0
+
+    def report(self) -> None:
+        """Publish the quality of the last second; say who disturbs it."""
+        several = [f"{topic.name} has the sources {' and '.join(self._plant.sources(topic))}"
+                   for topic, source in self._sources.items() if source.get_publisher_count() > 1]
+        late = [f"no command of {side}" for side, held in self._held.items() if held.late]
+        self._plant.concern = "; ".join(several + late)
+        values = self._timing.take()
+        if values:
+            time_ns = self._plant.tick * self._plant.scene.period_ns
+            self._quality.publish(messages.named_list(time_ns, list(values), list(values.values())))
+            self._plant.counters.update({name: f"{value:.6g}" for name, value in values.items()})

@@ -1,0 +1,127 @@
+"""What the monitor computes at a tick: V of laws that are known, the energy of the plant alone, and its balance."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.energy import energy, energy_balance
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import SIDES
+
+EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
+
+
+class Announcement(NamedTuple):
+    """Numbers of one controller's law, and the time from which they act."""
+
+    time_ns: int
+    numbers: Mapping[str, float]
+    cdr: bytes  # as it came
+
+
+class Judge:
+    """Knows the laws that were announced, and judges states and commands by them.
+
+    Parameters
+    ----------
+    scene : Scene
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
+        self._acting = dict.fromkeys(SIDES, -1)  # time in ns of the last announcement that acts
+        self._known: set[str] = set()
+        self._before: tuple[int, Array, Array] | None = None  # time in ns, state and external forces
+
+    @property
+    def unknown(self) -> list[str]:
+        """Sides whose controllers have announced no law so far."""
+        return [name.removesuffix("_controller") for name in self._scene.controllers
+                if name.removesuffix("_controller") not in self._known]
+
+    def announce(self, side: str, announcement: Announcement) -> None:
+        """Take note of a law that will act.
+
+        Raises
+        ------
+        Refused
+            If it is not a law of this scene.
+        """
+        wanted = set(self._scene.numbers_of(f"{side}_controller"))
+        if set(announcement.numbers) != wanted:
+            raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"
+                          f" {', '.join(sorted(wanted)) or 'nothing, this scene has no such controller'}")
+        self._scene.changed(announcement.numbers)
+        if self._before is None and not self._known:  # what came before is of the run before: topics keep the last one
+            self._waiting[side].clear()
+        self._waiting[side].append(announcement)
+
+    def restart(self) -> None:
+        """Forget the last tick and what it was announced for: time went back."""
+        self._before = None
+        self._known.clear()
+        self._acting = dict.fromkeys(self._acting, -1)
+
+    def begin(self, time_ns: int) -> list[tuple[str, bytes]]:
+        """Let the laws act that were announced up to a time.
+
+        Their times ascend; one that does not was announced after a reset that is still to come. Returns their sides and
+        messages.
+        """
+        begun = []
+        for side, waiting in self._waiting.items():
+            while waiting and self._acting[side] < waiting[0].time_ns <= time_ns:
+                announcement = waiting.popleft()
+                self._acting[side] = announcement.time_ns
+                self._known.add(side)
+                if dict(announcement.numbers) != self._scene.numbers_of(f"{side}_controller"):
+                    self._scene = self._scene.changed(announcement.numbers)
+                begun.append((side, announcement.cdr))
+        return begun
+
+    def judge(self, time_ns: int, state: Array, inputs: Array, commands: Mapping[str, float]) -> list[float]:
+        """What `lyapunov` publishes at a tick, see `topics.LYAPUNOV_NAMES`.
+
+        Parameters
+        ----------
+        time_ns : int
+        state : array (6,), m and m/s
+        inputs : array (3,), N by body
+            Forces of the controllers over the last period.
+        commands : mapping of str to float, N
+            Answers to this state, by side.
+        """
+        system = self._scene.system
+        tick = time_ns // self._scene.period_ns
+        external = system.external_at(tick)
+        work = residual = alarm = 0.0
+        if self._before is not None and self._before[0] + self._scene.period_ns == time_ns:
+            balance = energy_balance(system, self._before[1], state, inputs + self._before[2])
+            work, residual, alarm = float(balance.work), float(balance.residual), float(balance.alarm)
+        self._before = time_ns, state, external
+        alone = energy(system, state, external, feedback=False)
+        closed = not self.unknown and self._explains(tick, state, commands)
+        level = energy(system, state, external) if closed else None
+        V = [float(value) for value in level[:3]] if level else [np.nan] * 3
+        return [*V, float(alone.mode), residual, alarm, float(alone.V_c), work, float(closed)]
+
+    def _explains(self, tick: int, state: Array, commands: Mapping[str, float]) -> bool:
+        """Whether the commands are those of the laws that were announced, but for rounding."""
+        for side, force in commands.items():
+            body = SIDES[side]
+            law = self._scene.system.laws[body]
+            x, v = state[COLUMN[body]], state[COLUMN[body] + 1]
+            expected = law.command(tick, x, v)
+            if force != expected:
+                size = abs(law.position_gain) * (abs(x) + abs(law.set_point)) + abs(law.velocity_gain * v)
+                if not abs(force - expected) <= EXPLAINED * (size + abs(law.feed_forward)):
+                    return False
+        return True

@@ -1,0 +1,71 @@
+"""The life of nodes in a process: one or several of them in one thread, until they have finished."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Sequence
+
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.signals import SignalHandlerOptions
+
+from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.physics.errors import Refused
+
+POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
+
+
+def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> int:
+    """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
+
+    0 after a finished run or a signal, 2 if a node refuses its parameters, otherwise the first status of a node that is
+    not 0. The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
+    raises.
+    """
+    nodes: list[GraspNode] = []
+    try:
+        _init()
+        for make in makes:
+            nodes.append(make())
+        spin(nodes, received)
+    except Refused as error:
+        print(error, file=sys.stderr)
+        return 2
+    finally:
+        for node in nodes:
+            node.end()
+        rclpy.try_shutdown()
+    return next((node.exit_code for node in nodes if node.exit_code), 0)
+
+
+def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
+    """Run nodes of one context in this thread until plant and monitor, or whatever there is, have finished.
+
+    Controllers go on for the next plant and end when nothing else is left. All nodes are closed and destroyed at the
+    end, also when it comes by an exception.
+
+    Parameters
+    ----------
+    nodes : sequence of GraspNode
+    received : sequence of int, optional
+        Ends when something is in it, say a signal.
+    """
+    executor = EventsExecutor(context=nodes[0].context)
+    try:
+        for node in nodes:
+            executor.add_node(node)
+        waited_for = [node for node in nodes if not node.stays] or list(nodes)
+        while not (received or all(node.finished for node in waited_for) or any(node.exit_code for node in nodes)):
+            executor.spin_once(timeout_sec=POLL_SECONDS)
+        executor.shutdown()
+    finally:
+        for node in nodes:
+            node.end()
+
+
+def _init() -> None:
+    """Start rclpy with the arguments of the process."""
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the base of what rcl raises
+        raise Refused(f"--ros-args: {error}") from None

@@ -1,0 +1,64 @@
+"""Publishes a bag again, with its clock, for whoever wants to look at it with other tools."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.effects.base import NANOSECONDS
+
+DISCOVERY_SECONDS = 1.0  # before the first message, for readers to be found
+LOOK_SECONDS = 1e-3
+
+
+class Player(GraspNode):
+    """Node `player`; parameters bag and rate.
+
+    Parameters
+    ----------
+    options
+        As in `rclpy.node.Node`.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__("player", **options)
+        path = Path(self.read_only("bag", "", "directory of the bag"))
+        self._rate = self.read_only("rate", 1.0, "seconds of the bag in a second")
+        if not 0.0 < self._rate < math.inf:
+            raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
+        self._rows = bag.raw(path)
+        self._next = next(self._rows, None)
+        self._outputs: dict[str, Any] = {}
+        for name, topic in bag.names(path).items():
+            self._outputs[name] = self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
+        self.counters["messages"] = 0
+        self._begin = time.monotonic() + DISCOVERY_SECONDS
+        self.state = "playing"
+        self.wall_timer(LOOK_SECONDS, self._play)
+
+    def _play(self) -> None:
+        now = (time.monotonic() - self._begin) * self._rate
+        while self._next is not None and self._next.time_ns / NANOSECONDS <= now:
+            self._outputs[self._next.topic].publish(self._next.cdr)
+            self.count("messages")
+            self._next = next(self._rows, None)
+        if self._next is None:
+            self.finished = True
+
+    def close(self) -> None:
+        """Let every reader have the end."""
+        if self.finished:
+            self.flush(*self._outputs.values())
+
+
+def main(_: str, received: Sequence[int]) -> int:
+    """Run the player."""
+    return run([Player], received)

@@ -1,0 +1,114 @@
+"""Steering a plant: pause, resume, step, reset and status, as services.
+
+The meaning is that of the standard `simulation_interfaces`, whose package is not among the wheels; the types are those
+of std_srvs. A service that finds the plant in the wrong state does nothing and says why.
+"""
+
+from __future__ import annotations
+
+import json
+
+from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
+from std_srvs.srv import Trigger
+
+from grasp_ros.graph.nodes.stepped import SteppedNode
+
+MOST_STEPS = 10**9
+
+
+class Steering:
+    """Services `~/pause`, `~/resume`, `~/step`, `~/reset`, `~/status`, and the parameter `steps` of `~/step`.
+
+    Parameters
+    ----------
+    plant : SteppedNode
+
+    Attributes
+    ----------
+    steps : int
+        Control periods that are still to be done although the plant is paused.
+    reset_due : bool
+        Whether the plant is to be put back once its current state has been answered.
+    """
+
+    def __init__(self, plant: SteppedNode) -> None:
+        self._plant = plant
+        self._paused = plant.read_only("paused", False, "begin paused, at the first state")
+        self.steps = 0
+        self.reset_due = False
+        plant.declare_parameter("steps", 1, ParameterDescriptor(
+            description="control periods of one call of the service step",
+            integer_range=[IntegerRange(from_value=1, to_value=MOST_STEPS, step=1)],
+        ))
+        for name, action in (("pause", self._pause), ("resume", self._resume), ("step", self._step),
+                             ("reset", self._reset), ("status", self._status)):
+            plant.create_service(Trigger, f"~/{name}", action)
+
+    def go_on(self) -> bool:
+        """Whether the plant may advance now; takes one of the steps that were asked for."""
+        if not self._paused:
+            return True
+        if not self.steps:
+            return False
+        self.steps -= 1
+        return True
+
+    @property
+    def stands(self) -> bool:
+        """Whether the plant is paused without steps to go."""
+        return self._paused and not self.steps
+
+    def reset_done(self) -> None:
+        """Put the plant back; called by its loop when the current state has been answered."""
+        self.reset_due = False
+        self.steps = 0
+        self._plant.restart()
+
+    def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._change(response, paused=True)
+
+    def _resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        return self._change(response, paused=False)
+
+    def _change(self, response: Trigger.Response, paused: bool) -> Trigger.Response:
+        word = "paused" if paused else "running"
+        if self._paused is paused:
+            return _answer(response, False, f"already {word} at tick {self._plant.tick}")
+        self._paused, self.steps = paused, 0
+        self._plant.advance()
+        return _answer(response, True, f"{word} at tick {self._plant.tick}")
+
+    def _step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        plant, wanted = self._plant, int(self._plant.get_parameter("steps").value)
+        left = plant.scene.ticks - plant.tick
+        if not self._paused:
+            return _answer(response, False, "not paused; allowed: step of a paused plant")
+        if self.steps or self.reset_due:
+            return _answer(response, False, f"{self.steps} steps are still to go, or a reset; allowed: one at a time")
+        if wanted > left:
+            return _answer(response, False, f"steps: {wanted} is not allowed; allowed: at most {left}")
+        self.steps, goal = wanted, plant.tick + wanted
+        plant.advance()
+        return _answer(response, True, f"steps to tick {goal}")
+
+    def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        if self.reset_due:
+            return _answer(response, False, "a reset is already on its way")
+        self.reset_due = True
+        number = self._plant.resets + 1
+        self._plant.advance()
+        return _answer(response, True, f"reset number {number}, as soon as tick {self._plant.tick} is answered")
+
+    def _status(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        plant = self._plant
+        waiting = not plant.state.startswith("running")
+        return _answer(response, True, json.dumps({
+            "state": plant.state if waiting else "paused" if self.stands else "stepping" if self._paused else "running",
+            "tick": plant.tick, "ticks": plant.scene.ticks, "time_s": plant.scene.time_of(plant.tick),
+            "steps": self.steps, "resets": plant.resets, "resetting": self.reset_due, "scene": plant.scene.name,
+        }))
+
+
+def _answer(response: Trigger.Response, success: bool, text: str) -> Trigger.Response:
+    response.success, response.message = success, text
+    return response

@@ -1,0 +1,71 @@
+"""How well a free-running plant keeps its time, over a second: what it publishes on the topic `timing`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+PERCENTILE = 99.0
+
+
+class Timing:
+    """Collects lateness, intervals and the ages of commands.
+
+    Parameters
+    ----------
+    sides : sequence of str
+        Who has a controller.
+    period : float, s
+        Control period in wall time.
+
+    Attributes
+    ----------
+    lost : float, s
+        Wall time given up since the start, because the plant was too far behind.
+    """
+
+    def __init__(self, sides: Sequence[str], period: float) -> None:
+        self._sides, self._period = sides, period
+        self.lost = 0.0
+        self._overruns = 0
+        self._before = math.nan
+        self._clear()
+
+    def _clear(self) -> None:
+        self._intervals: list[float] = []
+        self._lateness: list[float] = []
+        self._ages: dict[str, list[int]] = {side: [] for side in self._sides}
+
+    def period(self, now: float, late: float) -> None:
+        """One control period, computed at a wall time in s, late by so much."""
+        if not math.isnan(self._before):
+            self._intervals.append(now - self._before)
+        self._before = now
+        self._lateness.append(late)
+        self._overruns += late > self._period
+
+    def age(self, side: str, periods: int) -> None:
+        """Age of the command that acts, in control periods: how much older the state is that it answers."""
+        self._ages[side].append(periods)
+
+    def take(self) -> dict[str, float]:
+        """What was collected since the last call, by name; nothing where there was no period.
+
+        `period_s` is the mean interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were
+        computed, `overruns` how many were later than a whole period since the start, and `left_age_p99` and so on the
+        age of the commands in periods.
+        """
+        if not self._lateness or not self._intervals:
+            return {}
+        values = {
+            "period_s": float(np.mean(self._intervals)), "jitter_s": float(np.std(self._intervals)),
+            "late_p99_s": float(np.percentile(self._lateness, PERCENTILE)), "overruns": float(self._overruns),
+            "lost_s": self.lost,
+        }
+        for side, ages in self._ages.items():
+            values[f"{side}_age_p99"] = float(np.percentile(ages, PERCENTILE))
+            values[f"{side}_age_max"] = float(np.max(ages))
+        self._clear()
+        return values

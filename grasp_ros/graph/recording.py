@@ -1,0 +1,126 @@
+"""What is in a bag, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.graph.running import Running
+from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.scene.effects.force import SECTIONS
+from grasp_ros.scene.topics import EXTERNAL_FORCES, LYAPUNOV_NAMES
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is in a bag.
+
+    Attributes
+    ----------
+    path : Path
+    scene : Scene
+    versions : dict of str to str
+        What the recording process ran with.
+    counts : dict of str to int
+        Messages by topic, of those that have one per tick.
+    tick : int array (n,)
+        Ticks whose state is in the bag.
+    state : array (n, 6), m and m/s
+        NaN for a body that is not there.
+    effort, command : arrays (n, 2), N
+        Forces of the controllers that acted until the tick, commands answered to it, which act later if there is a
+        delay; 0 without a controller, NaN where missing.
+    outputs : dict of str to array (n,), N
+        Impact and external forces by topic; NaN where missing.
+    lyapunov : array (n, 9)
+        What the monitor computed, see `topics.LYAPUNOV_NAMES`; NaN where missing.
+    changes : dict of int to dict of str to float
+        Numbers that were set while the graph ran, by the tick from which they act.
+    running : Running
+        How the plant ran: in lockstep or with the wall clock, and with which accuracy.
+    starts : int array (k,)
+        Ticks of the bag at which the plant began the scene, again after each reset; the first is 0 in a bag that has
+        the beginning. `tick` and `t` go on where a reset puts simulated time back.
+    lost : dict of str to str
+        How the recording ended and what is missing from it, as the bag itself says; if it was not closed, what the
+        reader has found.
+    """
+
+    path: Path
+    scene: scenes.Scene
+    versions: dict[str, str]
+    counts: dict[str, int]
+    tick: np.ndarray
+    state: Array
+    effort: Array
+    command: Array
+    outputs: dict[str, Array]
+    lyapunov: Array
+    changes: dict[int, dict[str, float]]
+    running: Running
+    starts: np.ndarray
+    lost: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def t(self) -> Array:
+        """Times in s."""
+        return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
+
+    @property
+    def inputs(self) -> Array:
+        """What acted on the bodies from each tick to the next: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
+
+        The commands that had arrived, which the next tick names as its effort, and the external forces. NaN where the
+        bag does not hold the next tick: at its end, and before a gap. `simulation.Trajectory.inputs` is the same.
+        """
+        inputs = np.zeros((len(self.tick), 3))
+        inputs[:-1, [LEFT, RIGHT]] = self.effort[1:]
+        external = {body: EXTERNAL_FORCES[name].name for name, body in SECTIONS.items()}
+        if any(topic in self.outputs for topic in external.values()):
+            nothing = np.zeros(len(self.tick))
+            inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
+        inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
+        return inputs
+
+    @property
+    def closed(self) -> bool:
+        """Whether V belongs to laws that were known and ran, at every tick."""
+        return bool((self.lyapunov[:, LYAPUNOV_NAMES.index("closed")] == 1.0).all())
+
+    @property
+    def energy_of(self) -> str:
+        """What `energy` is the energy of."""
+        return PLANT_AND_FEEDBACK if self.closed else PLANT_ALONE
+
+    @property
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force.
+
+        Of the plant alone, without its controllers, unless `closed`.
+        """
+        if not self.closed:
+            return energy(self.scene.system, self.state, feedback=False)
+        scene, begins = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
+        parts = []
+        for begin, end in pairwise(begins):
+            scene = scene.changed(self.changes.get(begin, {}))
+            parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
+        return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
+
+    @property
+    def alarms(self) -> int:
+        """Ticks at which the monitor found energy that the held forces do not explain."""
+        return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run."""
+        ticks = int(self.tick.max(initial=-1)) + 1
+        held = () if self.running.lockstep else [topic.name for topic in self.scene.controllers.values()]
+        return {name: ticks - count for name, count in self.counts.items() if name not in held}

@@ -1,0 +1,85 @@
+"""How a plant runs, as it says it on the topic `run` and as a bag keeps it: in lockstep, or with the wall clock."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import yaml
+
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.physics.errors import Refused
+
+REACTIONS = ("hold", "zero", "stop")
+LEAST = 1e-6  # real-time factor
+
+
+@dataclass(frozen=True)
+class Running:
+    """How a plant runs.
+
+    Attributes
+    ----------
+    accuracy : float
+        Of its integrator.
+    real_time_factor : float
+        Simulated seconds in a second of wall time; 0: lockstep.
+    timeouts : dict of str to float, s
+        Simulated time without a command after which `reactions` apply, by side; empty in lockstep.
+    reactions : dict of str to str
+        "hold" the last command, "zero" force, or "stop" the run.
+
+    Raises
+    ------
+    Refused
+        If one of them is not allowed.
+    """
+
+    accuracy: float = ACCURACY
+    real_time_factor: float = 0.0
+    timeouts: Mapping[str, float] = field(default_factory=dict)
+    reactions: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, value in {f"{side}_timeout_s": seconds for side, seconds in self.timeouts.items()}.items():
+            if not 0.0 < value < math.inf:
+                raise Refused(f"{name}: {value!r} is not allowed; allowed: a number > 0")
+        if not (self.real_time_factor == 0.0 or LEAST <= self.real_time_factor <= 1.0 / LEAST):
+            allowed = f"{LEAST:g} to {1.0 / LEAST:g}"
+            raise Refused(f"real_time_factor: {self.real_time_factor!r} is not allowed; allowed: {allowed}")
+        for side, reaction in self.reactions.items():
+            if reaction not in REACTIONS:
+                raise Refused(f"{side}_on_timeout: {reaction!r} is not allowed; allowed: {', '.join(REACTIONS)}")
+
+    @property
+    def lockstep(self) -> bool:
+        """Whether each state waits for its commands."""
+        return not self.real_time_factor
+
+    @property
+    def words(self) -> str:
+        """For a reader."""
+        return "lockstep" if self.lockstep else f"free-running, {self.real_time_factor:g} s in a second"
+
+    def to_yaml(self) -> str:
+        """As YAML; `parse` of it gives the same."""
+        mode = "lockstep" if self.lockstep else "free-running"
+        return yaml.safe_dump({"mode": mode, **asdict(self)}, sort_keys=False)
+
+
+def parse(text: str) -> Running:
+    """Read what `Running.to_yaml` wrote.
+
+    Raises
+    ------
+    Refused
+        If the text is not such a text.
+    """
+    try:
+        found: dict[str, Any] = yaml.safe_load(text)
+        found.pop("mode")
+        return Running(**found)
+    except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+        raise Refused(f"run: not what a plant says: {' '.join(str(error).split())}") from None

@@ -1,0 +1,196 @@
+"""A bag proves itself: its scene is simulated again with the inputs that it recorded, whatever controller gave them.
+
+Every state must have the same bits, and so must all that follows from states and commands: the forces that acted, the
+impact forces, and what the monitor computed. Which law gave the commands is a question of its own, see `laws_of`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from copy import copy
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.graph.recording import Recording
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array, Contact, impact_force, penetration
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.topics import CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
+from grasp_ros.simulation.sampled_plant import SampledPlant
+
+STATES = ("left position", "left velocity", "object position", "object velocity", "right position", "right velocity")
+
+
+class Difference(NamedTuple):
+    """One number that is not what it should be."""
+
+    tick: int  # of the bag
+    topic: str
+    name: str
+    recorded: float
+    computed: float
+
+    def __str__(self) -> str:
+        return (f"tick {self.tick}, {self.topic}, {self.name}: recorded {self.recorded!r} ({self.recorded.hex()}),"
+                f" computed {self.computed!r} ({self.computed.hex()})")
+
+
+class Verification(NamedTuple):
+    """What became of a bag that was simulated again."""
+
+    ticks: int  # whose states were compared
+    difference: Difference | None  # the first
+    problem: str  # why not all of the bag could be compared; empty if all was
+
+    @property
+    def holds(self) -> bool:
+        """Whether everything was compared and is equal."""
+        return self.difference is None and not self.problem
+
+    @property
+    def words(self) -> str:
+        """For a reader."""
+        if self.difference is not None:
+            return f"NOT EQUAL, first at {self.difference}"
+        equal = f"{self.ticks} states follow from the recorded inputs, bit for bit"
+        return f"{equal}; {self.problem}" if self.problem else equal
+
+
+class _Column(NamedTuple):
+    """Numbers that were recorded, beside what they should be."""
+
+    topic: str
+    name: str
+    recorded: Array
+    computed: Array
+
+
+def verify(recording: Recording) -> Verification:
+    """Simulate the scene of a bag with its recorded inputs, and compare every number that follows from them."""
+    ticks, first = 0, None
+    problem = _gap(recording)
+    for rows in _episodes(recording):
+        states, stop = _simulate(recording, rows)
+        ticks += len(states)
+        problem = problem or stop
+        part = rows[: len(states)]
+        found = [found for column in _columns(recording, part, states) if (found := _first(recording, part, column))]
+        if found:
+            first = min(found, key=lambda difference: difference.tick)
+            break
+    return Verification(ticks, first, problem)
+
+
+def laws_of(recording: Recording) -> dict[str, str]:
+    """Whose law gave the commands, by side: compared with the law that the scene or an announcement names.
+
+    In a free run the commands act when they come, and which state they answer is not compared.
+    """
+    if not recording.running.lockstep:
+        return {name.removesuffix("_controller"): "held, not compared" for name in recording.scene.controllers}
+    found = {}
+    scenes, scene = {}, recording.scene
+    for tick, numbers in recording.changes.items():
+        scenes[tick] = scene = scene.changed(numbers)
+    starts = _scene_ticks(recording)
+    for name, topic in recording.scene.controllers.items():
+        side = name.removesuffix("_controller")
+        body, laws, equal = SIDES[side], recording.scene.system.laws, 0
+        x, v = (recording.state[:, COLUMN[body] + i].tolist() for i in (0, 1))
+        for row, (tick, at) in enumerate(zip(recording.tick.tolist(), starts.tolist(), strict=True)):
+            laws = scenes[tick].system.laws if tick in scenes else laws
+            equal += laws[body].command(at, x[row], v[row]) == recording.command[row, body]
+        every = len(recording.tick)
+        found[side] = "the scene's law" if equal == every else (
+            f"foreign: {every - equal} of {every} commands on {topic.name} are not those of the scene's law"
+        )
+    return found
+
+
+def _gap(recording: Recording) -> str:
+    """What cannot be verified because the bag does not hold it."""
+    if not len(recording.starts) or recording.starts[0] != recording.tick[0]:
+        return f"the bag begins at tick {recording.tick[0]}, not at the beginning of the scene"
+    missing = np.flatnonzero(np.diff(recording.tick) != 1)
+    if len(missing):
+        return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
+    return ""
+
+
+def _episodes(recording: Recording) -> Iterator[np.ndarray]:
+    """Rows of the bag from each beginning of the scene to the next, or to a gap."""
+    begins = np.searchsorted(recording.tick, recording.starts)
+    for begin, end in zip(begins, [*begins[1:], len(recording.tick)], strict=True):
+        rows = np.arange(begin, end)
+        gaps = np.flatnonzero(np.diff(recording.tick[rows]) != 1)
+        yield rows[: gaps[0] + 1] if len(gaps) else rows
+
+
+def _scene_ticks(recording: Recording) -> np.ndarray:
+    """Ticks of the scene: those of the bag since the last reset."""
+    starts = recording.starts if len(recording.starts) else np.zeros(1, dtype=np.int64)
+    since = starts[np.maximum(np.searchsorted(starts, recording.tick, side="right") - 1, 0)]
+    ticks: np.ndarray = recording.tick - since
+    return ticks
+
+
+def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:
+    """States (k, 6) that follow from the inputs, as far as the integrator comes, and why it stopped."""
+    scene, system = recording.scene, copy(recording.scene.system)
+    system.delay = 0  # what is recorded are the forces that acted
+    integrator = Integrator(system, continuous=False, accuracy=recording.running.accuracy)
+    plant = SampledPlant(system, scene.period_ns, integrator)
+    acted = np.zeros((len(rows) - 1, 3))
+    acted[:, [LEFT, RIGHT]] = recording.effort[rows[1:]]
+    states = plant.follow(acted)
+    if plant.status is not Status.DONE:
+        return states, plant.stop
+    return np.concatenate([states, plant.state[None]]), ""
+
+
+def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[_Column]:
+    """Everything of an episode that follows from its inputs."""
+    system, present = recording.scene.system, recording.scene.system.present
+    for number, name in enumerate(STATES):
+        if any(COLUMN[body] == number // 2 * 2 for body in present):
+            yield _Column(JOINT_STATES.name, name, recording.state[rows, number], states[:, number])
+    yield from _effort(recording, rows)
+    u_l, d_l, u_r, d_r = penetration(states)
+    for side, u, d in (("left", u_l, d_l), ("right", u_r, d_r)):
+        if (topic := CONTACTS[side].name) in recording.outputs:
+            force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
+            yield _Column(topic, "force", recording.outputs[topic][rows], force)
+    external = system.external_over(np.arange(len(rows))) if system.external else None
+    for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
+        if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
+            yield _Column(topic, "force", recording.outputs[topic][rows], external[:, body])
+    alone = energy(system, states, feedback=False)
+    for name, values in (("V_plant", alone.V_c), ("mode", alone.mode.astype(float))):
+        yield _Column(LYAPUNOV.name, name, recording.lyapunov[rows, LYAPUNOV_NAMES.index(name)], values)
+
+
+def _effort(recording: Recording, rows: np.ndarray) -> Iterator[_Column]:
+    """In lockstep the force that acted until a tick is the command that had arrived: after the delay."""
+    if not recording.running.lockstep:
+        return
+    wait = recording.scene.system.delay + 1
+    for side in (LEFT, RIGHT):
+        if side in recording.scene.system.laws:
+            acted = np.concatenate([np.zeros(wait), recording.command[rows, side]])[: len(rows)]
+            yield _Column(JOINT_STATES.name, f"{NAMES[side]} effort", recording.effort[rows, side], acted)
+
+
+def _first(recording: Recording, rows: np.ndarray, column: _Column) -> Difference | None:
+    """The first number whose bits differ; NaN, which the bag has in place of what is lost, is left out."""
+    recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (column.recorded, column.computed))
+    differ = (recorded.view(np.int64) != computed.view(np.int64)) & ~np.isnan(recorded)
+    if not differ.any():
+        return None
+    place = int(np.argmax(differ))
+    return Difference(
+        int(recording.tick[rows[place]]), column.topic, column.name, float(recorded[place]), float(computed[place])
+    )

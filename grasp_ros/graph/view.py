@@ -1,0 +1,110 @@
+"""A graph or a bag in a terminal: the masses on their line, forces, energy, contacts and rates, at one moment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
+
+STYLES = {"left": "bold blue", "object": "bold white", "right": "bold red"}
+SIGNS = {"left": "[L]", "object": "(O)", "right": "[R]"}
+TRACK, BAR = 72, 30  # characters
+CONTACT = {Mode.NONE: "none", Mode.LEFT: "left", Mode.RIGHT: "right", Mode.BOTH: "left and right"}
+
+
+class Moment(NamedTuple):
+    """What is shown."""
+
+    time: float  # s
+    state: Array  # (6,), m and m/s; NaN for what is not there
+    commands: Mapping[str, float]  # N, by side
+    impacts: Mapping[str, float]  # N, by side
+    level: Mapping[str, float]  # by `topics.LYAPUNOV_NAMES`
+    words: str  # where it comes from, and how fast
+
+
+class View:
+    """Draws moments of one scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its initial state gives the scale of the line.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        places = np.abs(scene.initial_state[0::2])
+        self._reach = 1.25 * float(places.max()) or 1.0
+        self._most = 0.0  # energy shown so far, J
+
+    def draw(self, moment: Moment) -> RenderableType:
+        """A renderable of rich."""
+        self._reach = max(self._reach, float(np.nanmax(np.abs(moment.state[0::2]))))
+        parts = Group(
+            self._line(moment.state), self._ruler(), "", self._bodies(moment), "", self._energy(moment.level)
+        )
+        below = f"t = {moment.time:.3f} s   {moment.words}"
+        return Panel(parts, title=self._scene.title, subtitle=below, width=80)
+
+    def _line(self, state: Array) -> Text:
+        """Each body at its place; one that is behind another is moved aside by a character."""
+        row, taken = Text(" " * TRACK), -1
+        for body in sorted(NAMES, key=lambda body: COLUMN[body]):
+            x = float(state[COLUMN[body]])
+            if np.isnan(x):
+                continue
+            sign, style = SIGNS[NAMES[body]], STYLES[NAMES[body]]
+            middle = round((x / self._reach + 1.0) * 0.5 * (TRACK - 1))
+            begin = min(max(middle - 1, taken + 1, 0), TRACK - 3)
+            row = Text.assemble(row[:begin], (sign, style), row[begin + 3 :])
+            taken = begin + 2
+        return row
+
+    def _ruler(self) -> Text:
+        left, right = f"{-self._reach:.3g} m", f"{self._reach:.3g} m"
+        gap = (TRACK - 1) // 2
+        return Text(f"{left:<{gap}}0{right:>{TRACK - gap - 1}}", style="dim")
+
+    def _bodies(self, moment: Moment) -> Table:
+        table = Table(box=None, padding=(0, 2))
+        for heading in ("", "x, m", "v, m/s", "command, N", "impact, N"):
+            table.add_column(heading, justify="right" if heading else "left")
+        for body, name in NAMES.items():
+            x, v = moment.state[COLUMN[body] : COLUMN[body] + 2]
+            if not np.isnan(x):
+                forces = [moment.commands.get(name), moment.impacts.get(name)] if name in SIDES else [None, None]
+                words = ["" if force is None else f"{force:+.4f}" for force in forces]
+                table.add_row(Text(name, style=STYLES[name]), f"{x:+.5f}", f"{v:+.5f}", *words)
+        return table
+
+    def _energy(self, level: Mapping[str, float]) -> Table:
+        closed = level.get("closed") == 1.0
+        names = ("V_c", "V") if closed else ("V_plant",)
+        table = Table(box=None, padding=(0, 2), show_header=False)
+        for name in names:
+            value = level.get(name, np.nan)
+            self._most = np.nanmax([self._most, value])
+            filled = 0 if np.isnan(value) or not self._most else round(BAR * max(value, 0.0) / self._most)
+            table.add_row(name, f"{value:.6g} J", Text("█" * filled, style="green" if closed else "yellow"))
+        mode = Mode(int(np.nan_to_num(level.get("mode", 0.0))))
+        table.add_row("contact", CONTACT[mode], "" if closed else "V: no law is announced, or another one ran")
+        alarm = level.get("alarm", 0.0) == 1.0
+        table.add_row("balance", Text("ALARM", style="bold red") if alarm else "closes", "")
+        return table
+
+
+def named(values: Array) -> dict[str, float]:
+    """What `lyapunov` carries, by name."""
+    return dict(zip(LYAPUNOV_NAMES, (float(value) for value in values), strict=True))

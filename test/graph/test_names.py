@@ -1,0 +1,61 @@
+"""Two graphs side by side in one domain, and what the package says of itself."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+import yaml
+from mcap.reader import make_reader
+from processes import DEADLINE
+
+from grasp_ros import scene
+from grasp_ros.graph import bag
+from grasp_ros.graph.verify import laws_of, verify
+from grasp_ros.simulation import simulate
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow  # real processes
+def test_two_graphs_in_one_domain_do_not_see_each_other(launch: Any, tmp_path: Path) -> None:
+    names = {"/a": "case_01", "/b": "case_09"}
+    runs = [
+        launch(
+            sys.executable, "-m", "grasp_ros.cli", "run", name, "--set", "time.duration_s=0.5", "-o", namespace[1:],
+            "--namespace", namespace, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )
+        for namespace, name in names.items()
+    ]
+    for run in runs:
+        out, err = run.communicate(timeout=DEADLINE)
+        assert run.returncode == 0, out + err
+    for namespace, name in names.items():
+        recording = bag.read(tmp_path / namespace[1:] / "bag")
+        simulated = simulate(scene.load(name, ["time.duration_s=0.5"]), sampled=True)
+        assert recording.state.tobytes() == simulated.state.tobytes()
+        assert verify(recording).holds
+        assert set(laws_of(recording).values()) == {"the scene's law"}
+        with (recording.path / "bag.mcap").open("rb") as file:
+            summary = make_reader(file).get_summary()
+        assert summary is not None
+        topics = {channel.topic for channel in summary.channels.values()}
+        assert {topic for topic in topics if not topic.startswith(f"{namespace}/")} == {"/diagnostics"}
+        assert f"{namespace}/clock" in topics
+
+
+def test_the_package_lists_what_its_nodes_import_and_how_to_cite_it() -> None:
+    manifest = ElementTree.parse(ROOT / "package.xml").getroot()
+    listed = {entry.text for entry in manifest.findall("exec_depend")}
+    sources = "\n".join(path.read_text() for path in (ROOT / "grasp_ros" / "graph" / "nodes").glob("*.py"))
+    imported = set(re.findall(r"^from (\w+_(?:msgs|srvs|interfaces))\.", sources, re.M)) | {"rclpy"}
+    assert imported <= listed
+    version = (manifest.findtext("version"), manifest.findtext("license"))
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    assert (cited["version"], cited["license"]) == version
+    assert cited["references"][0]["year"] == 1990

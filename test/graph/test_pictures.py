@@ -1,0 +1,116 @@
+"""What there is to look at: markers, the description of the robot, layouts, and the view in a terminal."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from processes import DEADLINE
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+from grasp_ros import scene
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import impact_forces
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, ROBOT_DESCRIPTION, state_of
+
+pytestmark = pytest.mark.slow  # real processes
+CONFIG = Path(__file__).parents[2] / "config"
+
+
+def test_markers_show_the_states_and_only_where_somebody_looks(
+    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    pictures: list[MarkerArray] = []
+    states: dict[int, np.ndarray] = {}
+    texts: list[str] = []
+    peer.create_subscription(MarkerArray, "markers", pictures.append, 100)
+    peer.create_subscription(
+        JointState, "joint_states", lambda m: states.update({messages.to_ns(m.header.stamp): state_of(m)[0]}),
+        messages.qos(JOINT_STATES),
+    )
+    peer.create_subscription(
+        String, "robot_description", lambda m: texts.append(m.data), messages.qos(ROBOT_DESCRIPTION)
+    )
+    case = scene.load("case_01", ["time.duration_s=0.6"])
+    graph = Graph(case, tmp_path / "run", ACCURACY)
+    graph.start()
+    try:
+        while graph.processes["plant"].poll() is None:
+            executor.spin_once(timeout_sec=0.05)
+        graph.wait([])
+    finally:
+        graph.stop()
+    assert len(pictures) > 3
+    seen = [(messages.to_ns(picture.markers[0].header.stamp), picture) for picture in pictures]
+    compared = [(states[time_ns], picture) for time_ns, picture in seen if time_ns in states]
+    assert compared
+    for state, picture in compared:
+        boxes = {m.id: m.pose.position.x for m in picture.markers if m.ns == "masses"}
+        assert boxes[LEFT] == state[0] - 0.06
+        assert boxes[RIGHT] == state[4] + 0.06
+        arrows = [m for m in picture.markers if m.ns == "contact forces"]
+        for arrow, force in zip(arrows, impact_forces(case.grasp, state), strict=True):
+            assert arrow.action == (Marker.ADD if force > 0.0 else Marker.DELETE)
+            assert abs(arrow.points[1].x - arrow.points[0].x) == pytest.approx(force / 100.0)
+    joints = ElementTree.fromstring(texts[0]).findall("joint")
+    assert {joint.get("name") for joint in joints} == {"left", "object", "right"}
+    assert {joint.get("type") for joint in joints} == {"prismatic"}
+    assert {joint.find("parent").get("link") for joint in joints} == {messages.FRAME}  # type: ignore[union-attr]
+
+
+def test_layouts_name_topics_and_values_that_are_there() -> None:
+    case = scene.load("case_01")
+    topics = {f"/{topic.name}": topic for topic in case.topics}
+    layout = json.loads((CONFIG / "foxglove.json").read_text())
+    plots = [panel for name, panel in layout["configById"].items() if name.startswith("Plot")]
+    paths = [path["value"] for panel in plots for path in panel["paths"]]
+    assert len(paths) == 10
+    for path in paths:
+        topic, field, _ = re.match(r"([^.]+)\.(position\[(\d)\]|wrench\.force\.x)$", path).groups()  # type: ignore[union-attr]
+        assert ("position" in field) is (topics[topic].type == "sensor_msgs/msg/JointState")
+    assert [path["label"] for path in plots[2]["paths"]] == [LYAPUNOV_NAMES[i] for i in (0, 1, 6)]
+    curves = [curve.get("name") for curve in ElementTree.parse(CONFIG / "plotjuggler.xml").iter("curve")]
+    assert len(curves) == 10
+    assert {f"/lyapunov/{name}/position" for name in ("V", "V_c", "V_plant")} <= set(curves)
+    assert all(any(str(curve).startswith(f"{topic}/") for topic in topics) for curve in curves)
+
+
+def test_a_bag_is_watched_in_a_terminal(two_runs: tuple[Path, Path]) -> None:
+    ours, theirs = pty.openpty()
+    command = [sys.executable, "-m", "grasp_ros.cli", "watch", str(two_runs[0] / "bag"), "--rate", "3"]
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
+    watch = subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment)
+    os.close(theirs)
+    shown = b""
+    try:
+        while chunk := os.read(ours, 65536):
+            shown += chunk
+    except OSError:  # the other end is closed
+        pass
+    os.close(ours)
+    assert watch.wait(DEADLINE) == 0
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
+    pictures = text.split("Case 1, Fig. 2: standard parameters")[1:]
+    assert len(pictures) >= 4
+    last, level = bag.read(two_runs[0] / "bag").state[-1], bag.read(two_runs[0] / "bag").energy
+    assert f"{last[0]:+.5f}" in pictures[-1]
+    assert f"{level.V_c[-1]:.6g} J" in pictures[-1]
+    assert "t = 3.000 s" in pictures[-1]
+    assert all(sign in pictures[-1] for sign in ("[L]", "(O)", "[R]"))
