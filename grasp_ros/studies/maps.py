@@ -71,7 +71,7 @@ def settling(directory: Path, pixels: int = PIXELS) -> Settling:
     seconds = _computed(plan, directory / f"settling_{pixels}.zarr").seconds
     data = store.read(directory / f"settling_{pixels}.zarr")
     settles = np.isfinite(data["settling_time"].values)
-    zoom = Plan(scene, setup, _window(plan, settles, max(pixels // 20, 4), max(pixels // 2, 2)))
+    zoom = Plan(scene, setup, _window(plan, settles, max(pixels // 20, 4), max(pixels // 4, 2)))
     _computed(zoom, directory / f"zoom_{pixels}.zarr")
     zoomed = store.read(directory / f"zoom_{pixels}.zarr")
     return Settling(plan, data, zoom, zoomed, dimension(settles), _changed(zoom, zoomed), seconds)
