@@ -14,7 +14,7 @@ demo: install
 
 # All tests, some minutes; `pytest -m "not slow"` runs those that take seconds.
 test: lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist loadfile
 
 lint: install
 	$(BIN)/ruff check .

@@ -37,7 +37,7 @@ setup(
     ],
     extras_require={
         "test": [
-            "pytest", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
+            "pytest", "pytest-xdist", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
             "types-tqdm", "colcon-common-extensions", "scipy", "xarray", "zarr>=3.1", "distributed",
             "ruamel.yaml", "playwright",
         ],

@@ -131,7 +131,7 @@ class ControlLaw:
         """What its sensor makes of the state (x, v) of a tick."""
         return measured(self.row.tolist(), self.noise(tick).tolist(), x, v)  # plain floats overflow without a warning
 
-    def command(self, tick: int, x: float, v: float) -> float:
-        """Command in N that answers the state (x, v) of a tick."""
+    def command(self, tick: int, x: Any, v: Any) -> Any:
+        """Command in N that answers the state (x, v) of a tick, in the arithmetic of x and v."""
         row = self.row.tolist()
-        return float(limited(row, feedback(row, *self.measured(tick, x, v))))
+        return limited(row, feedback(row, *self.measured(tick, x, v)))

@@ -1,4 +1,4 @@
-"""A motion with contacts in 40 digits, by extrapolation in the logarithm of the time, along which u is like a power."""
+"""A motion with contacts in 50 digits, by extrapolation in the logarithm of the time, along which u is like a power."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from grasp_ros.physics.layout import (
     Pair,
 )
 
-BITS, COLUMNS = 133, 12  # 40 digits
+BITS, COLUMNS = 166, 12  # 50 digits
 Rates = Callable[[list[Any]], list[Any]]
 
 

@@ -1,4 +1,4 @@
-"""Contacts that begin at u = 0 from rest, or both at once: the start segment against a motion in 40 digits."""
+"""Contacts that begin at u = 0 from rest, or both at once: the start segment against a motion in 50 digits."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def start_for(b: Bench, span: float, tolerance: float = 1e-16) -> float:
 
 @SIDES
 @pytest.mark.parametrize("name", SCENES)
-def test_a_start_against_40_digits(name: str, side: Body) -> None:
+def test_a_start_against_50_digits(name: str, side: Body) -> None:
     before, b, t = segment(name, side)
     with gmpy2.context(precision=BITS):
         expected = next(states_at(before, [t]))

@@ -120,9 +120,12 @@ def signal_handlers() -> Iterator[None]:
 WRONG_PLANT = """
 import sys
 from grasp_ros.graph.nodes import start
-from grasp_ros.exact.integrator import Integrator
-set_input = Integrator.set_input
-Integrator.set_input = lambda self, forces: set_input(self, 1.5 * forces)
+from grasp_ros.simulation.sampled_plant import SampledPlant
+step = SampledPlant.step
+def push_harder(plant, commands):
+    step(plant, 1.5 * commands)
+    plant.effort = commands
+SampledPlant.step = push_harder
 sys.exit(start.main("plant"))
 """
 

@@ -14,7 +14,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact import integrator
+from grasp_ros.exact.integrator import ACCURACY
+from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.layout import DAMPING
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
@@ -57,13 +58,13 @@ def test_scenes_that_the_fuzzing_found_are_right(path: Path) -> None:
 @pytest.mark.parametrize("rubbish", [np.nan, 1e300])
 def test_no_kernel_reads_what_it_has_not_written(rubbish: float) -> None:
     """The workspace is shared: what another run left in it must not show."""
-    workspace, _ = integrator._workspace(integrator.ACCURACY)
     for scene in [scenes.load(str(path)) for path in FUZZED.glob("*.yaml")] + drawn(draw_degenerate)[:30]:
         product = Product(properties.MOST_EVENTS, properties.MOST_WORK)
         bits = []
         for left_over in (0.0, rubbish):
-            for table in (*workspace[:-1], *workspace.start):
-                table[...] = left_over
+            with workspace(ACCURACY) as (tables, _):
+                for table in (*tables[:-1], *tables.start):
+                    table[...] = left_over
             with suppress(Unfinished):
                 product.run(scene, None if scene.sampled else np.linspace(0.0, scene.duration, 50))
             bits.append((product.runs[-1].state.tobytes(), product.runs[-1].event_table.tobytes()))
