@@ -37,8 +37,8 @@ setup(
     ],
     extras_require={
         "test": [
-            "pytest", "pytest-xdist", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff", "types-PyYAML",
-            "types-tqdm", "colcon-common-extensions", "scipy", "xarray", "zarr>=3.1", "distributed",
+            "pytest", "pytest-xdist", "hypothesis", "gmpy2", "mpmath", "mcap-ros2-support", "mypy", "ruff",
+            "types-PyYAML", "types-tqdm", "colcon-common-extensions", "scipy", "xarray", "zarr>=3.1", "distributed",
             "ruamel.yaml", "playwright",
         ],
         "map": ["xarray", "zarr>=3.1", "scipy"],

@@ -14,7 +14,7 @@ PAGES = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 def links(page: Path) -> list[tuple[Path, str]]:
     """Files of this repository that a page links to or shows, with the anchor or an empty text."""
-    text = page.read_text(encoding="utf-8")
+    text = re.sub(r"(?m)^    .*", "", page.read_text(encoding="utf-8"))  # a terminal may show brackets, too
     targets = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'<img src="([^"]+)"', text)
     found = [target.partition("#") for target in targets if "://" not in target]
     return [((page.parent / path).resolve() if path else page, anchor) for path, _, anchor in found]

@@ -140,7 +140,7 @@ class Controller(GraspNode):
         if not self._ready_to_answer:
             self._held = message
             return
-        if self._scene is None:
+        if self._scene is None or self._side not in message.name:  # the scene of a new plant is still on its way
             return
         time_ns = messages.to_ns(message.header.stamp)
         if self._staged or time_ns <= self._answered or self._answered < 0:
