@@ -2,54 +2,41 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from collections.abc import Sequence
-from functools import reduce
-from typing import Any
 
-from grasp_ros.exact.foreign import Law
+from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.own_law import find_law
 
 FORM = "side=module:object"
 
 
-def load_controllers(words: Sequence[str]) -> dict[str, Law]:
-    """The callables by side; modules are found in the current directory, too.
+def sides_of(words: Sequence[str]) -> dict[str, str]:
+    """Where the controllers are found, "module:object" by side.
 
     Raises
     ------
     Refused
-        If a word has another form, comes twice for a side, or names what is not there or cannot be called.
+        If a word has another form, or comes twice for a side.
     """
-    found: dict[str, Law] = {}
+    found: dict[str, str] = {}
     for word in words:
         side, _, place = word.partition("=")
-        module, _, name = place.partition(":")
-        if side not in SIDES or not module or not name:
+        if side not in SIDES or not all(place.partition(":")):
             raise Refused(f"--controller: {word} is not allowed; allowed: {FORM}, with the side {' or '.join(SIDES)}")
         if side in found:
             raise Refused(f"--controller: {word} is not allowed; allowed: one for the {side} side")
-        found[side] = _load(word, module, name)
+        found[side] = place
     return found
 
 
-def _load(word: str, module: str, name: str) -> Law:
-    if "" not in sys.path:
-        sys.path.insert(0, "")
-    try:
-        holder: Any = importlib.import_module(module)
-    except ModuleNotFoundError as error:
-        if error.name is None or not f"{module}.".startswith(f"{error.name}."):
-            raise  # it is the module that misses another one
-        raise Refused(f"--controller: {word}: no module {error.name}; allowed: one of the current directory, or one"
-                      " that is installed") from None
-    try:
-        law: Any = reduce(getattr, name.split("."), holder)
-    except AttributeError:
-        raise Refused(f"--controller: {word}: {module} has no {name}; allowed: a callable of it") from None
-    if not callable(law):
-        raise Refused(f"--controller: {word}: {law!r} cannot be called; allowed: a callable of tick, time, x and v")
-    found: Law = law
-    return found
+def load_controllers(words: Sequence[str]) -> dict[str, Law | type]:
+    """The callables by side.
+
+    Raises
+    ------
+    Refused
+        As `sides_of`, and `scene.own_law.find_law`.
+    """
+    return {side: find_law(place, f"--controller: {side}={place}") for side, place in sides_of(words).items()}

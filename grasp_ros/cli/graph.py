@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
+from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError, become
 from grasp_ros.graph.running import Running
@@ -28,7 +29,7 @@ def add_to(commands: Any) -> None:
         help="do not start left_controller or right_controller; wait for another one on its topic",
     )
     sub.add_argument(
-        "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT", type=_law,
+        "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
         help="a law of your own in place of the scene's: called with tick, time, x and v it returns the force",
     )
     sub.add_argument(
@@ -59,15 +60,8 @@ def add_to(commands: Any) -> None:
     sub.add_argument("bag", type=Path)
 
 
-def _law(words: str) -> tuple[str, str]:
-    """Name of a controller and its law."""
-    side, _, law = words.partition("=")
-    if not side or not law:
-        raise argparse.ArgumentTypeError(f"{words} is not allowed; allowed: left=module:object, right=module:object")
-    return f"{side}_controller", law
-
-
 def _run(options: argparse.Namespace) -> int:
+    laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
@@ -77,7 +71,7 @@ def _run(options: argparse.Namespace) -> int:
         Running(real_time_factor=options.free_running)  # refuses what is wrong
         plant.update(free_running="true", real_time_factor=repr(options.free_running))
     graph = Graph(
-        scene, directory, options.accuracy, progress=True, without=options.without, laws=dict(options.laws),
+        scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,
     )
     begin = time.monotonic()

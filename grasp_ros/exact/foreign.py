@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable
 from functools import lru_cache
 from numbers import Real
 from typing import Any
@@ -22,9 +21,9 @@ from numba.core.errors import NumbaError
 from numba.core.types import float64, int64
 from numba.extending import intrinsic, is_jitted
 
+from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 
-Law = Callable[[int, float, float, float], float]  # tick, time in s, measured x in m and v in m/s to N
 SIGNATURE = float64(int64, float64, float64, float64)
 PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double)
 DOUBLE, WORD = ir.DoubleType(), ir.IntType(64)
@@ -81,12 +80,10 @@ class Foreign:
     Raises
     ------
     Refused
-        If it cannot be called, or has been compiled for other arguments.
+        If it has been compiled for other arguments.
     """
 
     def __init__(self, side: str, law: Law) -> None:
-        if not callable(law):
-            raise Refused(f"controllers: {side}: {law!r} is not allowed; allowed: a callable of tick, time, x and v")
         compiled = is_jitted(law) or isinstance(law, CFunc)
         named = getattr(law, "__wrapped__", law) if compiled else law
         named = named if hasattr(named, "__qualname__") else type(named)

@@ -5,16 +5,17 @@
 
 from __future__ import annotations
 
-from array import array
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import numpy as np
 from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
+from grasp_ros.graph.columns import Alike, alike
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.rosbag2 import BagError, decode, names_of
@@ -29,6 +30,8 @@ from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAM
 __all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
 KIND = "a bag of this package"
 VERSION = "version "  # how the keys of versions begin
+BATCH_BYTES = 2**18  # of the messages of a topic that are decoded at once
+MOST_NS = 2**63 - 1
 WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
@@ -102,25 +105,15 @@ def read(path: Path) -> Recording:
     """
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
-        columns, changes, scene = _Columns(), _Changes(), None
+        content = None
         for stored in storage.messages():
-            if scene is None:
-                scene = scene_of(storage, path)
-                known = {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
-                held = () if running_of(storage).lockstep else scene.controllers.values()
-            topic = known.get(stored.topic)
-            if topic is None or topic.type != stored.type:
-                raise BagError(f"{path}: {stored.topic}: {stored.type} is not a topic of its scene")
-            if topic in CHANGES.values():
-                changes.add(topic, stored, scene)
-            elif topic in held:  # as they came, not one for each tick
-                columns.held[topic] = columns.held.get(topic, 0) + 1
-            elif topic in scene.topics:
-                columns.add(topic, stored, scene)
-        if scene is None or not columns.ticks.get(JOINT_STATES):
+            if content is None:
+                content = _Content(path, storage)
+            content.take(stored)
+        if content is None or not len(content.columns[JOINT_STATES].of()[0]):
             raise BagError(f"{path}: holds no tick")
         _check_metadata(path, storage)
-        return _recording(path, scene, columns, changes, storage)
+        return content.recording()
 
 
 def _check_metadata(path: Path, storage: Storage) -> None:
@@ -131,35 +124,108 @@ def _check_metadata(path: Path, storage: Storage) -> None:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
 
+class _Content:
+    """What of a bag comes into its recording; begins with the first message."""
+
+    def __init__(self, path: Path, storage: Storage) -> None:
+        self.path, self.storage, self.scene = path, storage, scene_of(storage, path)
+        self.changes, self.held = _Changes(), Counter[Topic]()
+        known = {name: topic for topic, name in names_of(self.scene, storage.records[OWN_RECORD]).items()}
+        self.columns = {topic: _Columns(name, topic, self.scene) for name, topic in known.items()}
+        held = () if running_of(storage).lockstep else self.scene.controllers.values()
+        self._takers = {(name, topic.type): self._taker(topic, held) for name, topic in known.items()}
+
+    def _taker(self, topic: Topic, held: Collection[Topic]) -> Callable[[Stored], object]:
+        """What is done with the messages of a topic."""
+        if topic in CHANGES.values():
+            return lambda stored: self.changes.add(topic, stored, self.scene)
+        if topic in held:  # as they came, not one for each tick
+            return lambda _: self.held.update([topic])
+        return self.columns[topic].add if topic in self.scene.topics else lambda _: None
+
+    def take(self, stored: Stored) -> None:
+        """Take a message."""
+        taker = self._takers.get((stored.topic, stored.type))
+        if taker is None:
+            raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+        taker(stored)
+
+    def recording(self) -> Recording:
+        """All of it, as arrays."""
+        path, scene, storage = self.path, self.scene, self.storage
+        ticks, joints = self.columns[JOINT_STATES].of()
+        joints, stamps = joints[:, :8], joints[:, 8]
+
+        def aligned(topic: Topic) -> Array:
+            found, values = self.columns[topic].of()
+            result = np.full((len(ticks), values.shape[1]), np.nan)
+            _, here, there = np.intersect1d(ticks, found, return_indices=True)
+            result[here] = values[there]
+            return result
+
+        command = np.zeros((len(ticks), 2))
+        for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+            command[:, side] = aligned(topic)[:, 0]
+        own = storage.records[OWN_RECORD]
+        counts = {topic.name: self.held[topic] or len(self.columns[topic].of()[0]) for topic in scene.topics}
+        return Recording(
+            path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
+            counts, ticks, joints[:, :6], joints[:, 6:], command,
+            {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
+            dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage),
+        )
+
+
 class _Columns:
-    """Ticks and numbers by topic, as they come."""
+    """Ticks and numbers of one topic: taken as they come, and decoded many at a time."""
 
-    def __init__(self) -> None:
-        self.ticks: dict[Topic, array[int]] = {}
-        self.values: dict[Topic, array[float]] = {}
-        self.held: dict[Topic, int] = {}  # numbers of messages
+    def __init__(self, name: str, topic: Topic, scene: scenes.Scene) -> None:
+        self._name, self._topic, self._width = name, topic, WIDTH.get(topic, 1)
+        self._period_ns, self._end_ns = scene.period_ns, scene.ticks * scene.period_ns
+        self._times: list[int] = []
+        self._cdrs: list[bytes] = []
+        self._bytes = 0
+        self._ticks, self._rows = [np.array([-1])], [np.zeros((1, self._width))]  # before the first
 
-    def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
-        tick, rest = divmod(stored.time_ns, scene.period_ns)
-        ticks = self.ticks.setdefault(topic, array("q"))
-        row = _values(topic, decode(topic, stored.cdr))
-        if row.shape != (WIDTH.get(topic, 1),):
-            raise BagError(f"{stored.topic}: {row.size} numbers; allowed: {WIDTH.get(topic, 1)}")
-        beyond = topic == JOINT_STATES and row[-1] > scene.ticks * scene.period_ns
-        if rest or beyond or (ticks and ticks[-1] >= tick):
-            raise BagError(f"{stored.topic}: {stored.time_ns} ns; allowed: ticks of the scene in their order")
-        ticks.append(tick)
-        self.values.setdefault(topic, array("d")).extend(row.tolist())
+    def add(self, stored: Stored) -> None:
+        """Take a message."""
+        self._times.append(stored.time_ns)
+        self._cdrs.append(stored.cdr)
+        self._bytes += len(stored.cdr)
+        if self._bytes > BATCH_BYTES:
+            self._decode()
 
-    def count(self, topic: Topic) -> int:
-        """Messages of a topic."""
-        return self.held.get(topic, len(self.ticks.get(topic, ())))
+    def of(self) -> tuple[np.ndarray, Array]:
+        """Ticks (n,) and rows (n, k)."""
+        if self._cdrs:
+            self._decode()
+        ticks, rows = np.concatenate(self._ticks), np.concatenate(self._rows)
+        self._ticks, self._rows = [ticks], [rows]
+        return ticks[1:], rows[1:]
 
-    def of(self, topic: Topic) -> tuple[np.ndarray, Array]:
-        """Ticks (n,) and rows (n, k) of a topic."""
-        width = WIDTH.get(topic, 1)
-        found = np.array(self.ticks.get(topic, ()), dtype=np.int64)
-        return found, np.array(self.values.get(topic, ()), dtype=float).reshape(-1, width)
+    def _decode(self) -> None:
+        rows = np.empty((len(self._cdrs), self._width))
+        for group in alike(self._topic, self._cdrs):
+            found = _values(self._topic, group)
+            if found.shape[1] != self._width:
+                raise BagError(f"{self._name}: {found.shape[1]} numbers; allowed: {self._width}")
+            rows[group.places] = found
+        ticks = self._checked(rows)
+        self._ticks.append(ticks)
+        self._rows.append(rows)
+        self._times, self._cdrs, self._bytes = [], [], 0
+
+    def _checked(self, rows: Array) -> np.ndarray:
+        """Ticks of the rows."""
+        times, period = np.array(self._times, dtype=np.uint64), np.uint64(self._period_ns)
+        ticks = (times // period).astype(np.int64)
+        wrong = (times % period != 0) | (times > MOST_NS) | (np.diff(ticks, prepend=self._ticks[-1][-1]) <= 0)
+        if self._topic == JOINT_STATES:
+            wrong |= rows[:, -1] > self._end_ns
+        if wrong.any():
+            time_ns = self._times[int(np.argmax(wrong))]
+            raise BagError(f"{self._name}: {time_ns} ns; allowed: ticks of the scene in their order")
+        return ticks
 
 
 class _Changes(dict[int, dict[str, float]]):
@@ -180,35 +246,15 @@ class _Changes(dict[int, dict[str, float]]):
             self._now.update(new)
 
 
-def _values(topic: Topic, message: Any) -> Array:
+def _values(topic: Topic, group: Alike) -> Array:
+    """Numbers (n, k) of messages that a recording has."""
+    numbers = group.numbers
     if topic == JOINT_STATES:
-        state, inputs = state_of(message)
-        stamp = message.header.stamp
-        return np.concatenate([state, inputs[[LEFT, RIGHT]], [stamp.sec * NANOSECONDS + stamp.nanosec]])
-    return np.asarray(message.position if topic == LYAPUNOV else [message.wrench.force.x])
-
-
-def _recording(path: Path, scene: scenes.Scene, columns: _Columns, changes: _Changes, storage: Storage) -> Recording:
-    ticks, joints = columns.of(JOINT_STATES)
-    joints, stamps = joints[:, :8], joints[:, 8]
-
-    def aligned(topic: Topic) -> Array:
-        found, values = columns.of(topic)
-        result = np.full((len(ticks), values.shape[1]), np.nan)
-        _, here, there = np.intersect1d(ticks, found, return_indices=True)
-        result[here] = values[there]
-        return result
-
-    command = np.zeros((len(ticks), 2))
-    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-        command[:, side] = aligned(topic)[:, 0]
-    own = storage.records[OWN_RECORD]
-    return Recording(
-        path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
-        {topic.name: columns.count(topic) for topic in scene.topics}, ticks, joints[:, :6], joints[:, 6:], command,
-        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-        dict(changes), running_of(storage), ticks[stamps == 0.0], _lost(storage),
-    )
+        lists = {name: numbers[name].T for name in ("position", "velocity", "effort")}
+        state, inputs = state_of(SimpleNamespace(name=group.first.name, **lists), numbers.shape)
+        stamps = numbers["header.stamp.sec"].astype(np.int64) * NANOSECONDS + numbers["header.stamp.nanosec"]
+        return np.vstack([state, inputs[[LEFT, RIGHT]], stamps]).T
+    return np.asarray(numbers["position"] if topic == LYAPUNOV else numbers["wrench.force.x"][:, None])
 
 
 def _lost(storage: Storage) -> dict[str, str]:

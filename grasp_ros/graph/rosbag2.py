@@ -130,6 +130,11 @@ def _header(time_ns: int) -> Any:
     return _TYPES.types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
 
 
+def fields_of(kind: str) -> list[tuple[str, Any]]:
+    """Names and descriptions of the fields of a message type."""
+    return list(_TYPES.get_msgdef(kind).fields)
+
+
 def decode(topic: Topic, cdr: bytes) -> Any:
     """A serialized message of a topic.
 

@@ -19,13 +19,14 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Footer, Header, Message, Metadata, Schema
+from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
 from grasp_ros.graph.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
 from grasp_ros.graph.rosbag2 import PROFILE, BagError
 
 MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")  # opcode and length of every record
+MESSAGE = struct.Struct("<H4xQ8x")  # channel and time of a message; the library's reader takes ten times as long
 SUM = struct.Struct("<I")
 DATA_END_BYTES = HEAD.size + SUM.size
 FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
@@ -138,26 +139,26 @@ class Storage:
             body = data[offset + HEAD.size : offset + HEAD.size + length]
             if len(body) != length:
                 raise McapError("a record does not fit into its chunk")
-            stream = ReadDataStream(BytesIO(body))
-            if opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream)
+            if opcode == Opcode.MESSAGE:
+                found.append(self._stored(body))
+            elif opcode == Opcode.SCHEMA:
+                schema = Schema.read(ReadDataStream(BytesIO(body)))
                 self._schemas[schema.id] = schema
             elif opcode == Opcode.CHANNEL:
-                channel = Channel.read(stream)
+                channel = Channel.read(ReadDataStream(BytesIO(body)))
                 self._channels[channel.id] = channel
-            elif opcode == Opcode.MESSAGE:
-                found.append(self._stored(Message.read(stream, length)))
             else:
                 raise McapError(f"record {opcode} is not one of a chunk")
             offset += HEAD.size + length
         yield from found
 
-    def _stored(self, message: Message) -> Stored:
-        channel = self._channels.get(message.channel_id)
+    def _stored(self, body: bytes) -> Stored:
+        number, time_ns = MESSAGE.unpack_from(body)
+        channel = self._channels.get(number)
         schema = None if channel is None else self._schemas.get(channel.schema_id)
         if channel is None or schema is None:
-            raise McapError(f"a message of an unknown channel, {message.channel_id}")
-        return Stored(channel.topic, schema.name, message.log_time, message.data)
+            raise McapError(f"a message of an unknown channel, {number}")
+        return Stored(channel.topic, schema.name, time_ns, body[MESSAGE.size :])
 
     def _behind_damage(self, offset: int, why: str) -> int:
         """Where to go on; the end of the file if nothing follows, which is what a recorder leaves that was killed."""

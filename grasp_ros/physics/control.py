@@ -7,6 +7,7 @@ do nothing. `exact.control` compiles the same source for the kernels.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from functools import lru_cache
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 from grasp_ros.physics.layout import BLOCK
 from grasp_ros.physics.model import Array
 
+Law = Callable[[int, float, float, float], float]  # tick, time in s, measured x in m and v in m/s to N
 NO_NOISE = np.zeros(2)
 WHOLE = 2.0**53  # from here on every number is a whole one
 

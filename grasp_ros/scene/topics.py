@@ -45,9 +45,12 @@ CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True, depth=1) 
 LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm", "V_plant", "work", "closed"]
 
 
-def state_of(message: Any) -> tuple[Array, Array]:
-    """State (6,) and input forces (3,) of a `joint_states` message; NaN and 0 for a body that it does not name."""
-    state, inputs = np.full(6, np.nan), np.zeros(3)
+def state_of(message: Any, many: tuple[int, ...] = ()) -> tuple[Array, Array]:
+    """State (6,) and input forces (3,) of a `joint_states` message; NaN and 0 for a body that it does not name.
+
+    Where the numbers of the message are columns (n,), with `many` = (n,), they are (6, n) and (3, n).
+    """
+    state, inputs = np.full((6, *many), np.nan), np.zeros((3, *many))
     for body, name in NAMES.items():
         if name in message.name:
             row = message.name.index(name)

@@ -12,16 +12,17 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.foreign import Foreign, Law
+from grasp_ros.exact.foreign import Foreign
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
-from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import MASS, OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
+from grasp_ros.scene.own_law import begin
 from grasp_ros.simulation.sampled_plant import NO_INTERVAL, Outputs, Record, SampledPlant
 from grasp_ros.simulation.trajectory import Loop
 
@@ -31,8 +32,8 @@ SHORTEST, LONGEST = 16, 8192  # ticks of the first block, and of any
 Changes = Mapping[int, Mapping[str, float]]
 
 
-def foreign_controllers(scene: Scene, controllers: Mapping[str, Law]) -> dict[int, Foreign]:
-    """Controllers from outside by side, as the kernels call them.
+def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> dict[int, Foreign]:
+    """Controllers from outside by side, as the kernels call them, at the beginning of a run.
 
     Raises
     ------
@@ -45,7 +46,7 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law]) -> dict[in
         if side not in arms:
             allowed = " or ".join(arms) or "none, without an arm"
             raise Refused(f"controllers: {side!r} is not allowed; allowed: {allowed}")
-        found[int(SIDES[side])] = Foreign(side, law)
+        found[int(SIDES[side])] = Foreign(side, begin(law, f"controllers: {side}"))
     return found
 
 

@@ -9,11 +9,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from grasp_ros.exact.foreign import Law
 from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK
 from grasp_ros.methods import registry
 from grasp_ros.methods.contract import ACCURACY_KNOB, Problem
 from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -42,7 +42,7 @@ def simulate(
     max_events: int = MAX_EVENTS,
     max_work: int = MAX_WORK,
     changes: Changes = MappingProxyType({}),
-    controllers: Mapping[str, Law] = MappingProxyType({}),
+    controllers: Mapping[str, Law | type] = MappingProxyType({}),
     progress: Progress = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
@@ -73,7 +73,8 @@ def simulate(
         Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
         sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
         as the scene says. The loop is sampled. Each is called once for every tick, the last one included. A function
-        that numba has compiled runs at full speed.
+        that numba has compiled runs at full speed. A class is made anew for the run; of any other object `reset()` is
+        called before it, if it has one.
     progress : callable, optional
         Called with the time reached, in s.
 

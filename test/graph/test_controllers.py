@@ -20,7 +20,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
-from grasp_ros.simulation import SampledPlant
+from grasp_ros.simulation import SampledPlant, simulate
 
 pytestmark = pytest.mark.slow  # real processes
 
@@ -84,6 +84,8 @@ def test_an_object_as_controller_gives_the_same_bits_as_without_ros(launch: Any,
     names: dict[str, Any] = {}
     exec(OWN, names)
     law, case = names["Limited"](), recording.scene
+    simulated = simulate(case, controllers={"left": names["Limited"]})
+    assert simulated.state.tobytes() == recording.state.tobytes()
     plant, states = SampledPlant(case.system, case.period_ns), []
     for tick in range(len(recording.tick)):
         states.append(plant.state.copy())

@@ -1,0 +1,84 @@
+"""Controllers of the user's own: where `module:object` is found, and how one begins a run."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from functools import reduce
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from grasp_ros.physics.control import Law
+from grasp_ros.physics.errors import Refused
+
+CALLABLE = "a callable of tick, time, x and v"
+
+
+def find_law(place: str, what: str) -> Law | type:
+    """The object that `module:object` names.
+
+    Parameters
+    ----------
+    place : str
+        "module:object"; a module of the working directory, or one that is installed, which goes first.
+    what : str
+        What a refusal begins with.
+
+    Raises
+    ------
+    Refused
+        If the words have another form, the module cannot be imported, or what they name is not there or cannot be
+        called.
+    """
+    if not all(place.partition(":")):
+        raise Refused(f"{what} is not allowed; allowed: module:object")
+    module, _, name = place.partition(":")
+    if (here := str(Path.cwd())) not in sys.path:
+        sys.path.append(here)  # last: a file of the user's does not take the place of a library
+    try:
+        holder: Any = import_module(module)
+    except ModuleNotFoundError as error:
+        if error.name is None or not f"{module}.".startswith(f"{error.name}."):
+            raise Refused(f"{what}: {module} cannot be imported: {error}") from None
+        raise Refused(f"{what}: no module {error.name}; allowed: one of the current directory, or one that is"
+                      " installed") from None
+    except (ImportError, SyntaxError) as error:
+        raise Refused(f"{what}: {module} cannot be imported: {error}") from None
+    try:
+        law: Any = reduce(getattr, name.split("."), holder)
+    except AttributeError:
+        raise Refused(f"{what}: {module} has no {name}; allowed: a callable of it") from None
+    if not callable(law):
+        raise Refused(f"{what}: {law!r} cannot be called; allowed: {CALLABLE}")
+    found: Law | type = law
+    return found
+
+
+def begin(law: Law | type, what: str) -> Law:
+    """What answers in a run that begins: a new object of a class; any other object itself, after its `reset`, if any.
+
+    Parameters
+    ----------
+    law : callable, or a class of such
+    what : str
+        What a refusal begins with.
+
+    Raises
+    ------
+    Refused
+        If it cannot be called, or is a class that cannot be called without arguments.
+    """
+    begun: Any = law
+    if isinstance(law, type):
+        try:
+            inspect.signature(law).bind()
+        except (TypeError, ValueError) as error:
+            raise Refused(f"{what}: {law.__name__}: {error}; allowed: a class that is called without arguments, or an"
+                          " object") from None
+        begun = law()
+    elif hasattr(law, "reset"):
+        law.reset()
+    if not callable(begun):
+        raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")
+    return begun  # type: ignore[no-any-return]
