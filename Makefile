@@ -12,9 +12,10 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 demo: install
 	$(BIN)/grasp run case_01
 
-# All tests, some minutes; `pytest -m "not slow"` runs those that take seconds.
+# All tests, some minutes, those with processes of their own one after the other; `pytest -m "not slow"` runs those that take seconds.
 test: lint
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile --ignore=test/graph
+	$(BIN)/pytest test/graph
 
 lint: install
 	$(BIN)/ruff check .

@@ -88,13 +88,19 @@ class Limits(NamedTuple):
     stop: Integers  # (1,) not 0: return after the row
 
 
+def _takes_own_arrays(result: Any) -> bool:
+    """Whether machine code is for arrays as they are here; somebody may have called it with read-only ones, too."""
+    arrays = [kind for kind in result.signature.args if isinstance(kind, types.Array)]
+    return all(kind.layout == "C" and kind.mutable for kind in arrays)
+
+
 class Door(types.WrapperAddressProtocol):
     """`advance`, for a call by its address."""
 
     def __init__(self) -> None:
         compile_kernels()
         dispatcher: Any = advance
-        (self._result,) = dispatcher.overloads.values()
+        self._result = next(filter(_takes_own_arrays, dispatcher.overloads.values()))
 
     def __wrapper_address__(self) -> int:
         """Its address."""
