@@ -190,7 +190,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
     slide = SlideCandidate(math.inf, Slide.FREE)
     if mode[OBJECT] != Slide.FREE:
-        slide = slide_in_contact(tables, plant, mode, n, h, out.work)
+        slide = slide_in_contact(tables, plant, state, n, h, out.work)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when) or math.isnan(slide.when):
         return math.nan
     s = min(h, left.when, right.when, slide.when)

@@ -14,12 +14,12 @@ import numpy as np
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, rate_lanes
-from grasp_ros.exact.records import Array, Integers, Plant, SlideCandidate, State, Tables
-from grasp_ros.exact.rest import DOUBT
+from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
 from grasp_ros.exact.roots import first_rise
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
+    EPS,
     FORCE,
     HERTZIAN,
     LANES,
@@ -34,6 +34,8 @@ from grasp_ros.physics.layout import (
     Pair,
     Slide,
 )
+
+ROUNDINGS = 16.0 * EPS  # of the sum of the terms of a push: those of a force, and of a state that rests under it
 
 
 @kernel
@@ -57,16 +59,22 @@ def apply_friction(plant: Plant, mode: Integers) -> None:
 
 
 @kernel
-def impact_on_object(plant: Plant, state: State) -> float:
-    """Sum of the impact forces on the object in N, (3)."""
-    total = 0.0
+def push_on_object(plant: Plant, state: State) -> Push:
+    """What pushes the object beside its dry friction, by (3), and the rounding of that and of the friction.
+
+    This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
+    by more than the rounding. Of 1 + p u', which may have cancelled, the terms count.
+    """
+    total, size = 0.0, abs(plant.given[OBJECT, FORCE]) + plant.coulomb
     for side in (LEFT, RIGHT):
         if state.mode[side] == Pair.CONTACT:
-            pair = plant.pairs[side]
-            force = elastic_force(pair[HERTZIAN], state.y[U_L + side])
-            force *= damping_factor(pair[DISSIPATION], approach(state.y, side))
+            loss = plant.pairs[side, DISSIPATION]
+            front, back = rate_lanes(side)
+            elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
+            force = elastic * damping_factor(loss, approach(state.y, side))
+            size += elastic * (1.0 + loss * (abs(state.y[front]) + abs(state.y[back])))
             total += force if side == LEFT else -force
-    return total
+    return Push(total + plant.given[OBJECT, FORCE], ROUNDINGS * size)
 
 
 @inlined
@@ -124,35 +132,22 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
             product[j + k] += factor * second[k]
 
 
-@kernel
-def push_rounding(plant: Plant, impacts: float) -> float:
-    """Rounding of what pushes the object, N: of impact forces of that sum, of friction and of the rest."""
-    return DOUBT * (impacts + (abs(plant.given[OBJECT, FORCE]) + plant.coulomb))
+@inlined
+def beyond(over: float, rounding: float) -> float:
+    """What a push is over its limit; within rounding so far below that it has to exceed it by more than that."""
+    return over - rounding if abs(over) <= rounding else over
 
 
 @kernel
-def doubt(tables: Tables, plant: Plant, mode: Integers) -> float:
-    """`push_rounding` at the begin of a Taylor step."""
-    c, impacts = tables.c, 0.0
-    for side in (LEFT, RIGHT):
-        if mode[side] == Pair.CONTACT:
-            front, back = rate_lanes(side)
-            loss, w = plant.pairs[side, DISSIPATION], c[Z_L + side]
-            factor = 1.0 + loss * (abs(c[front]) + abs(c[back]))
-            impacts += elastic_force(plant.pairs[side, HERTZIAN], w * w) * factor
-    return push_rounding(plant, impacts)
-
-
-@kernel
-def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, work: Integers) -> SlideCandidate:
+def slip_candidate(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
     """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction."""
-    row, copy = tables.row, tables.start.f
+    row, copy, rounding = tables.row, tables.start.f, push_on_object(plant, state).rounding
     push = row[0] + plant.given[OBJECT, FORCE]
     for k in range(n + 1):
         copy[k] = -row[k]
-    row[0] = push - plant.coulomb
+    row[0] = beyond(push - plant.coulomb, rounding)
     to_right = first_rise(row, n, h, 0.0, work)
-    copy[0] = -push - plant.coulomb
+    copy[0] = beyond(-push - plant.coulomb, rounding)
     to_left = first_rise(copy, n, h, 0.0, work)
     if math.isnan(to_right) or math.isnan(to_left):
         return SlideCandidate(math.nan, Slide.STUCK)
@@ -160,20 +155,20 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, work: Integer
 
 
 @kernel
-def slide_in_contact(tables: Tables, plant: Plant, mode: Integers, n: int, h: float, work: Integers) -> SlideCandidate:
+def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
     """First s in a Taylor step of length h at which an object under dry friction stops or slips.
 
     An object that has just slipped is pushed by no more than rounding beyond its friction: the next order decides.
     """
-    slide, row, c = mode[OBJECT], tables.row, tables.c
+    slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
         factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
         for k in range(n + 1):
             row[k] = factor * c[LANES * k + V_O]
         if row[0] == 0.0:
-            accelerating = c[LANES + TIME] * doubt(tables, plant, mode) / plant.bodies[OBJECT, MASS]
+            accelerating = c[LANES + TIME] * push_on_object(plant, state).rounding / plant.bodies[OBJECT, MASS]
             if abs(row[1]) <= accelerating:
                 row[1] = 0.0
         return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
-    impact_series(tables, plant, mode, n)
-    return slip_candidate(tables, plant, n, h, work)
+    impact_series(tables, plant, state.mode, n)
+    return slip_candidate(tables, plant, state, n, h, work)

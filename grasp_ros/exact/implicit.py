@@ -12,6 +12,7 @@ import numpy as np
 
 from grasp_ros.exact.collocation import (
     E_NODES,
+    MATRIX,
     SUMS,
     V_NODES,
     Approach,
@@ -21,11 +22,12 @@ from grasp_ros.exact.collocation import (
     motion_of,
     penetration_at,
 )
+from grasp_ros.exact.elimination import eliminate
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, reduced_mass
 from grasp_ros.exact.radau import DERIVATIVE, FIRST, INTEGRAL, NODES, STAGES, TO_LEGENDRE, TO_POWERS, times
 from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Tables
-from grasp_ros.exact.scales import STIFF, relaxation
+from grasp_ros.exact.scales import STIFF, relaxation, slow_relaxation
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -106,7 +108,7 @@ def write_lane(tables: Tables, lane: int, begin: float, h: float, rate: float) -
 
 @inlined
 def acceleration(f: Array, body: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
-    """Acceleration of an arm at a node, m/s^2.
+    """Acceleration of an arm at a node, m/s^2; where the pair is not stiff, without that of its damper.
 
     It follows from the forces, so that a slow arm keeps digits that v_o and u' do not have; where the pair is stiff,
     it is the impact force that has none.
@@ -115,21 +117,39 @@ def acceleration(f: Array, body: Array, side: Body, pair: Approach, start: Begin
     if pair.stiff:
         return (times(DERIVATIVE, j, f, V_NODES, 0.0) + pair.sign * (
             pair.rate * times(DERIVATIVE, j, f, nodes, pair.e))) / h
-    v = (start.v + f[V_NODES + j]) + pair.sign * (pair.rate * (f[nodes + j] - pair.offset))
     x_o = start.x + h * (NODES[j] * start.v + times(INTEGRAL, j, f, V_NODES, 0.0))
     x = x_o + pair.sign * penetration_at(f, side, pair, h, j)
-    return (body[FORCE] - (body[DAMPING] * v + body[STIFFNESS] * x) - pair.sign * impact_at(f, side, pair, h, j)
-            ) / body[MASS]
+    return (body[FORCE] - body[STIFFNESS] * x - pair.sign * impact_at(f, side, pair, h, j)) / body[MASS]
+
+
+@kernel
+def damp(tables: Tables, rate: float, v: float, h: float) -> None:
+    """Add -rate v to the accelerations at the nodes, in `tables.row`; v begins at `v` and is their integral.
+
+    The equations are never singular: the matrix of an even number of stages has no real eigenvalues.
+    """
+    f, row = tables.f, tables.row
+    for j in range(STAGES):
+        at = MATRIX + j * (STAGES + 1)
+        for i in range(STAGES):
+            f[at + i] = rate * h * INTEGRAL[j, i]
+        f[at + j] += 1.0
+        f[at + STAGES] = row[j] - rate * v
+    eliminate(f, MATRIX, STAGES + 1)
+    for j in range(STAGES):
+        row[j] = f[MATRIX + j * (STAGES + 1) + STAGES]
 
 
 @kernel
 def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, start: Begin) -> float:
     """Write the lanes of an arm from the nodes; returns the error of u', relative to what is allowed of 1."""
-    f, row, h = tables.f, tables.row, start.h
+    f, row, h, body = tables.f, tables.row, start.h, plant.bodies[side]
     nodes, largest = E_NODES + side * STAGES, 0.0
     v = V_L if side == LEFT else V_R
     for j in range(STAGES):
-        row[j] = acceleration(f, plant.bodies[side], side, pair, start, j)
+        row[j] = acceleration(f, body, side, pair, start, j)
+    if body[DAMPING] != 0.0 and not pair.stiff:
+        damp(tables, body[DAMPING] / body[MASS], state.y[v], h)
     write_lane(tables, v, state.y[v], h, 0.0)
     for j in range(STAGES):
         row[j] = pair.rate * (f[nodes + j] - pair.offset)
@@ -194,7 +214,7 @@ def wait(out: Output, steps: float) -> None:
 def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """Length in s of an implicit step, whose polynomials it writes; 0 where Taylor steps are cheaper."""
     fastest = max(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT))
-    slower = min(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT))
+    slower = slow_relaxation(plant, state)
     creeping = creep_rate(plant, state, LEFT) + creep_rate(plant, state, RIGHT)
     h, scale = min(span, LENGTH / (settings.rate + creeping)), velocity_scale(plant, state, settings)
     allowed = FINEST + 100.0 * settings.tolerance

@@ -95,7 +95,7 @@ class Integrator:
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
         self._bodies = self._given.copy()
-        self._plant = self._given, self._bodies, system.pairs, float(system.coulomb)
+        self._plant = self._given, self._bodies, system.pairs.copy(), float(system.coulomb)
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._events: list[Array] = []
@@ -171,7 +171,7 @@ class Integrator:
         """
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
-        times = _NO_TIMES if grid is None else np.ascontiguousarray(grid, dtype=float)
+        times = _NO_TIMES if grid is None else np.array(grid, dtype=float)
         loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
         return self.run(loop, times)
 

@@ -33,17 +33,16 @@ one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without t
 
 from __future__ import annotations
 
-from grasp_ros.exact.friction import apply_friction, impact_on_object, lift_friction
+from grasp_ros.exact.friction import apply_friction, lift_friction, push_on_object
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, rate_lanes, relative_motion, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import DOUBT, NEVER, impact_beside, is_negligible, leaning
+from grasp_ros.exact.rest import NEVER, impact_beside, is_negligible, leaning
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EPS,
-    FORCE,
     HERTZIAN,
     LEFT,
     OBJECT,
@@ -108,8 +107,8 @@ def initial_slide(plant: Plant, state: State) -> None:
         return
     direction = state.y[V_O]
     if direction == 0.0:
-        push = impact_on_object(plant, state) + plant.given[OBJECT, FORCE]
-        direction = push if abs(push) > plant.coulomb * (1.0 + DOUBT) else 0.0
+        push = push_on_object(plant, state)
+        direction = push.value if abs(push.value) - plant.coulomb > push.rounding else 0.0
     if direction == 0.0:
         state.mode[OBJECT] = Slide.STUCK
     else:

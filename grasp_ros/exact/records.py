@@ -197,6 +197,13 @@ class SlideCandidate(NamedTuple):
     what: Slide  # the mode that follows; after a stop `modes.initial_slide` decides
 
 
+class Push(NamedTuple):
+    """What pushes the object beside its dry friction."""
+
+    value: float  # N, to the right
+    rounding: float  # N, of it and of the friction
+
+
 class Leaning(NamedTuple):
     """Where a pair at rest at u = 0 goes: the first derivative of u that differs from zero."""
 
@@ -209,3 +216,4 @@ class Level(NamedTuple):
 
     value: float  # J of V
     size: float  # J, sum of the sizes of its terms
+    loose: float  # J by which it changes where an arm is put where object and u say

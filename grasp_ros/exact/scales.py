@@ -129,6 +129,20 @@ def relaxation(plant: Plant, state: State, side: Body) -> float:
     return pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u) / reduced_mass(plant.bodies, side)
 
 
+@kernel
+def slow_relaxation(plant: Plant, state: State) -> float:
+    """Rate in 1/s of the slower one of both relaxations; a light object hands the force of one pair on to the other."""
+    left, right = relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT)
+    if not min(left, right) > 0.0:
+        return 0.0
+    mass = plant.bodies[OBJECT, MASS]
+    a, b = mass / plant.bodies[LEFT, MASS], mass / plant.bodies[RIGHT, MASS]
+    own = 1.0 - 1.0 / ((1.0 + a) * (1.0 + b)) if a + b > 1e-8 else a + b
+    total = left + right
+    product = own * (left * right)  # in this order, for mirror images
+    return 2.0 * product / (total + math.sqrt(max(total * total - 4.0 * product, 0.0)))
+
+
 @inlined
 def is_squeezed(plant: Plant, state: State, span: float, out: Output) -> bool:
     """Whether a contact relaxes so fast that an implicit step may be worth its price; a trial that failed waits."""

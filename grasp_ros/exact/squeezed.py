@@ -108,13 +108,13 @@ def deliver(tables: Tables, h: float, t: float, flies: tuple[bool, bool], free: 
 def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: Integers) -> SlideCandidate:
     """First event of the object within an implicit step of h s, in units of it."""
     if state.mode[OBJECT] != Slide.STUCK:
-        return slide_in_contact(tables, plant, state.mode, STAGES, 1.0, work)
+        return slide_in_contact(tables, plant, state, STAGES, 1.0, work)
     f, row = tables.f, tables.row
     for j in range(STAGES):
         row[j] = impact_at(f, LEFT, motion_of(plant, state, LEFT, h), h, j) - impact_at(
             f, RIGHT, motion_of(plant, state, RIGHT, h), h, j)
     expand_row(tables)
-    return slip_candidate(tables, plant, STAGES - 1, 1.0, work)
+    return slip_candidate(tables, plant, state, STAGES - 1, 1.0, work)
 
 
 @kernel

@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from grasp_ros.exact.clock import tick
+from grasp_ros.exact.friction import push_on_object
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, keep_resting, reduced_mass
 from grasp_ros.exact.observer import leave_step, notify
@@ -126,9 +127,9 @@ def scaled_series(tables: Tables, plant: Plant, state: State, settings: Settings
     """Expand in a time scale that fits; returns it, and how far the series reach in s."""
     scale = time_scale(plant, state, settings)
     n, tail = ORDER, 2 * POWERS + max(left, right, 0) // 2
-    reach = 0.0
+    reach, doubt = 0.0, push_on_object(plant, state).rounding
     for _ in range(MAX_SCALES):
-        expand_start(tables.start, plant, state.y, n, left, right, scale)
+        expand_start(tables.start, plant, state.y, n, left, right, scale, doubt)
         reach = reach_of(tables.start.c, n, settings, tail)
         if 1.0 / FITS < reach < FITS or reach == math.inf:
             break

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.friction import push_rounding
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import rate_lanes
 from grasp_ros.exact.records import Array, Plant, Settings, Start
@@ -84,10 +83,12 @@ def force_of(f: Array, n: int, k: int, side: Body, a: int) -> float:
 
 
 @kernel
-def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right: int, scale: float) -> None:
+def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right: int, scale: float, doubt: float
+                 ) -> None:
     """Write the coefficients of all quantities of the state up to the order n.
 
-    `left`, `right`: a of the pairs; -a for one that parts from rest; NONE for one that does neither.
+    `left`, `right`: a of the pairs; -a for one that parts from rest; NONE for one that does neither. `doubt`: rounding
+    of what pushes the object, N.
     """
     c, f, pairs = start.c, start.f, plant.pairs
     for i in range(LANES * (n + 1)):
@@ -110,7 +111,7 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
         c[following + V_R] = share * pushed(plant.bodies[RIGHT], one, c[i + X_R], c[i + V_R], force_r)
         a_o = pushed(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force_l - force_r)
         slips = k == 0 and plant.coulomb > 0.0 and y[V_O] == 0.0  # within rounding the next order decides
-        if slips and abs(a_o) * plant.bodies[OBJECT, MASS] <= push_rounding(plant, force_l + force_r):
+        if slips and abs(a_o) * plant.bodies[OBJECT, MASS] <= doubt:
             a_o = 0.0
         c[following + V_O] = share * a_o
         c[following + X_L], c[following + X_R] = share * c[i + V_L], share * c[i + V_R]

@@ -144,9 +144,12 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     block, n = variants.block(), len(which)
     gains = np.zeros((n, 2, 2))
     gains[:] = block.laws[which][..., :SET_POINT]
+    loop, own, pairs, coulomb, state = map(np.ascontiguousarray, (
+        block.closed_loop[which], block.bodies[which], block.pairs[which], block.coulomb[which, 0, 0],
+        block.state[which, :, 0]))
     rows = Rows(
-        block.closed_loop[which], block.bodies[which], gains, block.pairs[which], block.coulomb[which, 0, 0],
-        block.state[which, :, 0], np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)), np.full(n, LEFT_OUT),
+        loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
+        np.full(n, LEFT_OUT),
     )
     integrate_rows(rows, variants.scene.duration, setup.accuracy, wanted, setup.settled, stop, setup.max_events,
                    setup.max_work)

@@ -119,7 +119,7 @@ class SampledPlant:
         array (n, 6)
             States at the offsets; only the rows reached, and the tick stays, if `status` is not DONE afterwards.
         """
-        times = NO_TIMES if offsets is None else np.ascontiguousarray(offsets, dtype=float)
+        times = NO_TIMES if offsets is None else np.array(offsets, dtype=float)
         waits = len(self._waiting)
         self.effort = self._waiting[self.tick % waits].copy() if waits else np.array(commands, dtype=float)
         record = self._go(Outputs(times, np.array([0, len(times)])), np.array([commands], dtype=float))
@@ -140,7 +140,7 @@ class SampledPlant:
         """
         count = len(answers)
         outputs = Outputs(np.zeros(count), np.arange(count + 1))
-        return self._go(outputs, np.ascontiguousarray(answers, dtype=float)).states
+        return self._go(outputs, np.array(answers, dtype=float, order="C")).states
 
     def run(
         self, laws: Mapping[int, ControlLaw], outputs: Outputs, foreign: Mapping[int, Foreign] | None = None,

@@ -92,7 +92,7 @@ def simulate(
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
-    grid = np.asarray(grid, dtype=float)
+    grid = np.array(grid, dtype=float)  # kernels are compiled anew for arrays that nobody may write to
     _check_grid(scene, grid)
     _check_ticks(scene, sampled, max_work)
     foreign = foreign_controllers(scene, controllers)

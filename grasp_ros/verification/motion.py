@@ -19,8 +19,18 @@ from numpy.typing import NDArray
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import DISSIPATION, EPS, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
-from grasp_ros.verification.roundings import TINY, Impacts, Sizes, elapsed, impacts, sizes, walk
-from grasp_ros.verification.segments import Detail
+from grasp_ros.verification.roundings import (
+    TINY,
+    Impacts,
+    Sizes,
+    accelerations,
+    elapsed,
+    impact_speed,
+    impacts,
+    sizes,
+    walk,
+)
+from grasp_ros.verification.segments import INNER, Detail
 
 SMOOTH = 1e-6  # of its integral's size: an integrand whose two quadratures differ by more is not resolved
 
@@ -72,8 +82,9 @@ def _ledgers(detail: Detail) -> Iterator[Ledger]:
     momentum, unit = _momentum(detail, size)
     friction = _friction(detail, pairs)
     everywhere = np.asarray(smooth[:, present].all(axis=1))
-    yield _positions(detail, size, smooth, present)
-    yield _steps(detail, size, smooth, present)
+    noise = EPS * impact_speed(detail, pairs)
+    yield _positions(detail, size, noise, smooth, present)
+    yield _steps(detail, size, noise, accelerations(detail, pairs), smooth, present)
     yield from _bodies(detail, pairs, momentum, unit, friction, (smooth, pushed), present)
     whole, doubt = momentum[:, present].sum(axis=1), unit[:, present].sum(axis=1)
     doubt = doubt + EPS * sum(pair.bounce[:, 0] for pair in pairs)
@@ -147,30 +158,38 @@ def _bodies(detail: Detail, pairs: list[Impacts], momentum: Array, unit: Array, 
             yield Ledger(f"momentum, {name}", error, resolved[0][:, body] & resolved[1])
 
 
-def _positions(detail: Detail, size: Sizes, smooth: NDArray[np.bool_], present: list[int]) -> Ledger:
-    """dx = int v dt, the worst of all bodies."""
+def _positions(detail: Detail, size: Sizes, noise: Array, smooth: NDArray[np.bool_], present: list[int]) -> Ledger:
+    """dx = int v dt, the worst of all bodies.
+
+    The impact forces of a contact at rest may balance; `noise` (k, 3) is what their roundings make of v. An implicit
+    step, whose nodes depend on each other, has it from its begin on.
+    """
     way, doubt = detail.integral(detail.v[:, 1:-1])
     late = EPS * detail.pieces.end[:, None]
     span = (detail.pieces.end - detail.pieces.begin)[:, None]
     fastest = np.abs(detail.v).max(axis=(1, 2))[:, None]  # a touch sets u = 0, and x of the arm follows x_o
-    unit = EPS * (size.x[:, 0] + size.v[:, 0] * span) + late * fastest + doubt
+    unit = EPS * (size.x[:, 0] + size.v[:, 0] * span) + noise * span + late * fastest + doubt
     unit = unit + _wander(detail, detail.v) + TINY
     error = np.abs(detail.x[:, -1] - detail.x[:, 0] - way) / unit
     anywhere = np.asarray(smooth[:, present].any(axis=1))
     return Ledger("position", np.where(smooth, error, 0.0)[:, present].max(axis=1), anywhere)
 
 
-def _steps(detail: Detail, size: Sizes, smooth: NDArray[np.bool_], present: list[int]) -> Ledger:
-    """From each output to the next a body goes as far as its velocities at both say, the worst of all bodies."""
+def _steps(detail: Detail, size: Sizes, noise: Array, acting: Array, smooth: NDArray[np.bool_], present: list[int]
+           ) -> Ledger:
+    """From each output to the next a body goes as far as its velocities at both say, the worst of all bodies.
+
+    Differences of velocities hide a swing that is faster than the outputs; the accelerations there, `acting`, do not.
+    """
     step = np.maximum(np.diff(detail.t, axis=1)[..., None], TINY)
-    rate = np.abs(np.diff(detail.v, axis=1)) / step
+    rate = np.maximum(np.abs(np.diff(detail.v, axis=1)) / step, np.maximum(acting[:, 1:], acting[:, :-1]))
     steepest = rate.copy()  # of the neighbours, too: a velocity may turn between two outputs
     steepest[:, 1:] = np.maximum(steepest[:, 1:], rate[:, :-1])
     steepest[:, :-1] = np.maximum(steepest[:, :-1], rate[:, 1:])
     mean = 0.5 * (detail.v[:, 1:] + detail.v[:, :-1])
     beyond = np.abs(np.diff(detail.x, axis=1) - mean * step) - 0.5 * steepest * step**2
     fastest = np.abs(detail.v).max(axis=(1, 2))[:, None]
-    unit = EPS * size.x[:, 0] + EPS * detail.pieces.end[:, None] * fastest + TINY
+    unit = EPS * size.x[:, 0] + EPS * detail.pieces.end[:, None] * fastest + noise * step.max(axis=1) + TINY
     error = np.where(smooth, beyond.max(axis=1) / unit, 0.0)[:, present].max(axis=1)
     return Ledger("position, output to output", error, np.asarray(smooth[:, present].any(axis=1)))
 
@@ -186,7 +205,10 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
     taken = (damping * v * v).sum(axis=2) + detail.run.scene.system.coulomb * np.abs(v[..., OBJECT])
     unit = (mass * size.v * np.abs(v).max(axis=1, keepdims=True) + np.abs(stiffness) * size.x * size.x
             + np.abs(force) * size.x).sum(axis=(1, 2))
-    power = (np.abs(v) * (np.abs(stiffness * x) + np.abs(damping * v) + np.abs(force))).sum(axis=2).max(axis=1)
+    held = np.abs(stiffness * x) + np.abs(force)
+    power = (np.abs(v) * (held + np.abs(damping * v))).sum(axis=2).max(axis=1)
+    fastest = np.abs(v).max(axis=(1, 2))  # at a touch x of the arm follows x_o
+    power = power + np.where(detail.pieces.kind != INNER, fastest * held.max(axis=(1, 2)), 0.0)
     for pair in pairs:
         hertzian = detail.run.scene.system.pairs[pair.side, HERTZIAN]
         deep = np.maximum(pair.u[:, [0, -1]], 0.0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, MASS, OBJECT, STIFFNESS, Pair, Slide, Transition
 from grasp_ros.physics.model import Array
-from grasp_ros.verification.roundings import TINY, Impacts, impacts, sizes
+from grasp_ros.verification.roundings import TINY, Impacts, impacts, push_noise, sizes
 from grasp_ros.verification.segments import Detail
 
 BEFORE: dict[Transition, tuple[int, ...]] = {  # modes that an event ends
@@ -129,15 +129,17 @@ def _pair_events(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding
     """u = 0 at touch and release, u' = -1/p at the others, from the state at the recorded time."""
     times, kinds = _recorded(detail, pair.side)
     piece, hit = _at_events(detail, times)
+    before = np.maximum(piece - 1, 0)  # what rounding explains comes from the way to the event
+    seen = (detail.pieces.end[before] == detail.pieces.begin[piece]) | (detail.pieces.begin[piece] == 0.0)
+    piece, hit, before = piece[seen], hit[seen], before[seen]
     if not len(hit):
         return
     p = detail.run.scene.system.pairs[pair.side, DISSIPATION]
     through_zero = np.array([kinds[k] in (Transition.TOUCH, Transition.RELEASE) for k in hit])
-    before = np.maximum(piece - 1, 0)  # what rounding explains comes from the way to the event
-    depth = np.abs(pair.u[piece, 0]) / np.maximum(unit.u[piece, 0], unit.u[before, -1])
+    depth = np.abs(pair.u[piece, 0]) / np.maximum(unit.u[piece, 0], unit.u[before].max(axis=1))
     speed = np.full_like(depth, np.inf)
     if p > 0.0:
-        speed = np.abs(pair.d[piece, 0] + 1.0 / p) / np.maximum(unit.d[piece, 0], unit.d[before, -1])
+        speed = np.abs(pair.d[piece, 0] + 1.0 / p) / np.maximum(unit.d[piece, 0], unit.d[before].max(axis=1))
     yield Finding("event time", float(np.where(through_zero, depth, speed).max()))
 
 
@@ -161,4 +163,5 @@ def _object(detail: Detail, pairs: list[Impacts], acting: Array) -> Iterator[Fin
     piece, hit = _at_events(detail, times)
     if len(hit):
         scale = EPS * np.abs(detail.v[piece, :, OBJECT]).max(axis=1) + late[piece, 0] * acting[piece, 0, OBJECT] + TINY
+        scale = scale + push_noise(detail, pairs)[np.maximum(piece - 1, 0)]  # on the way there
         yield Finding("event time", float((v[piece, 0] / scale).max()))

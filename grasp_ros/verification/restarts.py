@@ -21,11 +21,22 @@ from grasp_ros.verification.cases.case import Product, Unfinished
 from grasp_ros.verification.cases.scenes import reference
 from grasp_ros.verification.deadline import Deadline, deadline
 from grasp_ros.verification.relations import FLIP
-from grasp_ros.verification.roundings import TINY, impacts, largest, rates, sizes, walk
+from grasp_ros.verification.roundings import (
+    TINY,
+    Impacts,
+    accelerations,
+    impact_speed,
+    impacts,
+    largest,
+    rates,
+    sizes,
+    walk,
+)
 from grasp_ros.verification.segments import FIRST, LAST, PLACES, Detail
 
 NUDGE = 2.0**-46  # of the size of a state
 PATTERN = np.array([1.0, -0.7, 0.4, 0.9, -1.0, 0.6])  # signs and parts of a nudge
+OTHER = np.array([0.5, 1.0, -0.8, 0.3, 0.9, 1.0])  # where one nudge shows least, another one does
 BESIDE = 1e-7  # of a time: outputs that near to an event are beside it
 AHEAD = 60  # pieces over which a restarted run is compared
 REFERENCE_STEPS = 100  # contact steps beyond which the reference, which counts in 25 digits, takes too long
@@ -51,12 +62,15 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     there = [COLUMN[body] + k for body in detail.run.scene.system.present for k in (0, 1)]
     scale = sizes(detail)
     whole, size = _rows(detail.x[pieces], detail.v[pieces]), _rows(scale.x[first], scale.v[first])[0]
-    again, *nudged = (_restart(detail, first, whole[0] + nudge * size * PATTERN, times - start, product)
-                      for nudge in (0.0, NUDGE, -NUDGE))
-    grown = np.maximum(*(np.abs(other - again) for other in nudged)) * (EPS / NUDGE)
+    again, *nudged = (_restart(detail, first, whole[0] + nudge * size * pattern, times - start, product)
+                      for nudge, pattern in ((0.0, PATTERN), (NUDGE, PATTERN), (-NUDGE, PATTERN), (NUDGE, OTHER)))
+    grown = np.max([np.abs(other - again) for other in nudged], axis=0) * (EPS / NUDGE)
     reached = np.abs(whole)
     reached[:, ::2] = np.maximum.accumulate(reached[:, ::2].max(axis=1))[:, None]  # in a contact x follows x_o
-    unit = grown + EPS * (reached + size) + _late(times, whole) + _noise(detail, pieces, times - start) + TINY
+    pairs = impacts(detail, scale)
+    moving = _rows(np.abs(detail.v[pieces]), accelerations(detail, pairs)[pieces])
+    unit = grown + EPS * (reached + size) + _late(times, whole, moving) + TINY
+    unit += _noise(detail, pairs, pieces, times - start)
     unit[:, 1::2] += EPS * reached[:, ::2] * rates(detail.bodies[first])[[LEFT, OBJECT, RIGHT]]
     error = (np.abs(again - whole) / unit)[:, there].max(axis=1) / walk(detail.run, 1)
     yield "splitting", float(error[~_beside_event(detail, pieces).ravel()].max(initial=0.0))
@@ -77,25 +91,23 @@ def _rows(x: Array, v: Array) -> Array:
     return states
 
 
-def _late(times: Array, states: Array) -> Array:
-    """What a rounding of the times changes in states (n, 6)."""
+def _late(times: Array, states: Array, moving: Array) -> Array:
+    """What a rounding of the times changes in states (n, 6), which move at rates of these sizes."""
     steps = np.abs(np.diff(states, axis=0)) / np.maximum(np.diff(times), TINY)[:, None]
     steps[np.diff(times) == 0.0] = 0.0
-    rates = np.zeros_like(states)
-    rates[:-1] = steps
-    rates[1:] = np.maximum(rates[1:], steps)
-    late: Array = EPS * times[:, None] * rates
+    fastest = moving.copy()
+    fastest[:-1] = np.maximum(fastest[:-1], steps)
+    fastest[1:] = np.maximum(fastest[1:], steps)
+    late: Array = EPS * times[:, None] * fastest
     return late
 
 
-def _noise(detail: Detail, pieces: slice, offsets: Array) -> Array:
+def _noise(detail: Detail, pairs: list[Impacts], pieces: slice, offsets: Array) -> Array:
     """What roundings of the constant forces, which may balance each other, and of impacts make of states (n, 6)."""
     mass, force = detail.bodies[pieces.start, :, MASS], np.abs(detail.bodies[pieces.start, :, FORCE])
     force[OBJECT] += detail.run.scene.system.coulomb
-    bounce = np.zeros(3)
-    for pair in impacts(detail, sizes(detail)):
-        bounce[[pair.side, OBJECT]] += pair.bounce[pieces].max()
-    speed = EPS * (force * offsets[:, None] + bounce) / np.where(mass > 0.0, mass, 1.0)
+    speed = EPS * (force * offsets[:, None] / np.where(mass > 0.0, mass, 1.0)
+                   + impact_speed(detail, pairs)[pieces].max(axis=0))
     return _rows(speed * offsets[:, None], speed)
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import EPS, LEFT, MASS, OBJECT, Work
+from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, STIFFNESS, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.segments import FIRST, Detail
@@ -68,12 +68,12 @@ def rates(bodies: Array) -> Array:
 
 
 def sizes(detail: Detail) -> Sizes:
-    """Sizes of positions and velocities; v of a swing has the digits of its amplitude."""
+    """Sizes of positions and velocities; v of a swing has the digits of its amplitude, that of a fall those it had."""
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
-    own = largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True))
+    own = _with_way(detail, largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True)))
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(stiffness != 0.0, np.abs(force / stiffness), 0.0)
-    swing = rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own)
+    swing = np.where(stiffness != 0.0, rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own), np.inf)
     gained = (np.abs(stiffness) * own + np.abs(force)) / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
     touching = np.zeros(len(own), dtype=bool)
     for side in detail.run.scene.system.contacts:
@@ -83,6 +83,57 @@ def sizes(detail: Detail) -> Sizes:
     v = np.abs(detail.v).max(axis=1, keepdims=True)
     v = v + np.minimum(swing, gained) + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
     return Sizes(np.maximum(own, near) + DIED_OUT / EPS, v + DIED_OUT / EPS)
+
+
+def _with_way(detail: Detail, own: Array) -> Array:
+    """Sizes (k, ...), those behind an event no less than on the way to it, whose roundings the state there has.
+
+    Where that way is not among the pieces, it may have been any.
+    """
+    begins, ends = detail.pieces.begin[1:], detail.pieces.end[:-1]
+    found = own.copy()
+    before = np.where((begins == ends)[:, None, None], own[:-1], own.max(axis=0))
+    behind = np.isin(begins, detail.run.event_table[:, 0])[:, None, None]
+    found[1:] = np.where(behind, np.maximum(own[1:], before), own[1:])
+    return found
+
+
+def accelerations(detail: Detail, pairs: list[Impacts]) -> Array:
+    """Sizes of the accelerations (k, n + 2, 3) in m/s^2, from the model; of dry friction no more than its limit."""
+    mass, stiffness, damping, force = (detail.bodies[:, None, :, column]
+                                       for column in (MASS, STIFFNESS, DAMPING, FORCE))
+    total = force - stiffness * detail.x - damping * detail.v
+    for pair in pairs:
+        push = pair.force if pair.side == LEFT else -pair.force
+        total[..., pair.side] -= push
+        total[..., OBJECT] += push
+    total = np.abs(total)
+    total[..., OBJECT] += detail.run.scene.system.coulomb
+    found: Array = total / np.where(mass > 0.0, mass, 1.0)
+    return found
+
+
+def impact_speed(detail: Detail, pairs: list[Impacts]) -> Array:
+    """Speeds (k, 3) in m/s that the impacts of a segment can give to its bodies."""
+    momentum = np.zeros((len(detail.x), 3))
+    for pair in pairs:
+        momentum[:, pair.side] += pair.bounce[:, 0]
+        momentum[:, OBJECT] += pair.bounce[:, 0]
+    mass = detail.bodies[..., MASS]
+    found: Array = momentum / np.where(mass > 0.0, mass, 1.0)
+    return found
+
+
+def push_noise(detail: Detail, pairs: list[Impacts]) -> Array:
+    """Speed (k,) in m/s that the roundings of the impacts give to the object from the begin of its segment on.
+
+    Where 1 + p u' nearly vanishes they are far larger than those of the force.
+    """
+    noise = sum(((pair.by_u * pair.noise + pair.by_d * pair.noise_d).max(axis=1) for pair in pairs),
+                np.zeros(len(detail.x)))
+    mass = detail.bodies[:, OBJECT, MASS]
+    found: Array = noise * elapsed(detail)[:, 0, 0] / np.where(mass > 0.0, mass, 1.0)
+    return found
 
 
 def elapsed(detail: Detail) -> Array:

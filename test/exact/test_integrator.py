@@ -13,9 +13,11 @@ import pytest
 from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.hybrid import advance
+from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
 from grasp_ros.physics.layout import Work
 from grasp_ros.physics.system import System
+from grasp_ros.simulation import simulate
 from grasp_ros.verification.cases.modes import STARTS
 
 GRID = np.linspace(0.0, 20.0, 201)
@@ -92,6 +94,16 @@ def test_advance_by_nothing_changes_nothing() -> None:
     integrator = Integrator(scene.system, continuous=True)
     assert np.array_equal(integrator.advance(0.0, np.array([0.0])), scene.initial_state[None])
     assert np.array_equal(integrator.state, scene.initial_state)
+
+
+def test_any_array_of_output_times_runs_on_the_same_machine_code() -> None:
+    grid = np.linspace(0.0, 1.0, 21)[::2]
+    grid.setflags(write=False)
+    compile_kernels()
+    known = len(advance.signatures)
+    Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True).advance(1.0, grid)
+    simulate(scenes.load("case_01"), grid=grid)
+    assert len(advance.signatures) == known
 
 
 def test_event_budget_stops_with_its_status() -> None:

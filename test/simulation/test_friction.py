@@ -131,3 +131,20 @@ def test_the_object_sticks_exactly_while_the_arms_push_too_weakly() -> None:
     lean = next(output.value(motion.scene.system, 0, motion.state[-1]) for output in motion.scene.outputs)
     assert lean == pytest.approx(-15.0 * motion.state[-1, 0], rel=1e-4)  # the arm rests against it
     assert 0.5 < lean < 1.0
+
+
+@pytest.mark.parametrize("beside", [-1, 0, 1])
+def test_an_object_pushed_by_exactly_its_friction_sticks(beside: int) -> None:
+    """A finger rests on it with 10 N, a rounding more or less than the friction: noise must not make it slip."""
+    force = 1e4 * 0.01**1.5
+    limit = force * (1.0 + beside * 2.0**-52)
+    scene = scenes.compose("limit", {
+        "time": {"duration_s": 1.0, "control_period_s": 0.001},
+        "left_arm": {"mass_kg": 1.0, "position_m": 0.01, "velocity_m_per_s": 0.0},
+        "left_feedback": {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": force},
+        "left_contact": {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.5},
+        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
+        "object_friction": {"coulomb_N": limit}})
+    assert simulate(scene).events == []
+    more = scene.changed({"left_feedback.feed_forward_N": 1.01 * force})
+    assert [event.kind for event in simulate(more).events] == [Transition.SLIP]
