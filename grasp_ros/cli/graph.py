@@ -14,8 +14,9 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError, become
+from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
+from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
 
 
 def add_to(commands: Any) -> None:
@@ -39,6 +40,13 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--namespace", default="/", metavar="NS", help="of all names, /clock too; for several graphs")
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
+    sub.add_argument(
+        "--peer-timeout", type=float, metavar="S",
+        help="wall time without a sign of life or an answer of a node after which it is silent (default 1.5 s)",
+    )
+    sub.add_argument(
+        "--on-silence", choices=("end", "wait"), default="end", help="what is done when a node is gone or silent"
+    )
     sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
     sub.add_argument("bag", type=Path)
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
@@ -73,12 +81,14 @@ def _run(options: argparse.Namespace) -> int:
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,
+        peer_timeout=options.peer_timeout, on_silence=options.on_silence,
     )
     begin = time.monotonic()
     try:
         stopped = _live(graph)
     except GraphError as error:
-        print(f"grasp: {error}", file=sys.stderr)
+        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
+        print(f"grasp: {error}{there}", file=sys.stderr)
         return 1
     seconds = time.monotonic() - begin
     if not (graph.bag / "metadata.yaml").exists():
@@ -90,15 +100,15 @@ def _run(options: argparse.Namespace) -> int:
 def _live(graph: Graph) -> bool:
     """Start a graph, wait for its end and stop it; returns whether a signal has ended it."""
     received: list[int] = []
-    for number in STOP_SIGNALS:  # only noted: an exception could leave a process behind
-        signal.signal(number, lambda which, _: received.append(which))
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    note_signals(received)
     try:
         graph.start()
         graph.wait(received)
     finally:
         graph.stop()
-        for number in STOP_SIGNALS:
-            signal.signal(number, signal.default_int_handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return bool(received)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -31,8 +32,13 @@ def launch() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
     yield call
     for process in started:
-        process.terminate()  # not kill: `grasp run` has processes of its own to end
-        process.wait(DEADLINE)
+        process.terminate()  # a clean end at first: what follows must not meet the processes of `grasp run`
+        process.send_signal(signal.SIGCONT)
+        try:
+            process.wait(DEADLINE / 2)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(DEADLINE)
 
 
 @pytest.fixture

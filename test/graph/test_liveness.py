@@ -1,0 +1,192 @@
+"""A node that is killed or frozen is noticed and named by those that need it, within two seconds."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from processes import DEADLINE, START, children, wait_for
+from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from grasp_ros import scene
+from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.verify import verify
+from grasp_ros.scene.topics import RUN as RUNNING
+
+pytestmark = pytest.mark.slow  # real processes
+
+NODES = ("monitor", "left_controller", "right_controller", "plant")
+
+
+class Terminals:
+    """Four nodes, each with its terminal."""
+
+    def __init__(self, launch: Any, directory: Path, scene: str, options: tuple[str, ...] = ()) -> None:
+        self.directory, self.processes = directory, {}
+        for name in NODES:
+            own = {"plant": ["-p", f"scene:={scene}"], "monitor": ["-p", f"bag:={directory / 'bag'}"]}.get(name, [])
+            wait = [] if name == "monitor" else ["-p", "wait_for_monitor:=true"]
+            with (directory / name).open("w") as log:
+                words = [*START, name, "--ros-args", *own, *wait, *options]
+                self.processes[name] = launch(*words, stderr=log)
+        file = directory / "bag" / "bag.mcap"
+        wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
+
+    def said(self, name: str) -> str:
+        return (self.directory / name).read_text()
+
+    def wait_for(self, name: str, words: str) -> None:
+        """Until a node has said something."""
+        wait_for(lambda: bool(re.search(words, self.said(name))), words)
+
+
+@pytest.fixture
+def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
+    """Levels of /diagnostics by node, as they are now."""
+    peer, executor = node
+    found: dict[str, bytes] = {}
+
+    def note(message: DiagnosticArray) -> None:
+        found.update({status.name: status.level for status in message.status})
+
+    peer.create_subscription(DiagnosticArray, "/diagnostics", note, 10)
+
+    def now() -> dict[str, bytes]:
+        executor.spin_once(timeout_sec=0.01)
+        return found
+
+    return now
+
+
+def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_path: Path, levels: Any) -> None:
+    """Each of four nodes frozen and thawed in turn: no tick is lost, and the bag is right."""
+    (tmp_path / "scene.yaml").write_text(scene.load("case_01", ["time.duration_s=3600"]).to_yaml())
+    graph = Terminals(launch, tmp_path, str(tmp_path / "scene.yaml"))
+    needs = {  # who misses a message of the first
+        "left_controller": ("plant", r"effort_command: no (sign of life|answer).* of /left_controller for 1\.\d s"),
+        "monitor": ("plant", r"lyapunov: no (sign of life|answer).* of /monitor for 1\.\d s"),
+        "plant": ("right_controller", r"joint_states: no sign of life of /plant for 1\.5 s"),
+    }
+    for name, (other, words) in needs.items():
+        graph.processes[name].send_signal(signal.SIGSTOP)
+        graph.wait_for(other, words)
+        wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.ERROR, "an error in /diagnostics")
+        graph.processes[name].send_signal(signal.SIGCONT)
+        wait_for(lambda other=other, words=words: "is back after" in graph.said(other).split("waits on")[-1], "its end")
+        wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.WARN, "a warning from then on")
+        assert "this process was stopped, or busy, for" in graph.said(name)
+    graph.processes["right_controller"].kill()
+    graph.wait_for("plant", r"right/effort_command: no (sign of life|answer).* of /right_controller for 1\.\d s")
+    launch(*START, "right_controller", "--ros-args", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL)
+    wait_for(lambda: "right/effort_command: is back after" in graph.said("plant"), "the one in its place")
+    size = (tmp_path / "bag" / "bag.mcap").stat().st_size
+    wait_for(lambda: (tmp_path / "bag" / "bag.mcap").stat().st_size > size + 20_000, "more ticks")
+    graph.processes["plant"].send_signal(signal.SIGINT)
+    assert graph.processes["monitor"].wait(DEADLINE) == 1
+    assert re.search(r"joint_states: /plant has ended; the bag has \d+ ticks", graph.said("monitor"))
+    recording = bag.read(tmp_path / "bag")
+    assert not any(recording.missing.values())
+    assert verify(recording).holds
+    assert "Traceback" not in "".join(graph.said(name) for name in NODES)
+
+
+RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
+FAULTS = [
+    ("left_controller", signal.SIGSTOP, r"left/effort_command: no (sign of life|answer).* of /left_controller for 1"),
+    ("monitor", signal.SIGKILL, r"monitor: ended with exit status -9"),
+    ("plant", signal.SIGSTOP, r"joint_states: no sign of life of /plant for 1\.5 s"),
+    ("together", signal.SIGSTOP, r"graph: was stopped, and did not go on for 1\.5 s"),
+]
+
+
+@pytest.mark.parametrize(("name", "number", "words"), FAULTS, ids=[f"{name} {fault.name}" for name, fault, _ in FAULTS])
+def test_a_run_ends_with_a_sentence(
+    launch: Any, tmp_path: Path, name: str, number: signal.Signals, words: str
+) -> None:
+    options = ["--one-process"] if name == "together" else []
+    run = launch(*RUN, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    file = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: file.exists() and file.stat().st_size > 50_000, "a bag that grows")
+    os.kill(children(tmp_path)[name], number)
+    _, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 1
+    assert re.search(words, err), err
+    assert err.splitlines()[-1].endswith("run/bag has what was recorded")
+    assert "Traceback" not in err
+    recording = bag.read(file.parent)
+    assert verify(recording).holds
+    assert not any(recording.missing.values())
+    assert (number == signal.SIGKILL) is not (file.parent / "metadata.yaml").exists()
+
+
+FORGETFUL = """
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node("forgetful")
+commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
+lost = [0, 50_000_000, 200_000_000]
+def answer(state):
+    if state.header.stamp.nanosec in lost:  # as if it had not come
+        lost.remove(state.header.stamp.nanosec)
+        return
+    i = state.name.index("left")
+    command = WrenchStamped(header=state.header)
+    command.wrench.force.x = -5.0 * state.position[i] - 0.5 * state.velocity[i]
+    commands.publish(command)
+while commands.get_subscription_count() < 2:
+    rclpy.spin_once(node, timeout_sec=0.01)
+node.create_subscription(JointState, "joint_states", answer, 1000)
+rclpy.spin(node)
+"""
+
+
+def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, tmp_path: Path) -> None:
+    """With a controller that gives no sign of life."""
+    run = launch(
+        *RUN, "--set", "time.duration_s=0.3", "--without", "left_controller", cwd=tmp_path, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    launch(sys.executable, "-c", FORGETFUL, stderr=subprocess.DEVNULL)
+    out, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    assert "equal, bit for bit" in out
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert recording.tick.tolist() == list(range(301))
+    assert not any(recording.missing.values())
+    assert int(recording.lost["repeated messages"]) + int(recording.lost["repeated states"]) > 0
+
+
+def test_what_the_executor_was_not_told_of_is_found(node: tuple[Any, SingleThreadedExecutor]) -> None:
+    """A message, and a call of a service, that lie there without a wake-up: nobody spins this node."""
+    peer, executor = node
+    waiting = GraspNode("waiting", context=peer.context)
+    heard: list[str] = []
+    waiting.subscribe(RUNNING, lambda message: heard.append(message.data))
+    waiting.create_service(Trigger, "~/status", lambda _, answer: answer)
+    publisher = peer.create_publisher(String, RUNNING.name, messages.qos(RUNNING))
+    publisher.publish(String(data="text"))
+    client = peer.create_client(Trigger, "/waiting/status")
+    assert client.wait_for_service(timeout_sec=DEADLINE)
+    future = client.call_async(Trigger.Request())
+
+    def found() -> bool:
+        waiting.sweep()
+        executor.spin_once(timeout_sec=0.01)
+        return bool(heard) and future.done()
+
+    wait_for(found, "both")
+    assert heard == ["text"]
+    waiting.end()
