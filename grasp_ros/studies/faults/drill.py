@@ -1,0 +1,189 @@
+"""One drill: a graph at work, an accident, and the wait for what comes of it."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.verify import verify
+from grasp_ros.studies.faults.output import NO_NEWS, plain
+from grasp_ros.studies.faults.stage import NODES, Failed, Stage
+from grasp_ros.studies.faults.verdict import LOST_SECONDS, Evidence
+
+DEADLINE_SECONDS = 30.0
+STILL_SECONDS = 10.0  # without a tick and without a word: it hangs
+GO_ON_TICKS, GO_ON_SECONDS = 200, 2.5  # after the accident: it goes on
+CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
+
+
+class Drill(NamedTuple):
+    """A fault and how it is caused.
+
+    Attributes
+    ----------
+    name : str
+        As `--only` takes it.
+    group, fault : str
+        For the reader.
+    start : callable
+        Starts the graph.
+    strike : callable
+        Causes the accident once the graph is at work; may take its time.
+    mute : bool
+        Whether nobody can read what is said from then on.
+    nothing_to_keep : bool
+        Whether the accident takes the bag away.
+    moment : str
+        "strike": the accident happens when it is caused; "notice": it happens by itself, at the latest when it is
+        noticed.
+    settle : bool
+        Whether the graph is at work before the accident.
+    quick : bool
+        Whether `--quick` plays it.
+    play : callable, optional
+        In place of the common course of a drill.
+    """
+
+    name: str
+    group: str
+    fault: str
+    start: Callable[[Stage], object]
+    strike: Callable[[Stage], object]
+    mute: bool = False
+    nothing_to_keep: bool = False
+    moment: str = "strike"
+    settle: bool = True
+    quick: bool = False
+    play: Callable[[Stage], Evidence] | None = None
+
+
+class Skipped(Exception):  # noqa: N818 - no error
+    """A drill that cannot be played here, and why."""
+
+
+def play(drill: Drill, stage: Stage) -> Evidence:
+    """Play a drill to its end; returns what is known then."""
+    if drill.play is not None:
+        return drill.play(stage)
+    drill.start(stage)
+    if drill.settle:
+        stage.settle()
+    shared, before = stage.shared_memory(), stage.published
+    begin = time.monotonic()
+    drill.strike(stage)
+    struck, reached = time.monotonic(), max(stage.published, before)
+    hung = not stage.wait(lambda: _over(stage) or _goes_on(stage, struck, reached) or _stands(stage, struck),
+                          DEADLINE_SECONDS) or _stands(stage, struck)
+    went_on = not _over(stage) and not hung
+    ended = math.nan if went_on or hung else time.monotonic()
+    asked = time.monotonic()
+    left = _close(stage, wait=math.isfinite(ended))
+    evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, ended=ended - begin,
+                        nothing_to_keep=drill.nothing_to_keep)
+    _read_words(evidence, stage, begin, asked if went_on or hung else math.inf)
+    evidence.exits = {name: process.returncode for name, process in stage.started.items()
+                      if name.split()[-1] in (*NODES, "run") and process.returncode is not None}
+    evidence.shared = sum(Path(name).exists() for name in shared - stage.shared_memory())
+    at = begin + evidence.noticed if drill.moment == "notice" and evidence.noticed >= 0.0 else begin
+    _read_bag(evidence, stage, struck if went_on else at)
+    return evidence
+
+
+def _over(stage: Stage) -> bool:
+    """Whether `grasp run` has ended, or in four terminals plant and monitor have."""
+    awaited = [name for name in ("grasp run", "plant", "monitor") if name in stage.started]
+    return all(stage.started[name].poll() is not None for name in awaited)
+
+
+def _goes_on(stage: Stage, struck: float, reached: int) -> bool:
+    return time.monotonic() > struck + GO_ON_SECONDS and stage.published > reached + GO_ON_TICKS
+
+
+def _stands(stage: Stage, struck: float) -> bool:
+    """Whether nothing has happened for a while."""
+    last = max(struck, float(stage.times[max(stage.published, 0)]),
+               *(line.when for line in stage.output.lines[-1:] if not NO_NEWS.match(line.text)))
+    return time.monotonic() > last + STILL_SECONDS
+
+
+def _close(stage: Stage, wait: bool) -> list[int]:
+    """End what is left as a user would; returns the processes that outlive it.
+
+    What was started by `grasp run` has to end by itself when that has ended; whoever sits in a terminal ends what is
+    in it with a Ctrl-C.
+    """
+    alone = "grasp run" not in stage.started
+    if alone or not wait:
+        for process in stage.started.values():
+            if process.poll() is None:
+                process.send_signal(signal.SIGCONT)
+                process.send_signal(signal.SIGINT)
+    stage.wait(lambda: all(process.poll() is not None for process in stage.started.values()) and not stage.living(),
+               CLOSE_SECONDS)
+    left = stage.living()
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    for process in stage.started.values():
+        try:
+            process.wait(CLOSE_SECONDS)
+        except subprocess.TimeoutExpired as error:
+            raise Failed(f"{error.cmd}: cannot be killed") from None
+    stage.output.finish(1.0)
+    return left
+
+
+def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> None:
+    """What the user sees, and when the first sentence or report came."""
+    news = stage.output.news(begin, end)
+    concerns = stage.companion.ask("concerns")["concerns"]
+    reports = [(when, words) for when, _, words in concerns.values() if begin <= when <= end]
+    times = [line.when for line in news] + [when for when, _ in reports]
+    evidence.noticed = min(times, default=math.nan) - begin
+    words = [line.text for line in news if not line.text.startswith(" ")]
+    spoken = [text for text in words if text.startswith(("grasp:", "["))] or words
+    said = spoken[-1] if spoken else f"/diagnostics: {reports[-1][1]}" if reports else ""
+    evidence.said = plain(said, [stage.place])
+    evidence.traceback = plain(stage.output.traceback, [stage.place])
+
+
+def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
+    """What was kept: of all ticks that the plant had published before the accident."""
+    evidence.published = stage.published
+    if evidence.nothing_to_keep:
+        return
+    try:
+        recording = bag.read(stage.bag)
+    except bag.BagError as error:
+        evidence.wrong = plain(str(error), [stage.place])
+        evidence.lost = math.inf
+        return
+    evidence.kept = int(recording.tick[-1])
+    last = min(accident, float(stage.times[stage.published]))
+    if evidence.kept < stage.published:
+        evidence.lost = max(0.0, last - float(stage.times[evidence.kept + 1]))
+    gone = {name: number for name, number in recording.missing.items() if number}
+    if gone:
+        evidence.wrong = f"missing: {gone}"
+        evidence.lost = math.inf
+        return
+    found = verify(recording)
+    if not found.holds:
+        evidence.wrong = found.words
+
+
+def lost_words(evidence: Evidence) -> str:
+    """What is kept, for a reader."""
+    if evidence.nothing_to_keep:
+        return "nothing is there to keep"
+    if evidence.kept < 0:
+        return "nothing"
+    if evidence.lost > LOST_SECONDS:
+        return f"all but {evidence.lost:.1f} s" if math.isfinite(evidence.lost) else evidence.wrong
+    return "all" if not evidence.lost else f"all but at most {LOST_SECONDS} s"

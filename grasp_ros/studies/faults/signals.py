@@ -1,0 +1,97 @@
+"""Drills: a process is killed, frozen, or asked to end."""
+
+from __future__ import annotations
+
+import signal
+import time
+from functools import partial
+from signal import Signals
+
+from grasp_ros.studies.faults.drill import Drill
+from grasp_ros.studies.faults.stage import NODES, Stage
+
+FROZEN_SECONDS = 5.0
+MOMENT_SECONDS = 1.0  # a freeze that nobody may take for an end
+SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
+UNDER, ALONE = "under `grasp run`", "in four terminals"
+QUICK = ("SIGKILL-monitor", "SIGSTOP-left_controller", "SIGKILL-grasp")
+
+
+def drills() -> list[Drill]:
+    """Every signal to every process, and some at other moments."""
+    found = []
+    for number in SIGNALS:
+        found += [_one(UNDER, Stage.run, number, name) for name in (*NODES, "grasp run")]
+    for number in SIGNALS:
+        found += [_one(ALONE, Stage.terminals, number, name) for name in NODES]
+    return [*found, *_at_other_moments()]
+
+
+def _one(group: str, start: object, number: str, name: str) -> Drill:
+    words = f"{number} of {'`grasp run`' if name == 'grasp run' else 'the ' + name.replace('_', ' ')}"
+    key = f"{number}-{name.split()[0]}" + ("" if group == UNDER else "-alone")
+    if number == "SIGSTOP":
+        words += f", SIGCONT after {FROZEN_SECONDS:g} s"
+    strike = partial(freeze, name=name) if number == "SIGSTOP" else partial(send, name=name, number=Signals[number])
+    return Drill(key, f"{group}", words, start, strike, quick=key in QUICK)  # type: ignore[arg-type]
+
+
+def send(stage: Stage, name: str, number: Signals) -> None:
+    """Send a signal."""
+    stage.signal(name, number)
+
+
+def freeze(stage: Stage, name: str, seconds: float = FROZEN_SECONDS) -> None:
+    """Stop a process and let it go on later, if it is still there."""
+    pid = stage.pid(name)
+    stage.signal(name, signal.SIGSTOP)
+    stage.wait(lambda: pid not in stage.living(), seconds)
+    if pid in stage.living():
+        stage.signal(name, signal.SIGCONT)
+
+
+def freeze_all(stage: Stage) -> None:
+    """Stop one node after the other for a moment."""
+    for name in NODES:
+        freeze(stage, name, MOMENT_SECONDS)
+
+
+def _at_other_moments() -> list[Drill]:
+    group = "at other moments"
+    return [
+        Drill("freeze-a-moment", group, f"SIGSTOP of each node in turn, SIGCONT after {MOMENT_SECONDS:g} s", Stage.run,
+              freeze_all),
+        Drill("kill-while-starting", group, "SIGKILL of the left controller while it starts", Stage.run,
+              partial(_while_starting, name="left_controller"), settle=False, nothing_to_keep=True),
+        Drill("kill-monitor-while-starting", group, "SIGKILL of the monitor while it starts", Stage.run,
+              partial(_while_starting, name="monitor"), settle=False, nothing_to_keep=True),
+        Drill("kill-run-while-starting", group, "SIGKILL of `grasp run` while its nodes start", Stage.run,
+              _run_while_starting, settle=False, nothing_to_keep=True),
+        Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
+              partial(Stage.run), partial(send, name="left_controller", number=signal.SIGKILL)),
+        Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
+              partial(send, name="together", number=signal.SIGKILL)),
+        Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
+              partial(send, name="grasp run", number=signal.SIGKILL)),
+        Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice),
+    ]
+
+
+def _while_starting(stage: Stage, name: str) -> None:
+    stage.wait(lambda: stage.has(name), 60.0)
+    stage.signal(name, signal.SIGKILL)
+
+
+def _run_while_starting(stage: Stage) -> None:
+    stage.wait(lambda: stage.has("monitor"), 60.0)
+    stage.signal("grasp run", signal.SIGKILL)
+
+
+def _one_process(stage: Stage) -> None:
+    stage.run("--one-process")
+
+
+def _twice(stage: Stage) -> None:
+    stage.signal("grasp run", signal.SIGINT)
+    time.sleep(0.05)
+    stage.signal("grasp run", signal.SIGINT)
