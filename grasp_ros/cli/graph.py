@@ -14,8 +14,9 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.graph.processes import STOP_SIGNALS, Graph, GraphError, become
+from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
+from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
 
 
 def add_to(commands: Any) -> None:
@@ -90,15 +91,15 @@ def _run(options: argparse.Namespace) -> int:
 def _live(graph: Graph) -> bool:
     """Start a graph, wait for its end and stop it; returns whether a signal has ended it."""
     received: list[int] = []
-    for number in STOP_SIGNALS:  # only noted: an exception could leave a process behind
-        signal.signal(number, lambda which, _: received.append(which))
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    note_signals(received)
     try:
         graph.start()
         graph.wait(received)
     finally:
         graph.stop()
-        for number in STOP_SIGNALS:
-            signal.signal(number, signal.default_int_handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)
     return bool(received)
 
 

@@ -1,12 +1,13 @@
 """`grasp`: the command line for everything that needs no ROS, and for starting the four processes together.
 
 Exit statuses: 0; 1 if a run failed, or if this package has a fault, which shows its traceback; 2 for input that is
-refused, in one line; 130 after a Ctrl-C.
+refused, in one line; 130 after a Ctrl-C, or another signal that ends a process.
 """
 
 from __future__ import annotations
 
 import argparse
+import errno
 import io
 import os
 import sys
@@ -14,20 +15,34 @@ from collections.abc import Sequence
 
 from grasp_ros.cli import graph, map, plot, simulate, studies
 from grasp_ros.cli.arguments import Command
+from grasp_ros.graph.stopping import raise_on_signals
 from grasp_ros.physics.errors import Refused
+
+NOBODY = (errno.EPIPE, errno.EIO)  # the reader of our output, `head` say, has had enough; the terminal is gone
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `grasp`; returns the exit status."""
-    options = _parser().parse_args(arguments)
-    command: Command = options.command
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
-        sys.stdout.reconfigure(errors="backslashreplace")
     try:
+        return _status(arguments)
+    except OSError as error:
+        if error.errno not in NOBODY:
+            raise
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(nothing, stream.fileno())
+        return 0 if error.errno == errno.EPIPE else 1
+
+
+def _status(arguments: Sequence[str] | None) -> int:
+    """Run a command; in one line what it refuses."""
+    try:
+        raise_on_signals()
+        options = _parser().parse_args(arguments)
+        command: Command = options.command
+        if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
+            sys.stdout.reconfigure(errors="backslashreplace")
         return command(options)
-    except BrokenPipeError:  # the reader of our output, `head` say, has had enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except Refused as error:
         print(f"grasp: {' '.join(str(error).splitlines())}", file=sys.stderr)
         return 2

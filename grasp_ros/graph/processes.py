@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
+from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
@@ -21,7 +22,6 @@ from grasp_ros.scene.files import writing
 STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
@@ -40,7 +40,7 @@ def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> No
 
 
 def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
-    """Command line of a node, or of "together" and the nodes of its process."""
+    """Command line of a node, or of "together" and the nodes of its process; after "child" it ends with this one."""
     words = [word for key, value in parameters.items() for word in ("-p", f"{key}:={value}")]
     root = namespace.rstrip("/")
     names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
@@ -90,6 +90,7 @@ class Graph:
     one_process: bool = False
     namespace: str = "/"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+    _lifeline: int = -1  # the children read the other end: when this one closes, however that comes, they end
 
     @property
     def bag(self) -> Path:
@@ -98,6 +99,8 @@ class Graph:
 
     def start(self) -> None:
         """Start the processes, each in a session of its own: a Ctrl-C reaches them through `stop`, once.
+
+        They end when this process does, whatever ends it.
 
         Raises
         ------
@@ -133,20 +136,22 @@ class Graph:
         }
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+        end, self._lifeline = os.pipe()
         try:
             for name, command in self._commands(settings).items():
                 self.processes[name] = subprocess.Popen(
-                    command, env=environment, start_new_session=True, stderr=self.errors
+                    command, env=environment, start_new_session=True, stdin=end, stderr=self.errors
                 )
         finally:
+            os.close(end)
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
         """Command lines by the names of the processes."""
         if not self.one_process:
-            return {name: _command([name], parameters, self.namespace) for name, parameters in settings.items()}
+            return {name: _command(["child", name], numbers, self.namespace) for name, numbers in settings.items()}
         together = {f"{name}:{key}": value for name, numbers in settings.items() for key, value in numbers.items()}
-        return {"graph": _command(["together", *settings], together, self.namespace)}
+        return {"graph": _command(["child", "together", *settings], together, self.namespace)}
 
     def wait(self, received: Sequence[int]) -> None:
         """Wait until plant and monitor have finished, or until a signal has been received.
@@ -174,6 +179,7 @@ class Graph:
         for process in self.processes.values():
             if process.poll() is None:
                 process.send_signal(signal.SIGINT)
+                process.send_signal(signal.SIGCONT)  # in case it was stopped
         deadline = time.monotonic() + STOP_SECONDS
         for process in self.processes.values():
             try:
@@ -181,4 +187,7 @@ class Graph:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        if self._lifeline >= 0:
+            os.close(self._lifeline)
+            self._lifeline = -1
         return {name: process.returncode for name, process in self.processes.items()}

@@ -12,11 +12,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
-from processes import DEADLINE
+from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -27,41 +25,39 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
-from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, ROBOT_DESCRIPTION, state_of
+from grasp_ros.scene.topics import LYAPUNOV_NAMES, ROBOT_DESCRIPTION
 
 pytestmark = pytest.mark.slow  # real processes
 CONFIG = Path(__file__).parents[2] / "config"
 
 
 def test_markers_show_the_states_and_only_where_somebody_looks(
-    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+    tmp_path: Path, node: tuple[Any, SingleThreadedExecutor], launch: Any
 ) -> None:
+    """The run waits for a controller until somebody looks."""
     peer, executor = node
     pictures: list[MarkerArray] = []
-    states: dict[int, np.ndarray] = {}
     texts: list[str] = []
     peer.create_subscription(MarkerArray, "markers", pictures.append, 100)
-    peer.create_subscription(
-        JointState, "joint_states", lambda m: states.update({messages.to_ns(m.header.stamp): state_of(m)[0]}),
-        messages.qos(JOINT_STATES),
-    )
     peer.create_subscription(
         String, "robot_description", lambda m: texts.append(m.data), messages.qos(ROBOT_DESCRIPTION)
     )
     case = scene.load("case_01", ["time.duration_s=0.6"])
-    graph = Graph(case, tmp_path / "run", ACCURACY)
+    graph = Graph(case, tmp_path / "run", ACCURACY, without=["left_controller"])
     graph.start()
     try:
+        wait_for(lambda: executor.spin_once(timeout_sec=0.05) or bool(texts), "the description of the robot")
+        launch(*START, "left_controller")
         while graph.processes["plant"].poll() is None:
             executor.spin_once(timeout_sec=0.05)
         graph.wait([])
     finally:
         graph.stop()
+    recording = bag.read(graph.bag)
+    states = dict(zip((recording.tick * case.period_ns).tolist(), recording.state, strict=True))
     assert len(pictures) > 3
     seen = [(messages.to_ns(picture.markers[0].header.stamp), picture) for picture in pictures]
-    compared = [(states[time_ns], picture) for time_ns, picture in seen if time_ns in states]
-    assert compared
-    for state, picture in compared:
+    for state, picture in [(states[time_ns], picture) for time_ns, picture in seen]:
         boxes = {m.id: m.pose.position.x for m in picture.markers if m.ns == "masses"}
         assert boxes[LEFT] == state[0] - 0.06
         assert boxes[RIGHT] == state[4] + 0.06

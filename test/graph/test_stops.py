@@ -21,14 +21,18 @@ from processes import DEADLINE, START, wait_for
 from grasp_ros import scene
 from grasp_ros.graph import bag, processes
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real processes
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("moment", ["recording", "starting"])
+@pytest.mark.parametrize(
+    ("number", "moment"),
+    [(signal.SIGINT, "recording"), (signal.SIGHUP, "recording"), (signal.SIGTERM, "starting"),
+     (signal.SIGQUIT, "starting")],
+)
 def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signal.Signals, moment: str) -> None:
     process = launch(
         sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run"),
@@ -55,8 +59,10 @@ def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signa
     assert left_behind.stdout == ""
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_lonely_nodes_end_cleanly_on_a_signal(launch: Any, tmp_path: Path, number: signal.Signals) -> None:
+@pytest.mark.parametrize("numbers", [STOP_SIGNALS, STOP_SIGNALS[::-1]], ids=["one way", "the other way"])
+def test_lonely_nodes_end_cleanly_on_a_signal(
+    launch: Any, tmp_path: Path, numbers: tuple[signal.Signals, ...]
+) -> None:
     """All four at the same time, each in a domain of its own."""
     domains = {"plant": 120, "left_controller": 121, "right_controller": 122, "monitor": 123}
     started = {
@@ -64,7 +70,7 @@ def test_lonely_nodes_end_cleanly_on_a_signal(launch: Any, tmp_path: Path, numbe
                      env={**os.environ, "ROS_DOMAIN_ID": str(domain)})
         for name, domain in domains.items()
     }
-    for name, process in started.items():
+    for (name, process), number in zip(started.items(), numbers, strict=True):
         context = rclpy.Context()
         rclpy.init(context=context, domain_id=domains[name])
         observer = rclpy.create_node("observer", context=context)
@@ -111,7 +117,7 @@ def test_run_notices_a_plant_that_was_stopped(
 @pytest.fixture
 def signal_handlers() -> Iterator[None]:
     """Puts back what `grasp run` changes in its process."""
-    before = {number: signal.getsignal(number) for number in processes.STOP_SIGNALS}
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)

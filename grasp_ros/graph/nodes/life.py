@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import rclpy
 from rclpy.experimental import EventsExecutor
@@ -29,7 +30,8 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
             nodes.append(make())
         spin(nodes, received)
     except Refused as error:
-        print(error, file=sys.stderr)
+        with suppress(OSError):  # nobody reads it
+            print(error, file=sys.stderr)
         return 2
     finally:
         for node in nodes:

@@ -5,9 +5,12 @@ When it advances is decided by one of two loops, `lockstep` (the default) and `f
 
 from __future__ import annotations
 
+import io
 import math
+import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 from tqdm import tqdm
@@ -28,6 +31,21 @@ from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
 UNWATCHED_REPORTS = 4  # in a row without a monitor: its last value may be on the way, and a busy machine stalls
+
+
+class _Terminal(io.TextIOBase):
+    """The standard error output, as long as somebody reads it: a terminal that is gone ends no run."""
+
+    encoding = sys.stderr.encoding
+
+    def write(self, text: str) -> int:
+        with suppress(OSError):
+            sys.stderr.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            sys.stderr.flush()
 
 
 class Plant(SteppedNode):
@@ -61,7 +79,9 @@ class Plant(SteppedNode):
         self.resets = 0
         self._begin = math.nan
         self.counters.update(tick=0, resets=0)
-        self._bar = tqdm(total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=not progress)
+        self._bar = tqdm(
+            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=not progress, file=_Terminal()
+        )
         self._states = self.publisher(JOINT_STATES)
         self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
         self._simulated = self.publisher(CLOCK)

@@ -10,15 +10,19 @@ import signal
 import sys
 from importlib import import_module
 
-STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
 
 
-def main(name: str) -> int:
-    """Run the node of that name; returns the exit status of the process."""
+def main(name: str, child: bool = False) -> int:
+    """Run the node of that name; returns the exit status of the process.
+
+    A child ends with the process that holds the other end of its standard input.
+    """
     received: list[int] = []
-    for number in STOP_SIGNALS:
-        signal.signal(number, lambda which, _: received.append(which))
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with both blocked
+    note_signals(received)
+    if child:
+        end_with_parent(received)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
     module = import_module(f"grasp_ros.graph.nodes.{'controller' if name.endswith('controller') else name}")
     status: int = module.main(name, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
@@ -47,4 +51,7 @@ def monitor() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    is_child = sys.argv[1] == "child"
+    if is_child:
+        del sys.argv[1]
+    sys.exit(main(sys.argv[1], is_child))

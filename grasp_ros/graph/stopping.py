@@ -1,0 +1,62 @@
+"""The signals that end a process cleanly, and the end of the process that started it.
+
+A process of the graph inherits the reading end of a pipe as its standard input. Whatever ends the process that holds
+the other end, a SIGKILL included, closes it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+import threading
+from contextlib import suppress
+
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
+GRACE_SECONDS = 10.0  # to end cleanly after the process that started this one has ended
+PR_SET_PDEATHSIG = 1  # of prctl(2)
+
+
+def note_signals(received: list[int]) -> None:
+    """From now on, only note the signals that end a process: an exception could leave something half done.
+
+    A SIGHUP that is ignored, as `nohup` does it, stays ignored.
+    """
+    for number in STOP_SIGNALS:
+        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, lambda which, _: received.append(which))
+
+
+def raise_on_signals() -> None:
+    """Let every signal that ends a process be a KeyboardInterrupt, so that files are closed and parts removed.
+
+    Processes that are forked from this one have the system's own reactions again.
+    """
+    changed = [number for number in STOP_SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
+    for number in changed:
+        signal.signal(number, signal.default_int_handler)
+
+    def give_back() -> None:
+        for number in changed:
+            signal.signal(number, signal.SIG_DFL)
+
+    if changed:
+        os.register_at_fork(after_in_child=give_back)
+
+
+def end_with_parent(received: list[int]) -> None:
+    """Note the end of the process that holds the other end of the standard input; then end, if late by force."""
+    if sys.platform == "linux":  # a process that was stopped could not end: its parent's death lets it go on
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGCONT)
+
+    def watch() -> None:
+        with suppress(OSError):
+            while os.read(0, 1):
+                pass
+        received.append(signal.SIGHUP)
+        threading.Event().wait(GRACE_SECONDS)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="parent", daemon=True).start()

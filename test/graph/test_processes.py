@@ -1,0 +1,114 @@
+"""What `grasp run` has started never outlives it, whatever ends it, and what was recorded is whole."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import DEADLINE, wait_for
+
+from grasp_ros.graph import bag
+from grasp_ros.scene.topics import JOINT_STATES
+
+pytestmark = pytest.mark.slow  # real processes
+
+RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
+TERMINAL = """
+import fcntl, os, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
+
+
+def children(directory: Path) -> dict[str, int]:
+    """Process ids of the graph that writes to a directory, by node."""
+    found = {}
+    for process in Path("/proc").iterdir():
+        try:
+            words = (process / "cmdline").read_bytes().decode().split("\0") if process.name.isdigit() else []
+            own = words and (process / "cwd").resolve() == directory.resolve()
+        except OSError:  # it has just ended
+            continue
+        if own and "grasp_ros.graph.nodes.start" in words:
+            found[words[words.index("child") + 1]] = int(process.name)
+    return found
+
+
+def records(directory: Path) -> bool:
+    file = directory / "run" / "bag" / "bag.mcap"
+    return file.exists() and file.stat().st_size > 300_000
+
+
+def check_bag(directory: Path) -> None:
+    """It was closed, and lacks nothing."""
+    assert (directory / "run" / "bag" / "metadata.yaml").exists()
+    recording = bag.read(directory / "run" / "bag")
+    assert np.array_equal(recording.tick, np.arange(recording.counts[JOINT_STATES.name]))
+    assert recording.lost["end"] == "closed"
+
+
+@pytest.fixture
+def survivors(tmp_path: Path) -> Iterator[None]:
+    """Ends what a failed test has left behind."""
+    yield
+    for process in children(tmp_path).values():
+        os.kill(process, signal.SIGKILL)
+
+
+@pytest.mark.usefixtures("survivors")
+@pytest.mark.parametrize("options", [[], ["--one-process"]], ids=["four processes", "one process"])
+def test_nothing_outlives_a_run_that_is_killed(launch: Any, tmp_path: Path, options: list[str]) -> None:
+    """Not even a process that is stopped at that moment. Before, the reader of its progress has had enough."""
+    run = launch(*RUN, *options, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    assert run.stderr.read(10)
+    run.stderr.close()
+    wait_for(lambda: records(tmp_path), "a bag that grows")
+    started = children(tmp_path)
+    assert len(started) == (1 if options else 4)
+    os.kill(started.get("right_controller", 0) or started["together"], signal.SIGSTOP)
+    run.kill()
+    run.wait(DEADLINE)
+    wait_for(lambda: not children(tmp_path), "the end of all processes")
+    check_bag(tmp_path)
+
+
+@pytest.mark.usefixtures("survivors")
+def test_a_terminal_that_is_closed_ends_a_run_cleanly(launch: Any, tmp_path: Path) -> None:
+    ours, theirs = os.openpty()
+    run = launch(
+        sys.executable, "-c", TERMINAL, *RUN, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs,
+        start_new_session=True,
+    )
+    os.close(theirs)
+    wait_for(lambda: records(tmp_path), "a bag that grows")
+    os.close(ours)
+    assert run.wait(DEADLINE) in (0, 1)
+    assert not children(tmp_path)
+    check_bag(tmp_path)
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
+def test_a_long_command_ends_cleanly_on_a_signal(launch: Any, tmp_path: Path, number: signal.Signals) -> None:
+    command = launch(
+        sys.executable, "-m", "grasp_ros.cli", "simulate", "case_01", "--set", "time.duration_s=1e6", "-o", "out.npz",
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    handlers = Path(f"/proc/{command.pid}/status")
+
+    def caught() -> bool:
+        [mask] = [line.split()[1] for line in handlers.read_text().splitlines() if line.startswith("SigCgt")]
+        return bool(int(mask, 16) >> (signal.SIGHUP - 1) & 1)
+
+    wait_for(caught, "the handlers")
+    command.send_signal(number)
+    _, err = command.communicate(timeout=DEADLINE)
+    assert command.returncode == 130
+    assert err.splitlines()[-1] == "grasp: interrupted"
+    assert not list(tmp_path.iterdir())
