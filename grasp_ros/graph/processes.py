@@ -35,8 +35,7 @@ def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> No
         Its parameters, as `-p` takes them.
     namespace : str
     """
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
-    os.execve(sys.executable, _command([node], parameters, namespace), environment)
+    os.execv(sys.executable, _command([node], parameters, namespace))
 
 
 def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
@@ -115,11 +114,7 @@ class Graph:
         with writing(self.directory):
             self.directory.mkdir(parents=True)
             scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
-        environment = {
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "ROS_LOG_DIR": str(self.directory / "log"),
-            **os.environ,
-        }
+        environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ}
         settings = {
             "monitor": {"bag": json.dumps(str(self.bag))},
             **{

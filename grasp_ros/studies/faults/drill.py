@@ -11,15 +11,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from grasp_ros.graph import bag
 from grasp_ros.graph.verify import verify
+from grasp_ros.scene.topics import LYAPUNOV_NAMES, WINDOW
 from grasp_ros.studies.faults.output import NO_NEWS, plain
 from grasp_ros.studies.faults.stage import NODES, Failed, Stage
 from grasp_ros.studies.faults.verdict import LOST_SECONDS, Evidence
 
+TERMINALS = (*NODES, "run")  # last words of the names of what a user has in a terminal
 DEADLINE_SECONDS = 30.0
 STILL_SECONDS = 10.0  # without a tick and without a word: it hangs
-GO_ON_TICKS, GO_ON_SECONDS = 200, 2.5  # after the accident: it goes on
+GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 2.5  # after the accident: it goes on, and not without its monitor
 CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
 
 
@@ -40,11 +44,12 @@ class Drill(NamedTuple):
         Whether nobody can read what is said from then on.
     nothing_to_keep : bool
         Whether the accident takes the bag away.
-    moment : str
-        "strike": the accident happens when it is caused; "notice": it happens by itself, at the latest when it is
-        noticed.
+    by_itself : bool
+        Whether the accident happens by itself, and so counts from when it is noticed.
     settle : bool
         Whether the graph is at work before the accident.
+    asked : bool
+        Whether it is no accident, but how a user ends a run.
     quick : bool
         Whether `--quick` plays it.
     play : callable, optional
@@ -58,8 +63,9 @@ class Drill(NamedTuple):
     strike: Callable[[Stage], object]
     mute: bool = False
     nothing_to_keep: bool = False
-    moment: str = "strike"
+    by_itself: bool = False
     settle: bool = True
+    asked: bool = False
     quick: bool = False
     play: Callable[[Stage], Evidence] | None = None
 
@@ -76,8 +82,10 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     if drill.settle:
         stage.settle()
     shared, before = stage.shared_memory(), stage.published
-    begin = time.monotonic()
+    called = time.monotonic()
     drill.strike(stage)
+    stage.happens(called)
+    begin = stage.accident
     struck, reached = time.monotonic(), max(stage.published, before)
     hung = not stage.wait(lambda: _over(stage) or _goes_on(stage, struck, reached) or _stands(stage, struck),
                           DEADLINE_SECONDS) or _stands(stage, struck)
@@ -85,13 +93,15 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     ended = math.nan if went_on or hung else time.monotonic()
     asked = time.monotonic()
     left = _close(stage, wait=math.isfinite(ended))
-    evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, ended=ended - begin,
-                        nothing_to_keep=drill.nothing_to_keep)
+    evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, asked=drill.asked,
+                        ended=ended - begin, nothing_to_keep=drill.nothing_to_keep)
     _read_words(evidence, stage, begin, asked if went_on or hung else math.inf)
     evidence.exits = {name: process.returncode for name, process in stage.started.items()
-                      if name.split()[-1] in (*NODES, "run") and process.returncode is not None}
+                      if name.split()[-1] in TERMINALS and process.returncode is not None}
     evidence.shared = sum(Path(name).exists() for name in shared - stage.shared_memory())
-    at = begin + evidence.noticed if drill.moment == "notice" and evidence.noticed >= 0.0 else begin
+    at = begin
+    if drill.by_itself and math.isfinite(evidence.noticed):
+        at, evidence.noticed = begin + evidence.noticed, 0.0
     _read_bag(evidence, stage, struck if went_on else at)
     return evidence
 
@@ -119,12 +129,10 @@ def _close(stage: Stage, wait: bool) -> list[int]:
     What was started by `grasp run` has to end by itself when that has ended; whoever sits in a terminal ends what is
     in it with a Ctrl-C.
     """
-    alone = "grasp run" not in stage.started
-    if alone or not wait:
-        for process in stage.started.values():
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.send_signal(signal.SIGINT)
+    for name, process in stage.started.items():
+        if process.poll() is None and not (wait and name == "grasp run"):
+            process.send_signal(signal.SIGCONT)
+            process.send_signal(signal.SIGINT if name.split()[-1] in TERMINALS else signal.SIGTERM)
     stage.wait(lambda: all(process.poll() is not None for process in stage.started.values()) and not stage.living(),
                CLOSE_SECONDS)
     left = stage.living()
@@ -146,8 +154,8 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     reports = [(when, words) for when, _, words in concerns.values() if begin <= when <= end]
     times = [line.when for line in news] + [when for when, _ in reports]
     evidence.noticed = min(times, default=math.nan) - begin
-    words = [line.text for line in news if not line.text.startswith(" ")]
-    spoken = [text for text in words if text.startswith(("grasp:", "["))] or words
+    words = [line.text for line in news]
+    spoken = [text for text in words if text.startswith(("grasp:", "[", "recorded ", "interrupted"))] or words
     said = spoken[-1] if spoken else f"/diagnostics: {reports[-1][1]}" if reports else ""
     evidence.said = plain(said, [stage.place])
     evidence.traceback = plain(stage.output.traceback, [stage.place])
@@ -165,17 +173,25 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
         evidence.lost = math.inf
         return
     evidence.kept = int(recording.tick[-1])
-    last = min(accident, float(stage.times[stage.published]))
-    if evidence.kept < stage.published:
-        evidence.lost = max(0.0, last - float(stage.times[evidence.kept + 1]))
     gone = {name: number for name, number in recording.missing.items() if number}
-    if gone:
-        evidence.wrong = f"missing: {gone}"
-        evidence.lost = math.inf
-        return
     found = verify(recording)
-    if not found.holds:
+    if found.difference is not None or (found.problem and not gone):
         evidence.wrong = found.words
+    first = _first_gap(recording) if gone else evidence.kept + 1
+    if first <= stage.published:
+        last = min(accident, float(stage.times[stage.published]))
+        evidence.lost = max(0.0, last - float(stage.times[first]))
+
+
+def _first_gap(recording: bag.Recording) -> int:
+    """The first tick that is not in the bag as a whole."""
+    commands = recording.command if recording.running.lockstep else np.zeros_like(recording.command)
+    judged = recording.lyapunov[:, [LYAPUNOV_NAMES.index("mode")]]
+    outputs = [values[:, None] for values in recording.outputs.values()]
+    whole = np.isfinite(np.hstack([recording.state, commands, judged, *outputs])).all(axis=1)
+    there = np.zeros(int(recording.tick[-1]) + 2, dtype=bool)
+    there[recording.tick[whole]] = True
+    return int(np.argmin(there))
 
 
 def lost_words(evidence: Evidence) -> str:
@@ -185,5 +201,5 @@ def lost_words(evidence: Evidence) -> str:
     if evidence.kept < 0:
         return "nothing"
     if evidence.lost > LOST_SECONDS:
-        return f"all but {evidence.lost:.1f} s" if math.isfinite(evidence.lost) else evidence.wrong
+        return f"all but {evidence.lost:.1f} s"
     return "all" if not evidence.lost else f"all but at most {LOST_SECONDS} s"

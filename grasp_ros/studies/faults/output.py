@@ -82,10 +82,10 @@ class Output:
     def traceback(self) -> str:
         """The last line of a traceback; empty without one."""
         texts = [line.text for line in self.lines]
-        if TRACEBACK not in texts:
+        begin = next((number for number, text in enumerate(texts) if TRACEBACK in text), None)
+        if begin is None:
             return ""
-        behind = texts[texts.index(TRACEBACK) + 1:]
-        return next((text for text in behind if RAISED.match(text)), TRACEBACK)
+        return next((text for text in texts[begin + 1:] if RAISED.match(text)), TRACEBACK)
 
     def news(self, begin: float, end: float) -> list[Line]:
         """Sentences that mean something to a user: all that came in an interval but what is logged as information."""
@@ -101,4 +101,5 @@ def plain(text: str, places: Iterable[Path]) -> str:
     text = re.sub(r"\btick \d+", "tick N", text)
     text = re.sub(r"\bt = [\d.e+-]+ s", "t = T s", text)
     text = re.sub(r"\b\d+ (ticks|messages|commands|bytes|states)\b", r"N \1", text)
-    return re.sub(r"\b\d+\.\d{2,}\b", "X", text).replace("|", "\\|")
+    text = re.sub(r"^recorded +[\d.e-]+ s", "recorded T s", text)
+    return re.sub(r" {2,}", " ", re.sub(r"\b\d+\.\d{2,}\b", "X", text)).replace("|", "\\|")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import signal
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -52,6 +53,9 @@ def run(drills: Sequence[Drill], output: Path | None) -> bool:
     Refused
         If the page cannot be written, or no ROS domain is free.
     """
+    for number in (signal.SIGINT, signal.SIGQUIT):  # a shell lets what runs in its background ignore them
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
     domains: queue.Queue[int] = queue.Queue()
     for domain in free_domains():
         domains.put(domain)

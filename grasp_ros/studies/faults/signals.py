@@ -13,6 +13,7 @@ from grasp_ros.studies.faults.stage import NODES, Stage
 FROZEN_SECONDS = 5.0
 MOMENT_SECONDS = 1.0  # a freeze that nobody may take for an end
 SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
+ASKING = ("SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")  # the graph to end
 UNDER, ALONE = "under `grasp run`", "in four terminals"
 QUICK = ("SIGKILL-monitor", "SIGSTOP-left_controller", "SIGKILL-grasp")
 
@@ -33,7 +34,8 @@ def _one(group: str, start: object, number: str, name: str) -> Drill:
     if number == "SIGSTOP":
         words += f", SIGCONT after {FROZEN_SECONDS:g} s"
     strike = partial(freeze, name=name) if number == "SIGSTOP" else partial(send, name=name, number=Signals[number])
-    return Drill(key, f"{group}", words, start, strike, quick=key in QUICK)  # type: ignore[arg-type]
+    asked = name == "grasp run" and number in ASKING
+    return Drill(key, group, words, start, strike, asked=asked, quick=key in QUICK)  # type: ignore[arg-type]
 
 
 def send(stage: Stage, name: str, number: Signals) -> None:
@@ -73,7 +75,8 @@ def _at_other_moments() -> list[Drill]:
               partial(send, name="together", number=signal.SIGKILL)),
         Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
               partial(send, name="grasp run", number=signal.SIGKILL)),
-        Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice),
+        Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,
+              asked=True),
     ]
 
 
@@ -89,6 +92,10 @@ def _run_while_starting(stage: Stage) -> None:
 
 def _one_process(stage: Stage) -> None:
     stage.run("--one-process")
+
+
+def _free_running(stage: Stage) -> None:
+    stage.run("--free-running")
 
 
 def _twice(stage: Stage) -> None:

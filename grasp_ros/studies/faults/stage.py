@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import signal
@@ -90,6 +91,7 @@ class Stage:
         self._scene_file.write_text(scene.to_yaml(), encoding="utf-8")
         self.output = Output()
         self.terminal = -1  # or a pipe: the end that is read
+        self.accident = math.nan  # when it happened, monotonic
         self.started: dict[str, subprocess.Popen[bytes]] = {}
         self.times: Array = np.lib.format.open_memmap(place / "times.npy", "w+", float, (scene.ticks + 1,))
         self._others = companion
@@ -177,7 +179,14 @@ class Stage:
 
     def signal(self, name: str, number: signal.Signals) -> None:
         """Send a signal to a node, or to `grasp run`."""
-        os.kill(self.pid(name), number)
+        pid = self.pid(name)
+        self.happens()
+        os.kill(pid, number)
+
+    def happens(self, when: float | None = None) -> None:
+        """Note the time of the accident, now or as given; the first counts."""
+        if math.isnan(self.accident):
+            self.accident = time.monotonic() if when is None else when
 
     def living(self) -> list[int]:
         """Processes of this drill that live, whoever is their parent."""

@@ -55,7 +55,8 @@ def _strays() -> list[Drill]:
 
 
 def _stray(stage: Stage, topic: Topic, fields: dict[str, Any], seconds: float = 0.0) -> None:
-    stage.companion.ask("publish", topic=topic.name, type=topic.type, fields=fields, seconds=seconds)
+    answer = stage.companion.ask("publish", topic=topic.name, type=topic.type, fields=fields, seconds=seconds)
+    stage.happens(answer["begin"])
 
 
 def _without_plant(stage: Stage) -> None:
@@ -111,14 +112,19 @@ def _second(stage: Stage, name: str = "left_controller", words: Any = (), number
     numbers = numbers or {}
     options = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
     stage.start(f"second {name}", [*NODE, name, "--ros-args", *options, *words])
-    stage.wait(lambda: stage.ended("grasp run") or stage.ended(f"second {name}"), 10.0)
+    _when_there(stage, LEFT_COMMAND if name == "left_controller" else JOINT_STATES)
 
 
 def _second_run(stage: Stage) -> None:
     words = stage.run_words()
     words[words.index("-o") + 1] = str(stage.place / "second")
     stage.start("second run", words)
-    stage.wait(lambda: stage.ended("grasp run") or stage.ended("second run"), 20.0)
+    _when_there(stage, JOINT_STATES)
+
+
+def _when_there(stage: Stage, topic: Topic) -> None:
+    """The accident happens when a topic has two sources."""
+    stage.happens(stage.companion.ask("wait_for_sources", topic=topic.name, number=2)["when"])
 
 
 def _with_reader(stage: Stage) -> None:

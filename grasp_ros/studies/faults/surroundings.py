@@ -20,7 +20,7 @@ from grasp_ros.studies.faults.stage import GRASP, NODES, Stage
 from grasp_ros.studies.faults.verdict import Evidence
 
 GROUP, NAMES, FILES = "terminal, disk and directory", "names and waiting", "files"
-DISK_BYTES, LIMIT_BLOCKS = 2_500_000, 3_000  # of a file system, and of `ulimit -f`, in units of 512 bytes
+DISK_BYTES, LIMIT_BLOCKS = 2_500_000, 4_600  # of a file system, and of `ulimit -f`, in units of 512 bytes
 IDLE_SECONDS, IDLE_SHARE = 3.0, 0.05  # of a core, while there is nothing to do
 CUTS, FILE_COUNT = 40, 200
 
@@ -30,9 +30,9 @@ def drills() -> list[Drill]:
     return [
         Drill("closed-terminal", GROUP, "its terminal is closed", _in_terminal, _close_terminal, mute=True),
         Drill("closed-pipe", GROUP, "nobody reads its output any more", _in_pipe, _close_pipe, mute=True),
-        Drill("full-disk", GROUP, "the disk becomes full", _on_small_disk, _until_the_end, moment="notice"),
+        Drill("full-disk", GROUP, "the disk becomes full", _on_small_disk, _until_the_end, by_itself=True),
         Drill("file-limit", GROUP, "a limit of the file size (`ulimit -f`)", _with_limit, _until_the_end,
-              moment="notice"),
+              by_itself=True),
         Drill("deleted-bag", GROUP, "the directory of the bag is deleted", Stage.run, _delete_bag,
               nothing_to_keep=True),
         Drill("deleted-run", GROUP, "the whole directory of the run is deleted", Stage.run, _delete_run,

@@ -55,6 +55,8 @@ class Evidence:
         Why what the bag holds is not the run.
     mute : bool
         Whether nobody could read a sentence: the terminal is gone.
+    asked : bool
+        Whether a user has ended the run: that takes as long as it takes to close it.
     nothing_to_keep : bool
         Whether the bag itself was taken away, or there was none.
     patience : float, s
@@ -74,6 +76,7 @@ class Evidence:
     traceback: str = ""
     wrong: str = ""
     mute: bool = False
+    asked: bool = False
     nothing_to_keep: bool = False
     skipped: str = ""
     patience: float = NOTICE_SECONDS
@@ -87,6 +90,6 @@ class Evidence:
             Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
             Verdict.LOST: not self.nothing_to_keep and (self.lost > LOST_SECONDS or self.kept < 0 <= self.published),
             Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent,
-            Verdict.LATE: not self.mute and not self.noticed <= self.patience + SLACK_SECONDS,
+            Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= self.patience + SLACK_SECONDS,
         }
         return next((verdict for verdict, holds in found.items() if holds), Verdict.SENTENCE)
