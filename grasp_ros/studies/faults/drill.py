@@ -16,7 +16,7 @@ import numpy as np
 from grasp_ros.graph import bag
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import LYAPUNOV_NAMES, WINDOW
-from grasp_ros.studies.faults.output import NO_NEWS, plain
+from grasp_ros.studies.faults.output import NO_NEWS, SENTENCE, plain
 from grasp_ros.studies.faults.stage import NODES, Failed, Stage
 from grasp_ros.studies.faults.verdict import LOST_SECONDS, Evidence
 
@@ -99,10 +99,10 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     evidence.exits = {name: process.returncode for name, process in stage.started.items()
                       if name.split()[-1] in TERMINALS and process.returncode is not None}
     evidence.shared = sum(Path(name).exists() for name in shared - stage.shared_memory())
-    at = begin
-    if drill.by_itself and math.isfinite(evidence.noticed):
-        at, evidence.noticed = begin + evidence.noticed, 0.0
-    _read_bag(evidence, stage, struck if went_on else at)
+    if drill.by_itself:  # counts from when it was noticed, and what had been recorded by then
+        evidence.noticed *= 0.0
+        begin = -math.inf
+    _read_bag(evidence, stage, struck if went_on else begin)
     return evidence
 
 
@@ -155,7 +155,7 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     times = [line.when for line in news] + [when for when, _ in reports]
     evidence.noticed = min(times, default=math.nan) - begin
     words = [line.text for line in news]
-    spoken = [text for text in words if text.startswith(("grasp:", "[", "recorded ", "interrupted"))] or words
+    spoken = [text for text in words if SENTENCE.match(text)] or words
     said = spoken[-1] if spoken else f"/diagnostics: {reports[-1][1]}" if reports else ""
     evidence.said = plain(said, [stage.place])
     evidence.traceback = plain(stage.output.traceback, [stage.place])

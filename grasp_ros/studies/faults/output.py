@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 PROGRESS = re.compile(r"\S+: +\d+%\|[^|]*\|.*?tick(/s)?\]")
 LOGGED = re.compile(r"\[(DEBUG|INFO|WARN|ERROR|FATAL)\] \[[\d.]+\] \[([^\]]*)\]: ")
+SENTENCE = re.compile(r"^(\[|grasp: |interrupted |recorded +[\d.]+ s)")  # rather than a row of a table
 NO_NEWS = re.compile(r"^\[(DEBUG|INFO)\]")
 RAISED = re.compile(r"^[\w.]+(Error|Exception|Interrupt|Exit)\b")
 SELECT_SECONDS = 0.02

@@ -13,9 +13,10 @@ from grasp_ros.studies.faults.stage import NODES, Stage
 FROZEN_SECONDS = 5.0
 MOMENT_SECONDS = 1.0  # a freeze that nobody may take for an end
 SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
+ALONE_SIGNALS = ("SIGKILL", "SIGSTOP", "SIGTERM")
 ASKING = ("SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")  # the graph to end
 UNDER, ALONE = "under `grasp run`", "in four terminals"
-QUICK = ("SIGKILL-monitor", "SIGSTOP-left_controller", "SIGKILL-grasp")
+QUICK = ("SIGKILL-monitor", "SIGKILL-grasp")
 
 
 def drills() -> list[Drill]:
@@ -23,7 +24,7 @@ def drills() -> list[Drill]:
     found = []
     for number in SIGNALS:
         found += [_one(UNDER, Stage.run, number, name) for name in (*NODES, "grasp run")]
-    for number in SIGNALS:
+    for number in ALONE_SIGNALS:
         found += [_one(ALONE, Stage.terminals, number, name) for name in NODES]
     return [*found, *_at_other_moments()]
 
