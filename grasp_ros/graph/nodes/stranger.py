@@ -88,12 +88,12 @@ class Stranger:
         self._concerns.clear()
         return {}
 
-    def wait_for_sources(self, topic: str, number: int) -> dict[str, Any]:
-        """Wait until a topic has that many publishers; says when it had."""
-        deadline = time.monotonic() + MATCH_SECONDS
-        while self._node.count_publishers(topic) < number and time.monotonic() < deadline:
+    def wait_for_sources(self, topic: str, number: int, seconds: float = MATCH_SECONDS) -> dict[str, Any]:
+        """Wait until a topic has that many publishers; says when it had, and how many there are."""
+        deadline = time.monotonic() + seconds
+        while (there := self._node.count_publishers(topic)) < number and time.monotonic() < deadline:
             self.spin()
-        return {"when": time.monotonic()}
+        return {"when": time.monotonic(), "there": there}
 
     def publish(self, topic: str, type: str, fields: dict[str, Any], seconds: float = 0.0) -> dict[str, Any]:
         """Send a message once its readers are there, once or at full speed for some seconds; then stop to be a source.

@@ -173,6 +173,10 @@ class Stage:
         except Failed:
             return False
 
+    def said(self, words: str) -> bool:
+        """Whether somebody has printed these words."""
+        return any(words in line.text for line in list(self.output.lines))
+
     def ended(self, name: str) -> bool:
         """Whether a process that was started here has ended."""
         return self.started[name].poll() is not None

@@ -130,7 +130,7 @@ def _shared_memory(stage: Stage) -> Evidence:
 
 def _idle(stage: Stage) -> Evidence:
     stage.node("plant")
-    stage.wait(lambda: any("waiting" in line.text for line in stage.output.lines), 60.0)
+    stage.wait(lambda: stage.said("waiting"), 60.0)
     share = _share(stage.pid("plant"))
     stage.signal("plant", signal.SIGINT)
     stage.wait(lambda: stage.ended("plant"), 15.0)
@@ -154,7 +154,7 @@ def _remapped(stage: Stage) -> Evidence:
     """The plant must say for whom it waits, and go on waiting."""
     for name in NODES:
         stage.node(name, *(["-r", "left/effort_command:=elsewhere"] if name == "plant" else []))
-    stage.wait(lambda: any("left/effort_command" in line.text for line in stage.output.lines), 30.0)
+    stage.wait(lambda: stage.said("left/effort_command"), 60.0)
     words = [line.text for line in stage.output.lines if "left/effort_command" in line.text]
     for name in NODES:
         stage.signal(name, signal.SIGINT)
