@@ -39,11 +39,13 @@ class Stranger:
     ----------
     domain : int
     times : path
-        Array of the file format of NumPy; entry k becomes the time, on the monotonic clock, at which state k was seen.
+        Array of the file format of NumPy; entry k becomes the time, on the monotonic clock, at which tick k was seen.
     period_ns : int
+    topic : str
+        Where it is looked for.
     """
 
-    def __init__(self, domain: int, times: str, period_ns: int) -> None:
+    def __init__(self, domain: int, times: str, period_ns: int, topic: str) -> None:
         self._context = rclpy.Context()
         rclpy.init(args=[], context=self._context, domain_id=domain)
         self._node = rclpy.create_node("stranger", context=self._context, enable_rosout=False)
@@ -54,7 +56,7 @@ class Stranger:
         self._concerns: dict[str, tuple[float, int, str]] = {}
         self._answer: dict[str, Any] = {}
         best_effort = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
-        self._node.create_subscription(JointState, JOINT_STATES.name, self._on_state, best_effort, raw=True)
+        self._node.create_subscription(JointState, topic, self._on_tick, best_effort, raw=True)
         self._node.create_subscription(messages.TYPES[DIAGNOSTICS.type], DIAGNOSTICS.name, self._on_health, 100)
 
     def spin(self) -> None:
@@ -67,7 +69,7 @@ class Stranger:
         self._node.destroy_node()
         self._context.shutdown()
 
-    def _on_state(self, cdr: bytes) -> None:
+    def _on_tick(self, cdr: bytes) -> None:
         self._latest_ns = messages.raw_stamp_ns(cdr)
         tick = self._latest_ns // self._period_ns
         if 0 <= tick < len(self._times) and not self._times[tick]:

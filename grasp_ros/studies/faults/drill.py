@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.verify import verify
-from grasp_ros.scene.topics import LYAPUNOV_NAMES, WINDOW
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, WINDOW, Topic
 from grasp_ros.studies.faults.output import NO_NEWS, SENTENCE, plain
 from grasp_ros.studies.faults.stage import NODES, Failed, Stage
 from grasp_ros.studies.faults.verdict import LOST_SECONDS, Evidence
@@ -48,6 +48,8 @@ class Drill(NamedTuple):
         Whether the accident happens by itself, and so counts from when it is noticed.
     settle : bool
         Whether the graph is at work before the accident.
+    seen : Topic
+        By which ticks are counted, see `Stage`.
     asked : bool
         Whether it is no accident, but how a user ends a run.
     quick : bool
@@ -65,6 +67,7 @@ class Drill(NamedTuple):
     nothing_to_keep: bool = False
     by_itself: bool = False
     settle: bool = True
+    seen: Topic = JOINT_STATES
     asked: bool = False
     quick: bool = False
     play: Callable[[Stage], Evidence] | None = None

@@ -63,10 +63,11 @@ def write(path: Path, played: Sequence[Played]) -> None:
     parts.append("## How to read it\n\n" + document.prose("""
         *What the user sees* is the last sentence that was printed before the run was over; of a drill that is survived,
         before it was stopped with a Ctrl-C. DIR stands for the directory, N for numbers that differ from run to run.
-        *Noticed* is the time from the accident to the first sentence on a terminal or the first report on
-        `/diagnostics` that is not OK. *Exit* is the exit status of `grasp run`, or of the nodes that ended.
-        *Left* are processes that had to be killed, and files in /dev/shm of processes that were killed: Fast DDS
-        clears those at its next start. In four terminals, what still waits when plant and monitor have ended is
+        *Kept* counts the ticks that the plant had published before the accident; where the monitor itself was hit,
+        those that it had recorded. *Noticed* is the time from the accident to the first sentence on a terminal or the
+        first report on `/diagnostics` that is not OK. *Exit* is the exit status of `grasp run`, or of the nodes that
+        ended. *Left* are processes that had to be killed, and files in /dev/shm of processes that were killed: Fast
+        DDS clears those at its next start. In four terminals, what still waits when plant and monitor have ended is
         ended with a Ctrl-C.
         """))
     document.write(path, "\n\n".join(parts) + "\n")

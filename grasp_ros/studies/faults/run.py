@@ -88,7 +88,7 @@ def run(drills: Sequence[Drill], output: Path | None) -> bool:
 
 def _one(drill: Drill, directory: Path, companions: queue.Queue[Companion], domains: queue.Queue[int]) -> Evidence:
     companion, domain = companions.get(), domains.get()
-    stage = Stage(directory / drill.name.replace(" ", "_"), scenes.load(SCENE, SETTINGS), companion, domain)
+    stage = Stage(directory / drill.name.replace(" ", "_"), scenes.load(SCENE, SETTINGS), companion, domain, drill.seen)
     try:
         return play(drill, stage)
     except Skipped as error:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import time
 from functools import partial
 from signal import Signals
 
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
 from grasp_ros.studies.faults.drill import Drill
 from grasp_ros.studies.faults.stage import NODES, Stage
 
@@ -36,7 +38,8 @@ def _one(group: str, start: object, number: str, name: str) -> Drill:
         words += f", SIGCONT after {FROZEN_SECONDS:g} s"
     strike = partial(freeze, name=name) if number == "SIGSTOP" else partial(send, name=name, number=Signals[number])
     asked = name == "grasp run" and number in ASKING
-    return Drill(key, group, words, start, strike, asked=asked, quick=key in QUICK)  # type: ignore[arg-type]
+    seen = LYAPUNOV if name == "monitor" else JOINT_STATES
+    return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK)  # type: ignore[arg-type]
 
 
 def send(stage: Stage, name: str, number: Signals) -> None:
@@ -59,11 +62,25 @@ def freeze_all(stage: Stage) -> None:
         freeze(stage, name, MOMENT_SECONDS)
 
 
+def suspend(stage: Stage) -> None:
+    """Stop all processes, as a machine does that goes to sleep."""
+    stage.happens()
+    there = stage.living()
+    for number in (signal.SIGSTOP, signal.SIGCONT):
+        for pid in there:
+            os.kill(pid, number)
+        time.sleep(FROZEN_SECONDS if number == signal.SIGSTOP else 0.0)
+
+
 def _at_other_moments() -> list[Drill]:
     group = "at other moments"
     return [
         Drill("freeze-a-moment", group, f"SIGSTOP of each node in turn, SIGCONT after {MOMENT_SECONDS:g} s", Stage.run,
               freeze_all),
+        Drill("suspend", group, f"SIGSTOP of all processes at once, SIGCONT after {FROZEN_SECONDS:g} s", Stage.run,
+              suspend),
+        Drill("kill-while-paused", group, "SIGKILL of the left controller of a paused graph", _paused, _while_paused,
+              settle=False),
         Drill("kill-while-starting", group, "SIGKILL of the left controller while it starts", Stage.run,
               partial(_while_starting, name="left_controller"), settle=False, nothing_to_keep=True),
         Drill("kill-monitor-while-starting", group, "SIGKILL of the monitor while it starts", Stage.run,
@@ -73,7 +90,7 @@ def _at_other_moments() -> list[Drill]:
         Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
               partial(Stage.run), partial(send, name="left_controller", number=signal.SIGKILL)),
         Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
-              partial(send, name="together", number=signal.SIGKILL)),
+              partial(send, name="together", number=signal.SIGKILL), seen=LYAPUNOV),
         Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
               partial(send, name="grasp run", number=signal.SIGKILL)),
         Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,
@@ -89,6 +106,16 @@ def _while_starting(stage: Stage, name: str) -> None:
 def _run_while_starting(stage: Stage) -> None:
     stage.wait(lambda: stage.has("monitor"), 60.0)
     stage.signal("grasp run", signal.SIGKILL)
+
+
+def _paused(stage: Stage) -> None:
+    stage.run("--paused")
+
+
+def _while_paused(stage: Stage) -> None:
+    stage.wait(lambda: stage.published >= 0, 60.0)
+    time.sleep(MOMENT_SECONDS)
+    stage.signal("left_controller", signal.SIGKILL)
 
 
 def _one_process(stage: Stage) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.topics import JOINT_STATES, Topic
 from grasp_ros.studies.faults.output import Output
 
 START_SECONDS = 60.0  # for a graph to start on a machine that is busy
@@ -81,10 +82,14 @@ class Stage:
     scene : Scene
     companion : Companion
     domain : int
+    seen : Topic, optional
+        By which ticks are counted: what the plant publishes, or what the monitor does once it has recorded a tick.
     """
 
-    def __init__(self, place: Path, scene: Scene, companion: Companion, domain: int) -> None:
-        self.place, self.scene, self.companion, self.domain = place, scene, companion, domain
+    def __init__(
+        self, place: Path, scene: Scene, companion: Companion, domain: int, seen: Topic = JOINT_STATES
+    ) -> None:
+        self.place, self.scene, self.companion, self.domain, self.seen = place, scene, companion, domain, seen
         self.mark = uuid.uuid4().hex
         place.mkdir()
         self._scene_file = place / f"{scene.name}.yaml"
@@ -99,7 +104,9 @@ class Stage:
 
     def _open(self) -> None:
         times = str(self.place / "times.npy")
-        self.companion.ask("open", domain=self.domain, times=times, period_ns=self.scene.period_ns)
+        self.companion.ask(
+            "open", domain=self.domain, times=times, period_ns=self.scene.period_ns, topic=self.seen.name
+        )
 
     def look_on_from(self, prefix: Sequence[str]) -> None:
         """Let a stranger on another host look on."""
