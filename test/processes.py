@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 DEADLINE = 60.0  # s
 START = [sys.executable, "-m", "grasp_ros.graph.nodes.start"]
@@ -15,3 +16,17 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
     while not condition():
         assert time.monotonic() < deadline, f"waited in vain for {what}"
         time.sleep(0.01)
+
+
+def children(directory: Path) -> dict[str, int]:
+    """Process ids of what `grasp run` has started in a directory, by node."""
+    found = {}
+    for process in Path("/proc").iterdir():
+        try:
+            words = (process / "cmdline").read_bytes().decode().split("\0") if process.name.isdigit() else []
+            own = words and (process / "cwd").resolve() == directory.resolve()
+        except OSError:  # it has just ended
+            continue
+        if own and "child" in words:
+            found[words[words.index("child") + 1]] = int(process.name)
+    return found

@@ -42,6 +42,13 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--namespace", default="/", metavar="NS", help="of all names, /clock too; for several graphs")
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
+    sub.add_argument(
+        "--peer-timeout", type=float, metavar="S",
+        help="wall time without a sign of life or an answer of a node after which it is silent (default 1.5 s)",
+    )
+    sub.add_argument(
+        "--on-silence", choices=("end", "wait"), default="end", help="what is done when a node is gone or silent"
+    )
     _add_network(sub)
     sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
     sub.add_argument("bag", type=Path)
@@ -91,12 +98,14 @@ def _run(options: argparse.Namespace) -> int:
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,
+        peer_timeout=options.peer_timeout, on_silence=options.on_silence,
     )
     begin = time.monotonic()
     try:
         stopped = _live(graph)
     except GraphError as error:
-        print(f"grasp: {error}", file=sys.stderr)
+        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
+        print(f"grasp: {error}{there}", file=sys.stderr)
         return 1
     seconds = time.monotonic() - begin
     if not (graph.bag / "metadata.yaml").exists():

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
 
+from grasp_ros.graph import shared_memory
 from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -22,6 +23,8 @@ from grasp_ros.scene.files import writing
 STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
+PEER_SECONDS = 1.5  # without a sign of life of a node
+NODES_SECONDS = 1.0  # for the nodes to say it themselves, which know more
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
@@ -75,7 +78,10 @@ class Graph:
         Whether all nodes run in one process and one thread.
     namespace : str
         Of all names, /clock too where it is not the root.
-
+    peer_timeout : float, s, optional
+        Wall time without a sign of life, or an answer, after which a node is silent; default: that of the nodes.
+    on_silence : str
+        What the others do then: "end" or "wait".
     """
 
     scene: Scene
@@ -88,7 +94,11 @@ class Graph:
     plant: Mapping[str, str] = field(default_factory=dict)
     one_process: bool = False
     namespace: str = "/"
+    peer_timeout: float | None = None
+    on_silence: str = "end"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+    _stopped: dict[str, float] = field(default_factory=dict)  # since when
+    _segments: set[str] = field(default_factory=set)  # of shared memory, that were there before
     _lifeline: int = -1  # the children read the other end: when this one closes, however that comes, they end
 
     @property
@@ -115,10 +125,15 @@ class Graph:
             self.directory.mkdir(parents=True)
             scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
         environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ}
+        shared = {"on_silence": self.on_silence}
+        if self.peer_timeout is not None:
+            shared["peer_timeout_s"] = repr(self.peer_timeout)
+        if self.without:
+            shared["start_timeout_s"] = "0"
         settings = {
-            "monitor": {"bag": json.dumps(str(self.bag))},
+            "monitor": {"bag": json.dumps(str(self.bag)), **shared},
             **{
-                name: {"wait_for_monitor": "true", "law": json.dumps(self.laws.get(name, ""))}
+                name: {**shared, "wait_for_monitor": "true", "law": json.dumps(self.laws.get(name, ""))}
                 for name in self.scene.controllers if name not in self.without
             },
             "plant": {
@@ -126,11 +141,13 @@ class Graph:
                 "accuracy": repr(float(self.accuracy)),
                 "wait_for_monitor": "true",
                 "progress": str(self.progress).lower(),
+                **shared,
                 **self.plant,
             },
         }
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+        self._segments = shared_memory.segments()
         end, self._lifeline = os.pipe()
         try:
             for name, command in self._commands(settings).items():
@@ -164,10 +181,30 @@ class Graph:
                 deadline = min(deadline, time.monotonic() + TOGETHER_SECONDS)
             if time.monotonic() > deadline:
                 raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
-            for name, process in self.processes.items():
-                if process.poll() or (process.poll() == 0 and name.endswith("controller")):
-                    raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")
+            self._check()
             time.sleep(POLL_SECONDS)
+        if not received:
+            self._check()
+
+    def _check(self) -> None:
+        """Nobody has failed, or stands still."""
+        for name, process in self.processes.items():
+            if process.poll() or (process.poll() == 0 and name.endswith("controller")):
+                raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")
+            self._see_whether_stopped(name, process)
+
+    def _see_whether_stopped(self, name: str, process: subprocess.Popen[bytes]) -> None:
+        """Nobody else is there to notice it when all nodes are in one process, or when all are stopped."""
+        if process.returncode is None:
+            found = os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WCONTINUED | os.WNOHANG)
+            if found is not None and found.si_code == os.CLD_CONTINUED:
+                self._stopped.pop(name, None)
+            elif found is not None:
+                self._stopped[name] = time.monotonic()
+        patience = PEER_SECONDS if self.peer_timeout is None else self.peer_timeout
+        patience += 0.0 if self.one_process else NODES_SECONDS
+        if self.on_silence == "end" and time.monotonic() - self._stopped.get(name, math.inf) > patience:
+            raise GraphError(f"{name}: was stopped, and did not go on for {patience:g} s")
 
     def stop(self) -> dict[str, int]:
         """Interrupt what still runs, wait for it, and return the exit statuses."""
@@ -185,4 +222,7 @@ class Graph:
         if self._lifeline >= 0:
             os.close(self._lifeline)
             self._lifeline = -1
-        return {name: process.returncode for name, process in self.processes.items()}
+        statuses = {name: process.returncode for name, process in self.processes.items()}
+        if any(status < 0 for status in statuses.values()):  # killed: what it has left is of no use to anybody
+            shared_memory.remove_unused(shared_memory.segments() - self._segments)
+        return statuses

@@ -35,6 +35,7 @@ RUN = Topic("run", "std_msgs/msg/String", latched=True, depth=1)
 TIMING = Topic("timing", NAMED_LIST)
 MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", depth=1)
 ROBOT_DESCRIPTION = Topic("robot_description", "std_msgs/msg/String", latched=True, depth=1)
+ALIVE = Topic("alive", "std_msgs/msg/String", depth=10)
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock")
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 

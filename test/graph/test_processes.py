@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import DEADLINE, wait_for
+from processes import DEADLINE, children, wait_for
 
 from grasp_ros.graph import bag
 from grasp_ros.scene.topics import JOINT_STATES
@@ -25,20 +25,6 @@ import fcntl, os, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 os.execv(sys.argv[1], sys.argv[1:])
 """
-
-
-def children(directory: Path) -> dict[str, int]:
-    """Process ids of the graph that writes to a directory, by node."""
-    found = {}
-    for process in Path("/proc").iterdir():
-        try:
-            words = (process / "cmdline").read_bytes().decode().split("\0") if process.name.isdigit() else []
-            own = words and (process / "cwd").resolve() == directory.resolve()
-        except OSError:  # it has just ended
-            continue
-        if own and "grasp_ros.graph.nodes.start" in words:
-            found[words[words.index("child") + 1]] = int(process.name)
-    return found
 
 
 def records(directory: Path) -> bool:

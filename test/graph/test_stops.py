@@ -150,7 +150,7 @@ def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(launch: A
         controller.terminate()
         controller.communicate(timeout=DEADLINE)
     assert (monitor.returncode, others[0].returncode) == (1, 1)
-    assert "the monitor that this run waits for has ended" in last_words
+    assert "lyapunov: /monitor has ended: V_c rose by" in last_words
     assert re.search(r"V_c rose by \S+ J more than the work of the held forces, t = \S+ s, mode 0, state \[", err)
     found = bag.read(tmp_path / "bag")
     assert found.alarms == 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -15,7 +15,8 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
+from grasp_ros.graph.nodes.ticks import is_state
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -23,10 +24,10 @@ from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE
 from grasp_ros.scene.validation import SceneError
 
-ANNOUNCE_SECONDS = 2.0
+ANNOUNCE_SECONDS = 1.0
 
 
-class Controller(GraspNode):
+class Controller(PeerNode):
     """Node `left_controller` or `right_controller`; parameters law, wait_for_monitor, and those of the scene.
 
     It takes its law from the scene that the plant announces and answers every state with a command of the same
@@ -58,18 +59,30 @@ class Controller(GraspNode):
         self._law: ControlLaw | None = None
         self._staged: dict[str, float] = {}
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
+        self._turn = 0  # how often the plant had been reset then
+        self._force = 0.0  # that answer
         self._ready_to_answer = self._listening = False
         self._held: Any = None  # the state that came before this node was ready
-        self.counters["answered states"] = 0
+        self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0})
         self.add_on_set_parameters_callback(self._on_set)
-        self.subscribe(SCENE, self._on_scene)
+        self.on_text(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
-    def _on_scene(self, message: Any) -> None:
+    def needs(self) -> Iterator[Need]:
+        """The plant; a monitor is the plant's need."""
+        yield Need(JOINT_STATES, Gone.STAYS)
+        if self._monitored:
+            yield Need(LYAPUNOV, Gone.NOTED, vital=False)
+
+    def progress(self) -> object:
+        """The last state answered."""
+        return self._answered, self._scene
+
+    def _on_scene(self, text: str) -> None:
         """A plant has come: the first one, or one after another."""
         first, self._scene = not self._listening, None
         try:
-            self._take(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
+            self._take(scenes.parse(text, SCENE.name, f"topic {SCENE.name}"))
         except Refused as error:
             if first:
                 raise
@@ -110,6 +123,7 @@ class Controller(GraspNode):
 
     def _start(self) -> None:
         self.state = f"running with {self._own.words}" if self._own else "running"
+        self.begun, self.concern = True, ""
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
             self.subscribe(JOINT_STATES, self._on_state)
@@ -123,6 +137,7 @@ class Controller(GraspNode):
         assert self._scene is not None
         if time_ns <= self._answered and self._own:
             self._own.reset()
+        self._turn = self.turn(JOINT_STATES)
         before, self._scene = self._scene, self._scene.changed(self._staged)
         for warning in self._scene.warnings:
             if warning not in before.warnings:
@@ -136,26 +151,45 @@ class Controller(GraspNode):
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
 
+    def _admits(self, message: Any) -> bool:
+        """Whether a state can be one of this run."""
+        assert self._scene is not None
+        time_ns, period_ns = messages.to_ns(message.header.stamp), self._scene.period_ns
+        true = time_ns % period_ns == 0 and (time_ns == 0 or self._answered <= time_ns <= self._scene.ticks * period_ns)
+        true = true and is_state(message, (self._side,))
+        if not true:
+            self.refuse("refused states", JOINT_STATES)
+        return true
+
     def _on_state(self, message: Any) -> None:
         if not self._ready_to_answer:
             self._held = message
             return
-        if self._scene is None or self._side not in message.name:  # the scene of a new plant is still on its way
+        if self._scene is None or not self._admits(message):  # the scene of a new plant may still be on its way
             return
         time_ns = messages.to_ns(message.header.stamp)
+        if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
+            self.count("repeated states")  # it, or what answered it, was lost on the way
+            self._commands.publish(messages.wrench(time_ns, self._force))
+            return
         if self._staged or time_ns <= self._answered or self._answered < 0:
             self._begin(time_ns)
         assert self._law is not None
         self._answered = time_ns
         row, tick = message.name.index(self._side), time_ns // self._scene.period_ns
         x, v = message.position[row], message.velocity[row]
-        if self._own:
-            force = self._own.command(self._law, tick, self._scene.time_of(tick), x, v)
-        else:
-            force = self._law.command(tick, x, v)
+        try:
+            if self._own:
+                force = self._own.command(self._law, tick, self._scene.time_of(tick), x, v)
+            else:
+                force = self._law.command(tick, x, v)
+        except Refused as error:
+            self.fail(str(error))
+            return
         if not math.isfinite(force):  # the plant would not take it, and all would wait
             self.fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
             return
+        self._force = force
         self._commands.publish(messages.wrench(time_ns, force))
         self.count("answered states")
 

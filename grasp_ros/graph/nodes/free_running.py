@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.peers import Gone, Need
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.nodes.timing import Timing
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import TIMING
+from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
 BURST_SECONDS = 0.05  # of catching up at a time, so that commands and services get their turn
@@ -75,15 +77,21 @@ class FreeRunning:
         self._held = {side: Held() for side in self._sides}
         self._timing = Timing(self._sides, self._period)
         self._quality = plant.publisher(TIMING)
-        self._sources = {
-            topic: plant.subscribe(topic, partial(self._on_command, side))
-            for topic, side in zip(commands, self._sides, strict=True)
-        }
+        for topic, side in zip(commands, self._sides, strict=True):
+            plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
         self._anchor = math.nan  # wall time of tick 0
 
     def missing(self) -> list[str]:
         """Nothing: it begins without controllers."""
         return []
+
+    def needs(self) -> Iterator[Need]:
+        """The monitor alone: commands have timeouts of their own."""
+        if self._plant.monitored:
+            yield Need(LYAPUNOV, Gone.ENDS)
+
+    def ask_again(self, now: float) -> None:
+        """Never: the wall clock goes on."""
 
     def start(self) -> None:
         """Begin at the current tick."""
@@ -93,12 +101,12 @@ class FreeRunning:
     def _set_anchor(self) -> None:
         self._anchor = time.monotonic() - self._plant.tick * self._period
 
-    def _on_command(self, side: str, message: Any) -> None:
-        force, stamp = message.wrench.force.x, messages.to_ns(message.header.stamp)
-        plant, held = self._plant, self._held[side]
+    def _on_command(self, side: str, topic: Topic, cdr: bytes) -> None:
+        plant, held, command = self._plant, self._held[side], messages.raw_command(cdr)
+        stamp, force = command or (0, math.nan)
         tick = stamp // plant.scene.period_ns if stamp else plant.tick
-        if not math.isfinite(force) or tick > plant.tick:
-            plant.count("refused commands")
+        if command is None or tick > plant.tick:
+            plant.refuse("refused commands", topic)
         elif tick < held.answers:
             plant.count("stale commands")
         else:
@@ -162,11 +170,9 @@ class FreeRunning:
             held.force = 0.0
 
     def report(self) -> None:
-        """Publish the quality of the last second; say who disturbs it."""
-        several = [f"{topic.name} has the sources {' and '.join(self._plant.sources(topic))}"
-                   for topic, source in self._sources.items() if source.get_publisher_count() > 1]
+        """Publish the quality of the last second; say whose commands are missing."""
         late = [f"no command of {side}" for side, held in self._held.items() if held.late]
-        self._plant.concern = "; ".join(several + late)
+        self._plant.concern = "; ".join(late)
         values = self._timing.take()
         if values:
             time_ns = self._plant.tick * self._plant.scene.period_ns

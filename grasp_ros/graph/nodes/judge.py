@@ -15,6 +15,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 
+MOST_WAITING = 64  # announcements of a controller: it makes one for a command
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
 
 
@@ -62,6 +63,8 @@ class Judge:
         self._scene.changed(announcement.numbers)
         if self._before is None and not self._known:  # what came before is of the run before: topics keep the last one
             self._waiting[side].clear()
+        if len(self._waiting[side]) >= MOST_WAITING:
+            raise Refused(f"{side}/parameters: more than {MOST_WAITING} laws that wait; allowed: at most that")
         self._waiting[side].append(announcement)
 
     def restart(self) -> None:

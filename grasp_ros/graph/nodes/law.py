@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from traceback import extract_tb
+
 from grasp_ros.physics.control import ControlLaw, limited, measured
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.own_law import begin, find_law
 
 
@@ -30,7 +33,19 @@ class OwnLaw:
         self._law = begin(self._found, f"law: {self.words}")
 
     def command(self, stages: ControlLaw, tick: int, time: float, x: float, v: float) -> float:
-        """Command in N that answers the state of a tick, through the stages of the scene."""
+        """Command in N that answers the state of a tick, through the stages of the scene.
+
+        Raises
+        ------
+        Refused
+            If the law itself raises, or returns what is no number.
+        """
         row = stages.row.tolist()
         x, v = measured(row, stages.noise(tick).tolist(), x, v)
-        return float(limited(row, float(self._law(tick, time, x, v))))
+        try:
+            force = float(self._law(tick, time, x, v))
+        except Exception as error:  # whatever a user's code may raise
+            place = extract_tb(error.__traceback__)[-1]
+            where = f"{place.filename}, line {place.lineno}"
+            raise Refused(f"law: {self.words}: {type(error).__name__}: {error}, at tick {tick}, {where}") from error
+        return float(limited(row, force))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
@@ -33,6 +34,12 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
         with suppress(OSError):  # nobody reads it
             print(error, file=sys.stderr)
         return 2
+    except Exception as error:  # a fault of this package: in one line, and where
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        words = f"{type(error).__name__}: {error}, in {place.filename}, line {place.lineno}"
+        with suppress(OSError):
+            print(f"{', '.join(node.get_name() for node in nodes)}: a fault of this package: {words}", file=sys.stderr)
+        return 1
     finally:
         for node in nodes:
             node.end()

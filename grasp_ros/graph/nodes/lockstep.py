@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
@@ -14,12 +15,14 @@ import numpy as np
 
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import UNKNOWN
+from grasp_ros.graph.nodes.peers import Gone, Need
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.physics.model import Array
-from grasp_ros.scene.topics import LYAPUNOV, WINDOW
+from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
-PATIENCE_SECONDS = 5.0
+REPEAT_SECONDS = 1.0
+HEAD = 12  # bytes of a message up to its stamp
 NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
@@ -43,13 +46,17 @@ class Lockstep:
         self._commands: dict[int, float] = {}
         self._recorded = -1  # last tick that the monitor has complete
         self._refused = False  # a second source has come
-        self._seen = -1  # tick at the last report
+        self._answered = False  # whether a state of this run was
+        self._asked = self._heard = 0.0  # wall time of the last repetition, and of the last message of the monitor
         self._timer: Any = None
         self._going = True  # the timer
-        plant.counters.update({"stale commands": 0, "repeated commands": 0, "refused commands": 0})
+        plant.counters.update({
+            "stale commands": 0, "repeated commands": 0, "refused commands": 0, "repeated states": 0,
+            "refused records": 0,
+        })
         self.topics = list(plant.scene.controllers.values())
         self._inputs = {
-            topic: plant.subscribe(topic, partial(self._on_command, side))
+            topic: plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
             for side, topic in zip(plant.scene.system.laws, self.topics, strict=True)
         }
         if plant.monitored:
@@ -57,7 +64,7 @@ class Lockstep:
 
     def missing(self) -> list[str]:
         """Command topics that do not have exactly one source, with the names of several."""
-        found = {topic.name: self._plant.sources(topic) for topic in self.topics}
+        found = {topic.name: self._plant.living(topic) for topic in self.topics}
         return [f"{name} from one source alone, not {' and '.join(nodes)}" if nodes else name
                 for name, nodes in found.items() if len(nodes) != 1]
 
@@ -67,45 +74,72 @@ class Lockstep:
             self._timer = self._plant.wall_timer(UNCONTROLLED_SECONDS, self.advance)
 
     def report(self) -> None:
-        """Say who is waited for, when a tick takes longer than a report."""
-        plant = self._plant
-        waits = plant.started and not plant.finished and plant.tick == self._seen and not self._steering.stands
-        self._seen = plant.tick
-        silent = [topic.name for topic, side in zip(self.topics, plant.scene.system.laws, strict=True)
-                  if side not in self._commands]
-        monitor = [LYAPUNOV.name] if plant.monitored and not silent else []
-        plant.concern = f"waits for {' and '.join(silent + monitor)} to answer tick {plant.tick}" if waits else ""
-        if waits:
-            plant.get_logger().warning(plant.concern, throttle_duration_sec=PATIENCE_SECONDS)
+        """Nothing: who does not answer is named by the plant."""
 
-    def _on_command(self, side: int, message: Any) -> None:
-        force = message.wrench.force.x
-        if messages.to_ns(message.header.stamp) != self._plant.tick * self._plant.scene.period_ns:
-            self._plant.count("stale commands")
-        elif not math.isfinite(force):
-            self._plant.count("refused commands")
+    def needs(self) -> Iterator[Need]:
+        """Controllers that answer the current state, and a monitor that records it."""
+        plant = self._plant
+        what = f"answer to tick {plant.tick}"
+        for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
+            due = math.inf if side in self._commands else plant.asked
+            yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self._answered)
+        if plant.monitored:
+            due = max(plant.asked, self._heard) if self._complete and self._ahead else math.inf
+            yield Need(LYAPUNOV, Gone.ENDS, what=what, due=due)
+
+    def ask_again(self, now: float) -> None:
+        """Publish the current state again if nothing has come of it for a second: it, or an answer, was lost."""
+        since = max(self._plant.asked, self._asked, self._heard if self._complete else 0.0)
+        if (self._ahead or not self._complete) and now - since > REPEAT_SECONDS:
+            self._asked = now
+            self._plant.count("repeated states")
+            self._plant.repeat()
+        elif self._complete:  # the dead process of a controller that was replaced has been forgotten, say
+            self.advance()
+
+    @property
+    def _complete(self) -> bool:
+        """Whether all commands are there that answer the current state."""
+        return len(self._commands) == len(self.topics)
+
+    @property
+    def _ahead(self) -> bool:
+        """Whether the plant has to wait for its monitor."""
+        lead = 0 if self._steering.reset_due or self._plant.at_end else WINDOW
+        return self._plant.monitored and self._plant.tick - self._recorded > lead
+
+    def _on_command(self, side: int, topic: Topic, cdr: bytes) -> None:
+        command = messages.raw_command(cdr)
+        if command is None:
+            self._plant.refuse("refused commands", topic)
+        elif command[0] != self._plant.tick * self._plant.scene.period_ns:
+            self._plant.refuse("stale commands", topic)
         elif side in self._commands:
-            self._plant.count("repeated commands")
+            self._plant.refuse("repeated commands", topic)
         else:
-            self._commands[side] = force
+            self._commands[side] = command[1]
             self.advance()
 
     def _on_lyapunov(self, cdr: bytes) -> None:
-        self._recorded = messages.raw_stamp_ns(cdr) // self._plant.scene.period_ns
+        tick, rest = divmod(messages.raw_stamp_ns(cdr), self._plant.scene.period_ns) if len(cdr) > HEAD else (0, 1)
+        if rest or not self._recorded <= tick <= self._plant.tick:
+            self._plant.refuse("refused records", LYAPUNOV)
+            return
+        self._recorded, self._heard = tick, time.monotonic()
         self.advance()
 
     def advance(self) -> None:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""
         plant = self._plant
-        resetting = self._steering.reset_due
-        lead = 0 if resetting or plant.at_end else WINDOW
-        ahead = plant.monitored and plant.tick - self._recorded > lead
+        resetting, ahead = self._steering.reset_due, self._ahead
         self._let_go_on(not ahead and (resetting or not self._steering.stands))
-        if self._refused or not plant.started or plant.finished or ahead or len(self._commands) < len(self.topics):
+        if self._refused or not plant.started or plant.finished or ahead or not self._complete:
             return
-        if any(source.get_publisher_count() > 1 for source in self._inputs.values()):
+        several = [topic for topic, source in self._inputs.items() if source.get_publisher_count() > 1]
+        if any(len(plant.living(topic)) > 1 for topic in several):
             self._refuse_sources()
             return
+        self._answered = True
         if resetting:
             self._commands.clear()
             self._recorded = -1

@@ -6,6 +6,7 @@ a message goes through float() here.
 
 from __future__ import annotations
 
+import math
 import struct
 from array import array
 from collections.abc import Mapping, Sequence
@@ -14,7 +15,7 @@ from enum import Enum
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -23,7 +24,7 @@ from visualization_msgs.msg import MarkerArray
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import LYAPUNOV_NAMES, Topic
+from grasp_ros.scene.topics import DEPTH, LYAPUNOV_NAMES, Topic
 
 TYPES = {
     "sensor_msgs/msg/JointState": JointState,
@@ -34,7 +35,10 @@ TYPES = {
     "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
 _STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
+_LENGTH, _NUMBER = struct.Struct("<I"), struct.Struct("<d")
 _CDR_HEADER = 4
+SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
+READER_DEPTH = 10  # of texts, which may be large
 FRAME = "line"  # in which the forces are given: x along the line on which all moves
 
 
@@ -46,13 +50,27 @@ class Level(Enum):
     ERROR = DiagnosticStatus.ERROR
 
 
-def qos(topic: Topic, depth: int = 0) -> QoSProfile:
-    """Reliable everywhere: a lost message would stop the lockstep. A reader keeps more than a writer may."""
+def qos(topic: Topic) -> QoSProfile:
+    """Reliable everywhere: a lost message would stop the lockstep."""
     return QoSProfile(
-        depth=max(depth, topic.depth),
+        depth=topic.depth,
         reliability=ReliabilityPolicy.RELIABLE,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if topic.latched else DurabilityPolicy.VOLATILE,
     )
+
+
+def reader_qos(topic: Topic) -> QoSProfile:
+    """That of a reader, which keeps more than a writer may.
+
+    The depth of a reader is shared by all writers of its topic: with the last messages alone, one that floods it would
+    push out those of the others. Fast DDS keeps at most 5000 otherwise, and lets the writers wait.
+    """
+    profile = qos(topic)
+    if topic.depth < DEPTH:
+        profile.depth = max(profile.depth, READER_DEPTH)
+    else:
+        profile.history = HistoryPolicy.KEEP_ALL
+    return profile
 
 
 def to_time(time_ns: int) -> Time:
@@ -69,6 +87,25 @@ def raw_stamp_ns(cdr: bytes) -> int:
     """Integer time in ns of a serialized stamped message, without deserializing it."""
     sec, nanosec = _STAMP.unpack_from(cdr, _CDR_HEADER)
     return int(sec * NANOSECONDS + nanosec)
+
+
+def raw_force(cdr: bytes) -> float:
+    """Force along the line in N of a serialized WrenchStamped, without deserializing it."""
+    (length,) = _LENGTH.unpack_from(cdr, _CDR_HEADER + _STAMP.size)
+    begin = _STAMP.size + _LENGTH.size + length  # of the numbers, which are aligned to their size
+    (force,) = _NUMBER.unpack_from(cdr, _CDR_HEADER + -(-begin // _NUMBER.size) * _NUMBER.size)
+    return float(force)
+
+
+def raw_command(cdr: bytes) -> tuple[int, float] | None:
+    """Time in ns and force in N of a serialized WrenchStamped; None if a plant cannot take it, or a bag not hold it."""
+    if not SHORTEST <= len(cdr) <= MOST_BYTES:
+        return None
+    try:
+        force = raw_force(cdr)
+    except struct.error:
+        return None
+    return (raw_stamp_ns(cdr), force) if math.isfinite(force) else None
 
 
 def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array) -> JointState:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from geometry_msgs.msg import WrenchStamped
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
@@ -16,13 +16,16 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import Recorder
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.judge import Announcement, Judge
 from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.nodes.node import PATIENCE_SECONDS
+from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.nodes.ticks import Tick, Ticks
+from grasp_ros.graph.nodes.ticks import Arrival, Tick, Ticks
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import reading
@@ -42,10 +45,11 @@ from grasp_ros.scene.topics import (
 )
 from grasp_ros.simulation.versions import versions
 
-GIVE_UP_REPORTS = 5  # reports without a new tick after which a message is lost
+MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**20  # of what does not come with every state: of one; in a second
+GIVE_UP_REPORTS = 3  # reports without a new tick after which a message is lost
 
 
-class Monitor(GraspNode):
+class Monitor(PeerNode):
     """Node `monitor`; parameter bag.
 
     It puts the messages of a tick together, computes V, V_c, V' of the laws that were announced, the energy of the
@@ -68,26 +72,53 @@ class Monitor(GraspNode):
         self._running: Running | None = None
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
-        self._ticks = Ticks(())
+        self._values: list[float] = []  # of the last tick
+        self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
+        self._plant = ""  # identity of the one that is recorded
         self._seen: object = -1  # ticks at the last report
         self._stuck = 0  # reports in a row without a new tick
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "alarms": 0,
-            "ticks without V": 0,
+            "ticks without V": 0, "messages not recorded": 0,
+            **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
-        self._values = self.publisher(LYAPUNOV)
-        self.subscribe(RUN, self._on_run)
-        self.subscribe(SCENE, self._on_scene)
+        self._output = self.publisher(LYAPUNOV)
+        self.on_text(RUN, self._on_run)
+        self.on_text(SCENE, self._on_scene)
 
-    def _on_run(self, message: Any) -> None:
+    def needs(self) -> Iterator[Need]:
+        """The plant; in lockstep controllers too, but they are the plant's need."""
+        yield Need(JOINT_STATES, Gone.ENDS)
+        if self._running is not None and self._scene is not None and self._running.lockstep:
+            for topic in self._scene.controllers.values():
+                yield Need(topic, Gone.NOTED, vital=False)
+
+    def progress(self) -> object:
+        """The ticks so far."""
+        return self.counters["ticks"]
+
+    def heard(self) -> None:
+        """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end."""
+        super().heard()
+        if self._plant and not self.finished and (other := self.beats.successor(self._plant)):
+            self.fail(f"{JOINT_STATES.name}: another {other} has taken the place of the one that is recorded")
+
+    def fail(self, reason: str) -> None:
+        """End with a sentence that says how far the bag reaches."""
+        ticks = f"; the bag has {self.counters['ticks']} ticks" if self._recorder is not None else ""
+        super().fail(f"{reason}{ticks}")
+
+    def _on_run(self, text: str) -> None:
         if self._running is None:
-            self._running = runnings.parse(message.data)
+            self._running = runnings.parse(text)
             self._begin()
 
-    def _on_scene(self, message: Any) -> None:
+    def _on_scene(self, text: str) -> None:
         if self._scene is None:  # one run, one scene
-            self._scene = scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}")
+            sign = self.beats.vouched(digest(text))
+            self._plant = sign.identity if sign else ""
+            self._scene = scenes.parse(text, SCENE.name, f"topic {SCENE.name}")
             self._begin()
 
     def _begin(self) -> None:
@@ -98,10 +129,14 @@ class Monitor(GraspNode):
         beside = [TIMING] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
         self._judge, self._picture = Judge(scene), Picture(self, scene)
-        self._ticks = Ticks([topic for topic in per_tick if topic != JOINT_STATES])
+        self._ticks = Ticks(
+            [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
+            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES),
+        )
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
+        self.begun, self.concern = True, ""
         self.state = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
         self.get_logger().info(self.state)
         for side, command in COMMANDS.items():
@@ -113,36 +148,53 @@ class Monitor(GraspNode):
             self.subscribe(topic, partial(self._record, topic), raw=True)
 
     def _record(self, topic: Topic, cdr: bytes) -> None:
-        """Keep what does not come with every state, at the time of the last one."""
-        if self._recorder is not None and self.counters["ticks"]:
+        """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
+        self._beside[topic] += len(cdr)
+        if self._recorder is None or not self.counters["ticks"]:
+            return
+        if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
+            self.refuse("messages not recorded", topic)
+        else:
             self._recorder.write(topic, cdr)
 
     def _on_announcement(self, side: str, cdr: bytes) -> None:
-        message = deserialize_message(cdr, JointState)
-        numbers = dict(zip(message.name, message.position, strict=False))
         try:
+            if len(cdr) > MOST_BYTES:
+                raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
+            message = deserialize_message(cdr, JointState)
+            numbers = dict(zip(message.name, message.position, strict=True))
             self._judge.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
-        except Refused as error:
-            self.count("refused announcements")
-            self.get_logger().warning(str(error))
+        except (Refused, RuntimeError, ValueError) as error:  # the last two: what is no such message
+            self.refuse("refused announcements", CHANGES[side])
+            self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        self._ticks.put(topic, cdr)
-        self._drain()
+        arrival = self._ticks.put(topic, cdr)
+        if arrival is Arrival.TAKEN:
+            self._drain()
+        elif arrival is Arrival.AGAIN:  # what was published has been lost
+            self.count(arrival.value)
+            self._output.publish(messages.lyapunov(messages.raw_stamp_ns(cdr), self._values))
+        elif arrival is Arrival.REPEATED:
+            self.count(arrival.value)
+        else:
+            self.refuse(arrival.value, topic)
 
-    def _drain(self) -> None:
-        while (tick := self._ticks.take()) is not None:
+    def _drain(self, patient: bool = True) -> None:
+        while (tick := self._ticks.take(patient)) is not None:
             self._complete(tick)
 
     def report(self) -> None:
         """Publish the counters; go on without a message that does not come although the plant has gone on."""
         super().report()
+        self._beside.clear()
         now = self.counters["ticks"]
         self._stuck = self._stuck + 1 if now == self._seen else 0
         self._seen = now
-        if self._stuck >= GIVE_UP_REPORTS and (tick := self._ticks.take(patient=False)) is not None:
-            self._complete(tick)
-            self._drain()
+        if self._recorder is None:
+            return
+        if self._stuck >= GIVE_UP_REPORTS:
+            self._drain(patient=False)
 
     def _complete(self, tick: Tick) -> None:
         assert self._scene is not None
@@ -158,14 +210,15 @@ class Monitor(GraspNode):
         begun = [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)]
         values = self._evaluate(tick)
         self._recorder.write_tick(self._bag_ns, [*begun, *tick.found.items()], values, tick.time_ns)
-        self._values.publish(messages.lyapunov(tick.time_ns, values))
+        self._values = values
+        self._output.publish(messages.lyapunov(tick.time_ns, values))
         self.finished = bool(self.exit_code) or tick.time_ns == self._scene.ticks * self._scene.period_ns
 
     def _evaluate(self, tick: Tick) -> list[float]:
         """What `lyapunov` publishes, see `topics.LYAPUNOV_NAMES`."""
-        state, inputs = state_of(deserialize_message(tick.found[JOINT_STATES], JointState))
+        state, inputs = state_of(tick.state)
         commands = {
-            side: deserialize_message(tick.found[topic], WrenchStamped).wrench.force.x
+            side: messages.raw_force(tick.found[topic])
             for side, topic in COMMANDS.items() if topic in tick.found
         }
         self._picture.show(tick.time_ns, state)
@@ -190,7 +243,7 @@ class Monitor(GraspNode):
         if self._recorder is not None:
             self._recorder.close(self.counters)
         if self.finished:
-            self.flush(self._values)
+            self.flush(self._output)
 
 
 def main(_: str, received: Sequence[int]) -> int:

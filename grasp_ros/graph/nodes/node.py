@@ -16,6 +16,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
+from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.nodes import messages
@@ -23,13 +24,15 @@ from grasp_ros.graph.nodes.messages import Level
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.topics import DEPTH, DIAGNOSTICS, Topic
+from grasp_ros.scene.topics import DIAGNOSTICS, Topic
 
 RCLError = rclpy_implementation.RCLError
 PEER_SECONDS = 0.05
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0
+LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
+SWEEP = 100  # messages of one topic at a time
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 
 
@@ -63,8 +66,11 @@ class GraspNode(Node):
         self.finished = False
         self.exit_code = 0
         self.counters: dict[str, int | float | str] = {}
+        self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self._ended = False
         self.concern = ""  # what is not as it should be, although the node goes on
+        self.trouble = ""  # what keeps it from going on
+        self.strangers = ""  # who publishes what somebody else does
         self.state = "waiting for peers"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
@@ -139,9 +145,22 @@ class GraspNode(Node):
         return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
 
     def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
-        """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
-        qos = messages.qos(topic, DEPTH)
-        return self.create_subscription(messages.TYPES[topic.type], topic.name, callback, qos, raw=raw)
+        """Subscribe to a topic of the graph; raw hands over the serialized bytes.
+
+        What cannot be decoded is refused here: the executor would raise.
+        """
+        kind = messages.TYPES[topic.type]
+
+        def decode(cdr: bytes) -> None:
+            try:
+                message = deserialize_message(cdr, kind)
+            except (RuntimeError, ValueError):  # ValueError: a text that is no UTF-8
+                self.refuse("malformed messages", topic)
+                return
+            callback(message)
+
+        qos = messages.reader_qos(topic)
+        return self.create_subscription(kind, topic.name, callback if raw else decode, qos, raw=True)
 
     def sources(self, topic: Topic) -> list[str]:
         """Full names of the nodes that publish on a topic, as far as discovery has them."""
@@ -186,7 +205,16 @@ class GraspNode(Node):
 
     def count(self, counter: str, number: int = 1) -> None:
         """Add to a counter."""
-        self.counters[counter] = int(self.counters[counter]) + number
+        self.counters[counter] = int(self.counters.get(counter, 0)) + number
+
+    def refuse(self, counter: str, topic: Topic) -> None:
+        """Count a message that cannot be true, and say every few seconds whose it may be."""
+        self.count(counter)
+        now = time.monotonic()
+        if now >= self._complaints.get((counter, topic), 0.0):
+            self._complaints[counter, topic] = now + PATIENCE_SECONDS
+            names = " and ".join(self.sources(topic)) or "none any more"
+            self.get_logger().warning(f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}")
 
     def flush(self, *publishers: Publisher) -> None:
         """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
@@ -197,9 +225,10 @@ class GraspNode(Node):
     def report(self) -> None:
         """Publish the counters."""
         stamp = self.get_clock().now().to_msg()
-        lost = any(self.counters[key] for key in self.counters if key.startswith("lost"))
-        level = Level.ERROR if self.exit_code else Level.WARN if lost or self.concern else Level.OK
-        summary = f"{self.state}; {self.concern}" if self.concern else self.state
+        lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
+        failed, doubtful = self.exit_code or self.trouble, lost or self.concern or self.strangers
+        level = Level.ERROR if failed else Level.WARN if doubtful else Level.OK
+        summary = "; ".join(words for words in (self.state, self.trouble, self.concern, self.strangers) if words)
         self._diagnostics.publish(
             messages.diagnostics(stamp, self.get_fully_qualified_name(), summary, level, self.counters)
         )
@@ -211,12 +240,35 @@ class GraspNode(Node):
         self.exit_code = 1
         self.finished = True
 
+    def sweep(self) -> None:
+        """Take what the executor has not been told of.
+
+        Between looking for messages and listening for them, rmw_fastrtps is deaf for a moment: the first message of a
+        topic can lie there until the second comes.
+        """
+        for subscription in tuple(self.subscriptions):
+            for _ in range(SWEEP):
+                with subscription.handle:
+                    found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                if found is None:
+                    break
+                subscription.callback(found[0])
+        for service in tuple(self.services):
+            with service.handle:
+                request, header = service.handle.service_take_request(service.srv_type.Request)
+            if header is not None:
+                service.send_response(service.callback(request, service.srv_type.Response()), header)
+
     def end(self) -> None:
         """Close and destroy, once."""
         if not self._ended:
             self._ended = True
             self.close()
+            self.part()
             self.destroy_node()
+
+    def part(self) -> None:
+        """Say last words; called once, before the node is destroyed."""
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""

@@ -9,7 +9,7 @@ import io
 import math
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -19,9 +19,11 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import ACCURACY, Integrator, Status, compile_kernels
 from grasp_ros.exact.jit import COMPILING, kernels_on_disk
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.free_running import FreeRunning
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.lockstep import Lockstep
+from grasp_ros.graph.nodes.peers import Need
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.running import Running
@@ -29,8 +31,6 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
-
-UNWATCHED_REPORTS = 4  # in a row without a monitor: its last value may be on the way, and a busy machine stalls
 
 
 class _Terminal(io.TextIOBase):
@@ -76,7 +76,7 @@ class Plant(SteppedNode):
             self.get_logger().info(COMPILING)
         compile_kernels()
         self._plant = self._new_plant()
-        self.resets = 0
+        self.resets, self.asked = 0, math.inf
         self._begin = math.nan
         self.counters.update(tick=0, resets=0)
         self._bar = tqdm(
@@ -86,10 +86,11 @@ class Plant(SteppedNode):
         self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
         self._simulated = self.publisher(CLOCK)
         self._descriptions = [self.publisher(RUN), self.publisher(SCENE)]
-        for publisher, text in zip(self._descriptions, (running.to_yaml(), self.scene.to_yaml()), strict=True):
+        texts = [running.to_yaml(), self.scene.to_yaml()]
+        self.beats.own.texts = [digest(text) for text in texts]
+        for publisher, text in zip(self._descriptions, texts, strict=True):
             publisher.publish(messages.text(text))
         self.loop = FreeRunning(self, steering, running) if free else Lockstep(self, steering)
-        self._unwatched = 0  # reports in a row without a monitor
         if progress:
             self.wall_timer(0.1, self._show)
         self.when(self._ready, self._start)
@@ -124,17 +125,27 @@ class Plant(SteppedNode):
         return not math.isnan(self._begin)
 
     def report(self) -> None:
-        """Publish the counters, and see to it that nobody else plays the plant and that the monitor is still there."""
+        """Publish the counters, and see to it that nobody else plays the plant."""
         super().report()
         self._insist()
-        watched = not self.monitored or not self.started or self.count_publishers(LYAPUNOV.name) > 0
-        self._unwatched = 0 if watched else self._unwatched + 1
-        if self._unwatched >= UNWATCHED_REPORTS and not self.finished:
-            self.fail(f"{LYAPUNOV.name}: the monitor that this run waits for has ended")
         self.loop.report()
 
+    def needs(self) -> Iterator[Need]:
+        """Of its loop: controllers and monitor."""
+        return self.loop.needs()
+
+    def progress(self) -> object:
+        """Its time."""
+        return self.tick, self.resets
+
+    def look(self) -> None:
+        """See to it that everybody is there; ask again what has not been answered."""
+        super().look()
+        if self.begun and not self.finished:
+            self.loop.ask_again(time.monotonic())
+
     def _insist(self) -> None:
-        others = self.sources(JOINT_STATES)
+        others = self.living(JOINT_STATES)
         if len(others) > 1:
             topic = self._states.topic_name
             self.fail(f"{topic}: another plant publishes here, sources {', '.join(others)};"
@@ -148,19 +159,26 @@ class Plant(SteppedNode):
         self.state = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
         # Who has been here with another plant must have this scene before its first state.
         known = all(publisher.get_subscription_count() >= self.count_subscribers(publisher.topic_name)
-                    and self.delivered(publisher) for publisher in self._descriptions)
+                    and self.delivered(publisher) for publisher in (*self._descriptions, self.beats.publisher))
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _ in self._forces
         )
 
     def _start(self) -> None:
         self.state = "running"
+        self.begun, self.concern = True, ""
+        self.beats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
         self.publish_state()
         self.loop.start()
 
     def publish_state(self) -> None:
         """Send the state of the current tick and what belongs to it."""
+        self.asked = time.monotonic()
+        self.repeat()
+
+    def repeat(self) -> None:
+        """Publish the current state again: something on the way to or from those who answer it was lost."""
         tick, state = self._plant.tick, self._plant.state
         time_ns = tick * self.scene.period_ns
         self._simulated.publish(messages.clock(time_ns))
@@ -189,6 +207,8 @@ class Plant(SteppedNode):
         self.counters.update(tick=0, resets=self.resets)
         self._begin = time.monotonic()
         self._bar.reset()
+        self.beats.own.turn = self.resets
+        self.beats.tell()  # with the stamp of the first state this one is otherwise a repetition
         self.publish_state()
 
     def finish(self) -> None:
@@ -205,7 +225,7 @@ class Plant(SteppedNode):
         """End the progress bar, and deliver what a finished run has published."""
         self._show()
         self._bar.close()
-        if self.finished:
+        if self.finished and not self.exit_code:
             self.flush(self._states, *(publisher for publisher, _ in self._forces))
 
 

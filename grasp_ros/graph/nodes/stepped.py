@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.nodes.peers import PeerNode
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 
 
-class SteppedNode(GraspNode):
+class SteppedNode(PeerNode):
     """A plant that is advanced from outside.
 
     Attributes
@@ -19,11 +19,14 @@ class SteppedNode(GraspNode):
         Whether it waits for a monitor.
     resets : int
         How often time and state were put back.
+    asked : float, s
+        Wall time at which the current state was published.
     """
 
     scene: Scene
     monitored: bool
     resets: int
+    asked: float
 
     @property
     @abstractmethod
@@ -34,6 +37,10 @@ class SteppedNode(GraspNode):
     @abstractmethod
     def started(self) -> bool:
         """Whether the first state has been published."""
+
+    @abstractmethod
+    def repeat(self) -> None:
+        """Publish the current state again: something on the way to or from those who answer it was lost."""
 
     @property
     def at_end(self) -> bool:

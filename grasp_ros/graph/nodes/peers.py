@@ -1,0 +1,257 @@
+"""A node that needs others: it notices when one of them is gone or silent, says which, and ends or waits on."""
+
+from __future__ import annotations
+
+import math
+import time
+from abc import abstractmethod
+from collections.abc import Callable, Iterator
+from enum import Enum
+from functools import partial
+from typing import Any, NamedTuple
+
+from rclpy.subscription import Subscription
+
+from grasp_ros.graph.nodes.beats import ENDED, Beats, digest
+from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
+from grasp_ros.graph.processes import PEER_SECONDS
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import TEXT_BYTES
+from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
+
+LOOK_SECONDS = 0.2
+STILL_SECONDS = 1.0  # between two looks: this process itself stood still
+GONE_SECONDS = 0.8  # without a source: its last messages are on the way
+START_SECONDS = 60.0
+SLOW = 4  # times longer who shows that it lives may take
+MOST_TEXTS = 8  # that wait for somebody to vouch for them
+
+
+class Gone(Enum):
+    """What a node does when nobody publishes a topic any more."""
+
+    ENDS = "ends"
+    AS_TOLD = "ends or waits on, as on_silence says"
+    STAYS = "waits for the next one"
+    NOTED = "says so"
+
+
+class Need(NamedTuple):
+    """A topic that somebody has to publish."""
+
+    topic: Topic
+    gone: Gone
+    vital: bool = True  # whether this node ends for it, if it was told so; otherwise another one does
+    what: str = ""  # is due
+    due: float = math.inf  # since this wall time
+    first: bool = False  # whether it would be the first
+
+
+class Trouble(NamedTuple):
+    """What is wrong with a topic."""
+
+    words: str
+    certain: bool  # whether it is more than slowness
+    announced: bool = False  # whether its source has said that it ends
+
+
+class PeerNode(GraspNode):
+    """A node that needs others; parameters peer_timeout_s, start_timeout_s, on_silence.
+
+    Parameters
+    ----------
+    name : str
+    options
+        As in `rclpy.node.Node`.
+
+    Attributes
+    ----------
+    begun : bool
+        Whether the peers it waited for at first have come.
+    """
+
+    def __init__(self, name: str, **options: Any) -> None:
+        self._inputs: list[Topic] = []
+        super().__init__(name, **options)
+        self.patience = self.read_only("peer_timeout_s", PEER_SECONDS, "wall time without a sign of life or an answer")
+        self.start_patience = self.read_only(
+            "start_timeout_s", START_SECONDS, "wall time for peers to come and to answer first; 0: any"
+        ) or math.inf
+        reaction = self.read_only("on_silence", "wait", "what is done when a peer is gone or silent: end or wait")
+        if not 0.0 < self.patience <= self.start_patience:
+            raise Refused(f"peer_timeout_s: {self.patience:g} is not allowed; allowed: a number > 0, not above"
+                          " start_timeout_s")
+        if reaction not in ("end", "wait"):
+            raise Refused(f"on_silence: {reaction!r} is not allowed; allowed: end, wait")
+        self._ends = reaction == "end"
+        self.begun = False
+        self._silent: dict[str, float] = {}  # by topic: since when
+        self._said = 0.0  # when that was last said
+        self._gone: dict[Topic, float] = {}
+        self._last: dict[Topic, list[str]] = {}  # names of the last sources
+        self._texts: dict[Topic, list[tuple[float, str]]] = {}
+        self._takers: dict[Topic, Callable[[str], None]] = {}
+        self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
+        self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
+        self.beats = Beats(self, self.heard)
+        self._created = self._looked = self._excused = time.monotonic()
+        self._before: object = None
+        self.wall_timer(LOOK_SECONDS, self.look)
+
+    @abstractmethod
+    def needs(self) -> Iterator[Need]:
+        """What this node needs of others now that it has begun."""
+
+    @abstractmethod
+    def progress(self) -> object:
+        """Something that changes while all is well."""
+
+    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
+        """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
+        self._inputs.append(topic)
+        return super().subscribe(topic, callback, raw)
+
+    def report(self) -> None:
+        """Publish the counters, and who publishes what somebody else does."""
+        found = {topic.name: self.living(topic) for topic in self._inputs if topic not in (ALIVE, DIAGNOSTICS)}
+        self.strangers = "; ".join(f"{name} has the sources {' and '.join(names)}" for name, names in found.items()
+                                   if len(names) > 1)
+        if self.strangers:
+            self.count("second sources")
+        super().report()
+
+    def look(self) -> None:
+        """See to it that everybody is there."""
+        now = time.monotonic()
+        if now - self._looked > STILL_SECONDS:
+            if self._before is not None:
+                words = f"was stopped, or busy, for {now - self._looked:.1f} s"
+                self.get_logger().warning(f"this process {words}", throttle_duration_sec=PATIENCE_SECONDS)
+            self._excused = now  # what others did meanwhile is not known yet
+        self._looked = now
+        self._offer()
+        if self.finished:
+            return
+        progress = self.progress()
+        if progress == self._before:
+            self.sweep()
+        self._before = progress
+        if not self.begun:
+            self._wait_for_start(now)
+            return
+        for need in self.needs():
+            self._note(need, self._trouble_with(need, now), now)
+            if self.finished or not self.begun:
+                return
+
+    def _wait_for_start(self, now: float) -> None:
+        waited = now - self._created
+        self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
+        if waited > self.start_patience and self._ends:
+            self.fail(f"{self.state}: nobody has come for {self.start_patience:g} s")
+
+    def _trouble_with(self, need: Need, now: float) -> Trouble | None:
+        """What is wrong with a topic; None if all is well."""
+        names = self.sources(need.topic)
+        if not names:
+            if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
+                return None
+            last = self._last.get(need.topic, [])
+            said = [sign.ended for sign in self.beats.of(last) if sign.ended]
+            words = f"{need.topic.name}: {' and '.join(last) or 'its source'} has ended"
+            return Trouble(words + "".join(f": {last}" for last in said[-1:] if last != ENDED), True, bool(said))
+        self._gone.pop(need.topic, None)
+        self._last[need.topic] = names
+        patience = self.patience
+        if self._excused < now - patience and (quiet := self.beats.quiet(names, now - patience)):
+            if any(sign.runs for sign in self.beats.of(quiet)):  # on this machine, and busy or without its turn
+                patience *= SLOW
+                quiet = self.beats.quiet(names, now - patience)
+            if quiet:
+                words = f"{need.topic.name}: no sign of life of {' and '.join(quiet)} for {patience:g} s"
+                return Trouble(words, True)
+        late = now - max(need.due, self._excused)
+        if late > self.patience:
+            living = bool(self.beats.of(names))  # it may be slow, or compile for its first answer
+            limit = (self.start_patience if need.first else SLOW * self.patience) if living else self.patience
+            words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
+            return Trouble(f"{words}, although it lives" if living else words, late > limit)
+        return None
+
+    def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:
+        """React to what is wrong with a topic, or to its end."""
+        name, gone = need.topic.name, need.topic in self._gone
+        since = self._silent.get(name)
+        if trouble is None:
+            if since is not None and not gone:
+                del self._silent[name]
+                self.get_logger().warning(f"{name}: is back after {now - since:.1f} s")
+        elif gone and need.gone is Gone.STAYS:
+            self._silent.clear()
+            self.leave(trouble.words)
+        elif (gone and need.gone is Gone.ENDS) or (need.vital and self._ends and trouble.certain):
+            self.fail(trouble.words)
+        elif since is None and not (trouble.announced and need.gone is Gone.NOTED):
+            self._silent[name] = self._said = now
+            self.count("silent peers")
+            self.get_logger().error(f"{trouble.words}; waits on")
+        elif since is not None and now - self._said > PATIENCE_SECONDS:
+            self._said = now
+            self.get_logger().error(f"{trouble.words}; waits on")
+        self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
+
+    def leave(self, words: str) -> None:
+        """A peer without which this node stays has ended."""
+        self.begun = False
+        self._created = math.inf
+        self.state = f"waiting for another one: {words}"
+        self.get_logger().info(self.state)
+
+    def living(self, topic: Topic) -> list[str]:
+        """Sources of a topic without processes that are known to be dead."""
+        return self.beats.living(self.sources(topic), time.monotonic() - self.patience)
+
+    def turn(self, topic: Topic) -> int:
+        """How often the source of a topic has put its time back, as far as it says so."""
+        return max((sign.turn for sign in self.beats.of(self._last.get(topic) or self.sources(topic))), default=0)
+
+    def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
+        """Subscribe to a text; it counts when a living node vouches for it, or when nobody here says such texts."""
+        self._texts[topic], self._takers[topic] = [], take
+        self.subscribe(topic, partial(self._on_text, topic))
+
+    def _on_text(self, topic: Topic, message: Any) -> None:
+        if len(message.data) > TEXT_BYTES or len(self._texts[topic]) >= MOST_TEXTS:
+            self.refuse("refused texts", topic)
+            return
+        self._texts[topic].append((time.monotonic(), message.data))
+        self._offer()
+
+    def heard(self) -> None:
+        """Somebody has given a sign of life."""
+        self._offer()
+
+    def _offer(self) -> None:
+        """Take the texts that somebody vouches for, and refuse those that have waited in vain."""
+        now = time.monotonic()
+        for topic, texts in self._texts.items():
+            for entry in tuple(texts):
+                when, text = entry
+                name = digest(text)
+                sign = self.beats.vouched(name)
+                if sign is None and now - when < self.patience:
+                    continue
+                texts.remove(entry)
+                if sign is None and (self.beats.speakers() or not self._is_plant(self.sources(topic))):
+                    self.refuse("refused texts", topic)
+                elif (told := (name, sign.identity if sign else "")) != self._taken.get(topic) or sign is None:
+                    self._taken[topic] = told
+                    self._takers[topic](text)
+
+    def _is_plant(self, names: list[str]) -> bool:
+        """Whether nodes that give no sign of life may be a plant of another make."""
+        return bool(names) and set(names) <= set(self.sources(JOINT_STATES))
+
+    def part(self) -> None:
+        """Say last words."""
+        self.beats.end(self.state if self.exit_code else "")

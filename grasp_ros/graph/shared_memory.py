@@ -1,0 +1,34 @@
+"""What Fast DDS leaves in the shared memory of a host when a process is killed.
+
+A segment has a lock file beside it, which its process holds: if it can be had, nobody uses the segment any more. The
+small segments of ports are left alone: the next process on that port takes them over, perhaps at this moment.
+"""
+
+from __future__ import annotations
+
+import fcntl
+from contextlib import suppress
+from pathlib import Path
+
+DIRECTORY = Path("/dev/shm")  # of Linux; elsewhere there is nothing to find
+LOCK, PREFIX, PORT = "_el", "fastrtps_", "fastrtps_port"
+
+
+def segments() -> set[str]:
+    """Names of the segments that are there, used or not."""
+    with suppress(OSError):
+        found = {path.name.removesuffix(LOCK) for path in DIRECTORY.glob(f"{PREFIX}*{LOCK}")}
+        return {name for name in found if not name.startswith(PORT)}
+    return set()
+
+
+def remove_unused(names: set[str]) -> list[str]:
+    """Remove those of some segments that no process uses; returns their names."""
+    removed = []
+    for name in sorted(names):
+        with suppress(OSError), (DIRECTORY / (name + LOCK)).open("rb") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for left in (name, name + LOCK):
+                (DIRECTORY / left).unlink(missing_ok=True)
+            removed.append(name)
+    return removed

@@ -1,0 +1,199 @@
+"""What a node does with messages that cannot be true: it counts them, says whose they may be, and loses nothing."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from array import array
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import DEADLINE, START, wait_for
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.serialization import serialize_message
+from std_msgs.msg import String
+
+from grasp_ros import scene
+from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.ticks import PATIENCE_TICKS, Arrival, Ticks
+from grasp_ros.graph.verify import verify
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
+
+PERIOD, END = 1_000_000, 10**10
+BODIES = [0]
+
+
+def state(tick: int, position: float = 0.5) -> bytes:
+    return serialize_message(messages.joint_state(tick * PERIOD, BODIES, np.full(6, position), np.zeros(3)))
+
+
+def command(tick: int, force: float = 1.0) -> bytes:
+    return serialize_message(messages.wrench(tick * PERIOD, force))
+
+
+def ticks(turn: list[int]) -> Ticks:
+    return Ticks([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
+
+
+def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:
+    for length in range(20):
+        message = messages.wrench(7, -1.5)
+        message.header.frame_id = "x" * length
+        assert messages.raw_force(serialize_message(message)) == -1.5
+
+
+def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
+    found = ticks([0])
+    assert found.put(JOINT_STATES, state(0)) is Arrival.TAKEN
+    strange = messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
+    strange.velocity = array("d", [1.0, 2.0])
+    nobody = messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
+    nobody.name = ["nobody"]
+    long = messages.wrench(0, 1.0)
+    long.header.frame_id = "x" * messages.MOST_BYTES
+    for topic, cdr, arrival in (
+        (JOINT_STATES, serialize_message(strange), Arrival.REFUSED),
+        (JOINT_STATES, serialize_message(nobody), Arrival.REFUSED),
+        (JOINT_STATES, state(1, np.nan), Arrival.REFUSED),
+        (JOINT_STATES, state(1)[:20], Arrival.REFUSED),
+        (JOINT_STATES, state(END // PERIOD + 1), Arrival.STAMP),
+        (LEFT_COMMAND, command(1, np.inf), Arrival.REFUSED),
+        (LEFT_COMMAND, serialize_message(long), Arrival.REFUSED),
+        (LEFT_COMMAND, b"", Arrival.REFUSED),
+        (LEFT_COMMAND, serialize_message(messages.wrench(1, 1.0)), Arrival.STAMP),  # no tick
+        (LEFT_COMMAND, serialize_message(messages.wrench(1_800_000_000_000_000_000, 1.0)), Arrival.STAMP),
+        (LEFT_COMMAND, command(PATIENCE_TICKS + 1), Arrival.STAMP),
+        (LEFT_COMMAND, command(-1), Arrival.STAMP),
+        (LEFT_COMMAND, command(1), Arrival.TAKEN),
+        (LEFT_COMMAND, command(1), Arrival.REPEATED),
+        (LEFT_COMMAND, command(1, 2.0), Arrival.CONTRADICTS),
+    ):
+        assert found.put(topic, cdr) is arrival, (topic.name, cdr[:40])
+
+
+def test_a_state_that_comes_again_is_one_tick_and_a_reset_is_two() -> None:
+    turn = [0]
+    found = ticks(turn)
+    for tick in (0, 0, 1, 1):
+        found.put(JOINT_STATES, state(tick))
+        found.put(LEFT_COMMAND, command(tick))
+        if tick == 0:
+            found.take()
+    assert [row.time_ns for row in iter(found.take, None)] == [PERIOD]
+    assert found.put(JOINT_STATES, state(1)) is Arrival.AGAIN
+    found.put(LEFT_COMMAND, command(1, 3.0))  # of the repetition, or the first of another run that has come this far
+    turn[0] = 1
+    for tick in (0, 1):
+        assert found.put(LEFT_COMMAND, command(tick, 7.0)) is Arrival.TAKEN
+        assert found.put(JOINT_STATES, state(tick)) is Arrival.TAKEN
+    rows = list(iter(found.take, None))
+    assert [(row.time_ns, row.restarted) for row in rows] == [(0, True), (PERIOD, False)]
+    assert [messages.raw_force(row.found[LEFT_COMMAND]) for row in rows] == [7.0, 7.0]
+    turn[0] = 2
+    assert found.put(JOINT_STATES, state(0)) is Arrival.TAKEN
+    found.put(LEFT_COMMAND, command(0))
+    assert found.take() is not None
+    assert found.put(JOINT_STATES, state(0)) is Arrival.AGAIN
+
+
+def test_what_is_kept_is_bounded() -> None:
+    found = ticks([0])
+    for tick in range(4 * PATIENCE_TICKS):
+        found.put(LEFT_COMMAND, command(tick % (PATIENCE_TICKS + 1)))
+        found.put(LEFT_COMMAND, command(tick))
+    assert len(found._others[LEFT_COMMAND]) <= 2 * PATIENCE_TICKS
+
+
+ROGUE = """
+import sys, time, rclpy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import WrenchStamped
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+rclpy.init()
+node = rclpy.create_node("rogue")
+latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+wrench = WrenchStamped()
+wrench.header.stamp = node.get_clock().now().to_msg()
+crooked = JointState(name=["left", "left"], position=[1e300], velocity=[float("nan")] * 3)
+crooked.header.frame_id = "\\x07" * 100000
+far = JointState(name=["V"], position=[float("inf")])
+far.header.stamp.sec = 2**31 - 1
+health = DiagnosticArray(status=[DiagnosticStatus(name="rogue", message="y" * 200000)])
+with open(sys.argv[1]) as file:
+    other = file.read()
+once = [("scene", String(data=other), latched), ("run", String(data="{["), latched),
+        ("scene", String(data="a: &a [*a, *a]"), latched), ("run", String(data=other * 2000), latched)]
+often = [("alive", String(data="[1, 2"), 10), ("alive", String(data="[" * 3000), 10), ("lyapunov", far, 10),
+         ("lyapunov", crooked, 10), ("left/parameters", crooked, latched), ("/diagnostics", health, 10),
+         ("lyapunov", b"\\0", 10), ("left/parameters", b"\\0\\1", latched),
+         ("alive", b"\\0\\1\\0\\0\\xff\\xff", 10)]
+kinds = {"lyapunov": JointState, "left/parameters": JointState, "alive": String}
+publishers = [(node.create_publisher(kinds.get(topic, type(message)), topic, qos), message)
+              for topic, message, qos in once + often]
+flood = node.create_publisher(WrenchStamped, "contact/left", 1000)
+end = time.monotonic() + float(sys.argv[2])
+for number in range(10**9):
+    if time.monotonic() > end:
+        break
+    for publisher, message in publishers if number % 500 == 0 else ():
+        publisher.publish(message)
+    flood.publish(wrench)
+"""
+
+
+@pytest.mark.slow  # real processes
+def test_a_rogue_at_full_speed_on_every_other_topic_costs_no_tick(launch: Any, tmp_path: Path) -> None:
+    (tmp_path / "other.yaml").write_text(scene.load("case_09").to_yaml())
+    run = launch(
+        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=4", "-o", "run",
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    wait_for((tmp_path / "run" / "bag" / "bag.mcap").exists, "the bag")
+    launch(sys.executable, "-c", ROGUE, str(tmp_path / "other.yaml"), "4")
+    out, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    assert "equal, bit for bit" in out
+    for words in ("contact/left: messages with a wrong stamp", "scene: refused texts", "lyapunov: refused records"):
+        assert re.search(rf"{words}: \d+; sources: .*/rogue", err), err
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert not any(recording.missing.values())
+    assert verify(recording).holds
+    assert int(recording.lost["messages with a wrong stamp"]) > 100
+    assert sum(file.stat().st_size for file in recording.path.iterdir()) < 20e6
+    assert "Traceback" not in err
+
+
+@pytest.mark.slow  # real processes
+def test_a_text_that_no_plant_vouches_for_starts_nothing(
+    launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, _ = node
+    publisher = peer.create_publisher(String, SCENE.name, messages.qos(SCENE))
+    publisher.publish(String(data="no scene"))
+    with (tmp_path / "log").open("w") as log:
+        controller = launch(*START, "left_controller", stderr=log)
+    wait_for(lambda: "scene: refused texts: 1; sources: /peer" in (tmp_path / "log").read_text(), "the refusal")
+    assert controller.poll() is None
+
+
+LAW = "def law(tick, time, x, v):\n    return 1 / (tick - 30)\n"
+
+
+@pytest.mark.slow  # real processes
+def test_a_law_that_raises_ends_the_run_with_its_line(launch: Any, tmp_path: Path) -> None:
+    (tmp_path / "broken.py").write_text(LAW)
+    run = launch(
+        sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "-o", "run", "--one-process", "--controller",
+        "left=broken:law", cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    _, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 1
+    assert re.search(r"law: broken:law: ZeroDivisionError: division by zero, at tick 30, \S*broken\.py, line 2", err)
+    assert "Traceback" not in err
+    assert len(bag.read(tmp_path / "run" / "bag").tick) == 30

@@ -1,0 +1,131 @@
+"""A node that is killed or frozen is noticed and named by those that need it, within two seconds."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from processes import DEADLINE, START, children, wait_for
+from rclpy.executors import SingleThreadedExecutor
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.verify import verify
+
+pytestmark = pytest.mark.slow  # real processes
+
+NOTICE_SECONDS = 2.0
+BUSY_SECONDS = 8.0  # what a busy machine may add, until a process has said it and ended
+NODES = ("monitor", "left_controller", "right_controller", "plant")
+
+
+class Terminals:
+    """Four nodes, each with its terminal."""
+
+    def __init__(self, launch: Any, directory: Path, scene: str, options: tuple[str, ...] = ()) -> None:
+        self.directory, self.processes = directory, {}
+        for name in NODES:
+            own = {"plant": ["-p", f"scene:={scene}"], "monitor": ["-p", f"bag:={directory / 'bag'}"]}.get(name, [])
+            wait = [] if name == "monitor" else ["-p", "wait_for_monitor:=true"]
+            with (directory / name).open("w") as log:
+                words = [*START, name, "--ros-args", *own, *wait, *options]
+                self.processes[name] = launch(*words, stderr=log)
+        file = directory / "bag" / "bag.mcap"
+        wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
+
+    def said(self, name: str) -> str:
+        return (self.directory / name).read_text()
+
+    def say(self, words: str, names: tuple[str, ...], since: float) -> None:
+        """Wait until some nodes have said something in time."""
+        wait_for(lambda: all(re.search(words, self.said(name)) for name in names), words)
+        assert time.monotonic() - since < NOTICE_SECONDS + BUSY_SECONDS
+
+
+@pytest.fixture
+def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
+    """Levels of /diagnostics by node, as they are now."""
+    peer, executor = node
+    found: dict[str, bytes] = {}
+
+    def note(message: DiagnosticArray) -> None:
+        found.update({status.name: status.level for status in message.status})
+
+    peer.create_subscription(DiagnosticArray, "/diagnostics", note, 10)
+
+    def now() -> dict[str, bytes]:
+        executor.spin_once(timeout_sec=0.01)
+        return found
+
+    return now
+
+
+def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_path: Path, levels: Any) -> None:
+    """Each of four nodes frozen and thawed in turn: no tick is lost, and the bag is right."""
+    (tmp_path / "scene.yaml").write_text(scene_text())
+    graph = Terminals(launch, tmp_path, str(tmp_path / "scene.yaml"))
+    needs = {  # who misses a message of the first
+        "left_controller": ("plant", r"left/effort_command: no (sign of life|answer).* of /left_controller for 1\.5 s"),
+        "monitor": ("plant", r"lyapunov: no (sign of life|answer).* of /monitor for 1\.5 s"),
+        "plant": ("right_controller", r"joint_states: no sign of life of /plant for 1\.5 s"),
+    }
+    for name, (other, words) in needs.items():
+        graph.processes[name].send_signal(signal.SIGSTOP)
+        graph.say(words, (other,), time.monotonic())
+        wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.ERROR, "an error in /diagnostics")
+        graph.processes[name].send_signal(signal.SIGCONT)
+        wait_for(lambda other=other, words=words: "is back after" in graph.said(other).split("waits on")[-1], "its end")
+        wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.WARN, "a warning from then on")
+        assert "this process was stopped, or busy, for" in graph.said(name)
+    graph.processes["plant"].send_signal(signal.SIGINT)
+    assert graph.processes["monitor"].wait(DEADLINE) == 1
+    assert re.search(r"joint_states: /plant has ended; the bag has \d+ ticks", graph.said("monitor"))
+    recording = bag.read(tmp_path / "bag")
+    assert not any(recording.missing.values())
+    assert verify(recording).holds
+    assert "Traceback" not in "".join(graph.said(name) for name in NODES)
+
+
+def scene_text() -> str:
+    """An hour: longer than a test."""
+    from grasp_ros import scene
+
+    return scene.load("case_01", ["time.duration_s=3600"]).to_yaml()
+
+
+RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
+FAULTS = [
+    ("left_controller", signal.SIGSTOP, r"left/effort_command: no (sign of life|answer).* of /left_controller for 1"),
+    ("monitor", signal.SIGKILL, r"monitor: ended with exit status -9"),
+    ("plant", signal.SIGSTOP, r"joint_states: no sign of life of /plant for 1\.5 s"),
+    ("together", signal.SIGSTOP, r"graph: was stopped, and did not go on for 1\.5 s"),
+]
+
+
+@pytest.mark.parametrize(("name", "number", "words"), FAULTS, ids=[f"{name} {fault.name}" for name, fault, _ in FAULTS])
+def test_a_run_ends_with_a_sentence(
+    launch: Any, tmp_path: Path, name: str, number: signal.Signals, words: str
+) -> None:
+    options = ["--one-process"] if name == "together" else []
+    run = launch(*RUN, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    file = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: file.exists() and file.stat().st_size > 50_000, "a bag that grows")
+    os.kill(children(tmp_path)[name], number)
+    begin = time.monotonic()
+    _, err = run.communicate(timeout=DEADLINE)
+    assert time.monotonic() - begin < NOTICE_SECONDS + BUSY_SECONDS
+    assert run.returncode == 1
+    assert re.search(words, err), err
+    assert err.splitlines()[-1].endswith("run/bag has what was recorded")
+    assert "Traceback" not in err
+    recording = bag.read(file.parent)
+    assert verify(recording).holds
+    assert not any(recording.missing.values())
+    assert (number == signal.SIGKILL) is not (file.parent / "metadata.yaml").exists()
