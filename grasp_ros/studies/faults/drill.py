@@ -90,9 +90,10 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     stage.happens(called)
     begin = stage.accident
     struck, reached = time.monotonic(), max(stage.published, before)
-    hung = not stage.wait(lambda: _over(stage) or _goes_on(stage, struck, reached) or _stands(stage, struck),
-                          DEADLINE_SECONDS) or _stands(stage, struck)
-    went_on = not _over(stage) and not hung
+    stage.wait(lambda: _over(stage) or _goes_on(stage, struck, reached) or _stands(stage, struck), DEADLINE_SECONDS)
+    over = _over(stage)
+    went_on = not over and _goes_on(stage, struck, reached)
+    hung = not over and not went_on
     ended = math.nan if went_on or hung else time.monotonic()
     asked = time.monotonic()
     left = _close(stage, wait=math.isfinite(ended))

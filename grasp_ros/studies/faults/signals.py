@@ -13,11 +13,12 @@ from grasp_ros.studies.faults.drill import Drill
 from grasp_ros.studies.faults.stage import NODES, Stage
 
 FROZEN_SECONDS = 5.0
+MISSED_SECONDS = 3.0
 MOMENT_SECONDS = 1.0  # a freeze that nobody may take for an end
 SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
-ALONE_SIGNALS = ("SIGKILL", "SIGSTOP", "SIGTERM")
+ALONE_SIGNALS = ("SIGKILL", "SIGTERM")
 ASKING = ("SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")  # the graph to end
-UNDER, ALONE = "under `grasp run`", "in four terminals"
+UNDER, ALONE, PATIENT = "under `grasp run`", "in four terminals, with `on_silence:=end`", "in four terminals"
 QUICK = ("SIGKILL-monitor", "SIGKILL-grasp")
 
 
@@ -27,8 +28,14 @@ def drills() -> list[Drill]:
     for number in SIGNALS:
         found += [_one(UNDER, Stage.run, number, name) for name in (*NODES, "grasp run")]
     for number in ALONE_SIGNALS:
-        found += [_one(ALONE, Stage.terminals, number, name) for name in NODES]
-    return [*found, *_at_other_moments()]
+        found += [_one(ALONE, partial(Stage.terminals, on_silence="end"), number, name) for name in NODES]
+    found += [_one(PATIENT, Stage.terminals, "SIGSTOP", name) for name in NODES]
+    back = [
+        Drill(f"SIGKILL-{name}-back", PATIENT, f"SIGKILL of the {name.replace('_', ' ')}, and another one is started",
+              Stage.terminals, partial(replace, name=name))
+        for name in ("left_controller", "right_controller")
+    ]
+    return [*found, *back, *_at_other_moments()]
 
 
 def _one(group: str, start: object, number: str, name: str) -> Drill:
@@ -40,6 +47,15 @@ def _one(group: str, start: object, number: str, name: str) -> Drill:
     asked = name == "grasp run" and number in ASKING
     seen = LYAPUNOV if name == "monitor" else JOINT_STATES
     return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK)  # type: ignore[arg-type]
+
+
+def replace(stage: Stage, name: str) -> None:
+    """Kill a node, and start it again once the others have missed it."""
+    stage.signal(name, signal.SIGKILL)
+    stage.started.pop(name).wait()
+    time.sleep(MISSED_SECONDS)
+    stage.node(name)
+    stage.wait(lambda: stage.said(f"[{name}]: waiting") or stage.said(f"[{name}]: running"), 20.0)
 
 
 def send(stage: Stage, name: str, number: Signals) -> None:

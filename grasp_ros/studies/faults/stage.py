@@ -60,11 +60,11 @@ class Companion:
         assert self._process.stdout is not None
         self._process.stdin.write(json.dumps({"do": action, **words}) + "\n")
         self._process.stdin.flush()
-        line = self._process.stdout.readline()
-        if not line:
-            raise Failed("the onlooker has ended")
-        answer: dict[str, Any] = json.loads(line)
-        return answer
+        for line in self._process.stdout:
+            if line.startswith("{"):  # Fast DDS writes there, too
+                answer: dict[str, Any] = json.loads(line)
+                return answer
+        raise Failed("the onlooker has ended")
 
     def close(self) -> None:
         """End it."""
@@ -158,10 +158,10 @@ class Stage:
         self.bag.parent.mkdir(exist_ok=True)
         self.start(name, [*prefix, *NODE, name, "--ros-args", *numbers, *words])
 
-    def terminals(self) -> None:
+    def terminals(self, **parameters: str) -> None:
         """Start the four nodes, each in a terminal of its own."""
         for name in NODES:
-            self.node(name)
+            self.node(name, **parameters)
 
     def pid(self, name: str) -> int:
         """Process of a node, or of `grasp run`."""
