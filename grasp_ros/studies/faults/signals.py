@@ -55,7 +55,8 @@ def replace(stage: Stage, name: str) -> None:
     stage.started.pop(name).wait()
     time.sleep(MISSED_SECONDS)
     stage.node(name)
-    stage.wait(lambda: stage.said(f"[{name}]: waiting") or stage.said(f"[{name}]: running"), 20.0)
+    reached = stage.published
+    stage.wait(lambda: stage.published > reached, 20.0)
 
 
 def send(stage: Stage, name: str, number: Signals) -> None:

@@ -273,8 +273,13 @@ def _shared(pid: int) -> set[str]:
 
 
 def free_domains() -> list[int]:
-    """Domains in which nobody is at the moment: the ports of their first participants can be taken."""
-    return [domain for domain in DOMAINS if _free(7410 + 250 * domain)]
+    """Domains in which nobody is at the moment: the ports of their first participants can be taken.
+
+    Another study at the same time begins with others.
+    """
+    found = [domain for domain in DOMAINS if _free(7410 + 250 * domain)]
+    first = os.getpid() % max(len(found), 1)
+    return found[first:] + found[:first]
 
 
 def _free(port: int) -> bool:
