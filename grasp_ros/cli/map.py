@@ -12,8 +12,9 @@ from tqdm import tqdm
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_scene, load_scene, prepare, whole
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation.chunk import SETTLED, STATUSES, Setup
+from grasp_ros.simulation.chunk import STATUSES, Setup
 from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.quantities import SETTLED
 
 PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
 RANGE = "section.key=low:high[:n[:log]]"

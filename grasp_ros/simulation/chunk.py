@@ -26,11 +26,11 @@ from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
 from grasp_ros.simulation.lyapunov import check as check_lyapunov
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
+from grasp_ros.simulation.quantities import SETTLED
 from grasp_ros.simulation.variants import SET_POINT, Variants
 
 REFUSED = "REFUSED"
 STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if status is not Status.DONE))
-SETTLED = 0.02  # part of the largest initial displacement
 TOUCHES = len((LEFT, RIGHT))
 NO_GRID = np.zeros(0)
 NEVER = np.zeros(1, dtype=np.int64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -32,6 +33,7 @@ def launch() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     yield call
     for process in started:
         process.terminate()  # not kill: `grasp run` has processes of its own to end
+        process.send_signal(signal.SIGCONT)
         process.wait(DEADLINE)
 
 

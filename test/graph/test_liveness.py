@@ -15,9 +15,15 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from processes import DEADLINE, START, children, wait_for
 from rclpy.executors import SingleThreadedExecutor
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
+from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.graph.verify import verify
+from grasp_ros.scene.topics import RUN as RUNNING
 
 pytestmark = pytest.mark.slow  # real processes
 
@@ -69,7 +75,7 @@ def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
 
 def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_path: Path, levels: Any) -> None:
     """Each of four nodes frozen and thawed in turn: no tick is lost, and the bag is right."""
-    (tmp_path / "scene.yaml").write_text(scene_text())
+    (tmp_path / "scene.yaml").write_text(scene.load("case_01", ["time.duration_s=3600"]).to_yaml())
     graph = Terminals(launch, tmp_path, str(tmp_path / "scene.yaml"))
     needs = {  # who misses a message of the first
         "left_controller": ("plant", r"left/effort_command: no (sign of life|answer).* of /left_controller for 1\.5 s"),
@@ -84,6 +90,12 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
         wait_for(lambda other=other, words=words: "is back after" in graph.said(other).split("waits on")[-1], "its end")
         wait_for(lambda other=other: levels().get(f"/{other}") == DiagnosticStatus.WARN, "a warning from then on")
         assert "this process was stopped, or busy, for" in graph.said(name)
+    graph.processes["right_controller"].kill()
+    graph.say(r"right/effort_command: no (sign of life|answer).* of /right_controller", ("plant",), time.monotonic())
+    launch(*START, "right_controller", "--ros-args", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL)
+    wait_for(lambda: "right/effort_command: is back after" in graph.said("plant"), "the one in its place")
+    size = (tmp_path / "bag" / "bag.mcap").stat().st_size
+    wait_for(lambda: (tmp_path / "bag" / "bag.mcap").stat().st_size > size + 20_000, "more ticks")
     graph.processes["plant"].send_signal(signal.SIGINT)
     assert graph.processes["monitor"].wait(DEADLINE) == 1
     assert re.search(r"joint_states: /plant has ended; the bag has \d+ ticks", graph.said("monitor"))
@@ -91,13 +103,6 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
     assert not any(recording.missing.values())
     assert verify(recording).holds
     assert "Traceback" not in "".join(graph.said(name) for name in NODES)
-
-
-def scene_text() -> str:
-    """An hour: longer than a test."""
-    from grasp_ros import scene
-
-    return scene.load("case_01", ["time.duration_s=3600"]).to_yaml()
 
 
 RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
@@ -129,3 +134,65 @@ def test_a_run_ends_with_a_sentence(
     assert verify(recording).holds
     assert not any(recording.missing.values())
     assert (number == signal.SIGKILL) is not (file.parent / "metadata.yaml").exists()
+
+
+FORGETFUL = """
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node("forgetful")
+commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
+lost = [0, 50_000_000, 200_000_000]
+def answer(state):
+    if state.header.stamp.nanosec in lost:  # as if it had not come
+        lost.remove(state.header.stamp.nanosec)
+        return
+    i = state.name.index("left")
+    command = WrenchStamped(header=state.header)
+    command.wrench.force.x = -5.0 * state.position[i] - 0.5 * state.velocity[i]
+    commands.publish(command)
+while commands.get_subscription_count() < 2:
+    rclpy.spin_once(node, timeout_sec=0.01)
+node.create_subscription(JointState, "joint_states", answer, 1000)
+rclpy.spin(node)
+"""
+
+
+def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, tmp_path: Path) -> None:
+    """With a controller that gives no sign of life."""
+    run = launch(
+        *RUN, "--set", "time.duration_s=0.3", "--without", "left_controller", cwd=tmp_path, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    launch(sys.executable, "-c", FORGETFUL, stderr=subprocess.DEVNULL)
+    out, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    assert "equal, bit for bit" in out
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert recording.tick.tolist() == list(range(301))
+    assert not any(recording.missing.values())
+    assert int(recording.lost["repeated messages"]) + int(recording.lost["repeated states"]) > 0
+
+
+def test_what_the_executor_was_not_told_of_is_found(node: tuple[Any, SingleThreadedExecutor]) -> None:
+    """A message, and a call of a service, that lie there without a wake-up: nobody spins this node."""
+    peer, executor = node
+    waiting = GraspNode("waiting", context=peer.context)
+    heard: list[str] = []
+    waiting.subscribe(RUNNING, lambda message: heard.append(message.data))
+    waiting.create_service(Trigger, "~/status", lambda _, answer: answer)
+    publisher = peer.create_publisher(String, RUNNING.name, messages.qos(RUNNING))
+    publisher.publish(String(data="text"))
+    client = peer.create_client(Trigger, "/waiting/status")
+    assert client.wait_for_service(timeout_sec=DEADLINE)
+    future = client.call_async(Trigger.Request())
+
+    def found() -> bool:
+        waiting.sweep()
+        executor.spin_once(timeout_sec=0.01)
+        return bool(heard) and future.done()
+
+    wait_for(found, "both")
+    assert heard == ["text"]
+    waiting.end()

@@ -9,6 +9,7 @@ from documents import scene_of
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.simulation import simulate
+from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.quantities import (
     contact_intervals,
     impact_forces_of,
@@ -58,6 +59,18 @@ def test_what_held_commands_take_is_their_work() -> None:
     run = simulate(scenes.load("case_01"), sampled=True)
     level, lost = run.energy.V_c, losses(run)
     assert float(lost.total) == pytest.approx(level[0] - level[-1], rel=1e-4)
+
+
+@pytest.mark.parametrize("name", ["case_01", "case_03", "case_07", "noise", "saturation"])
+def test_they_are_those_of_an_observed_run(name: str) -> None:
+    scene = scenes.load(name)
+    run = simulate(scene, grid=np.linspace(0.0, scene.duration, 20001))
+    observed = ensemble(scene, {}, ["settling_time", "energy"]).columns
+    lost, part = losses(run), 1e-4 if run.sampled else 1e-9
+    assert settling_times(run).max() == pytest.approx(observed["settling_time"][0], abs=1e-5)
+    for cause in ("dampers", "friction", "impacts", *(() if run.sampled else ("feedback",))):
+        expected = 2.0 * observed[f"lost_{cause}"][0]  # J of V
+        assert float(getattr(lost, cause)) == pytest.approx(expected, rel=part, abs=part)
 
 
 def test_contacts_of_case_1() -> None:

@@ -93,6 +93,8 @@ class Beats:
     node : GraspNode
     heard : callable
         Called after each sign of another node.
+    beaten : callable
+        Called in the thread after each of its own.
 
     Attributes
     ----------
@@ -100,8 +102,8 @@ class Beats:
     publisher : Publisher
     """
 
-    def __init__(self, node: GraspNode, heard: Callable[[], None]) -> None:
-        self._heard = heard
+    def __init__(self, node: GraspNode, heard: Callable[[], None], beaten: Callable[[], None]) -> None:
+        self._heard, self._beaten = heard, beaten
         self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", _process(str(os.getpid()))[1])
         self._signs: dict[str, Sign] = {}
         self.publisher = node.publisher(ALIVE)
@@ -114,6 +116,7 @@ class Beats:
         while not self._stop.wait(BEAT_SECONDS):
             with suppress(Exception):  # of a context that has just become invalid
                 self._beat()
+                self._beaten()
 
     def _beat(self) -> None:
         own = self.own
@@ -164,6 +167,10 @@ class Beats:
             dead = [sign for sign in self.of([name]) if sign.ended or sign.heard < limit]
             found += [name] * max(1, number - len(dead))
         return found
+
+    def alive(self, names: Sequence[str], limit: float) -> list[str]:
+        """Those of some nodes that have given a sign since a wall time."""
+        return sorted({sign.node for sign in self.of(names) if not sign.ended and sign.heard >= limit})
 
     def vouched(self, name: str) -> Sign | None:
         """Who says a text, by its digest; None if nobody does."""

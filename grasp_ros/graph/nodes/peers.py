@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
@@ -12,7 +13,7 @@ from typing import Any, NamedTuple
 
 from rclpy.subscription import Subscription
 
-from grasp_ros.graph.nodes.beats import ENDED, Beats, digest
+from grasp_ros.graph.nodes.beats import BEAT_SECONDS, ENDED, Beats, digest
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
 from grasp_ros.graph.processes import PEER_SECONDS
 from grasp_ros.physics.errors import Refused
@@ -87,15 +88,17 @@ class PeerNode(GraspNode):
         self.begun = False
         self._silent: dict[str, float] = {}  # by topic: since when
         self._said = 0.0  # when that was last said
+        self._left = ""  # what it did before a peer ended without which it stays
         self._gone: dict[Topic, float] = {}
         self._last: dict[Topic, list[str]] = {}  # names of the last sources
         self._texts: dict[Topic, list[tuple[float, str]]] = {}
         self._takers: dict[Topic, Callable[[str], None]] = {}
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
-        self.beats = Beats(self, self.heard)
+        self.beats = Beats(self, self.heard, self._on_beat)
         self._created = self._looked = self._excused = time.monotonic()
         self._before: object = None
+        self._beats = 0  # since the last look
         self.wall_timer(LOOK_SECONDS, self.look)
 
     @abstractmethod
@@ -128,7 +131,7 @@ class PeerNode(GraspNode):
                 words = f"was stopped, or busy, for {now - self._looked:.1f} s"
                 self.get_logger().warning(f"this process {words}", throttle_duration_sec=PATIENCE_SECONDS)
             self._excused = now  # what others did meanwhile is not known yet
-        self._looked = now
+        self._looked, self._beats = now, 0
         self._offer()
         if self.finished:
             return
@@ -141,8 +144,16 @@ class PeerNode(GraspNode):
             return
         for need in self.needs():
             self._note(need, self._trouble_with(need, now), now)
-            if self.finished or not self.begun:
+            if self.finished or self._left:
                 return
+
+    def _on_beat(self) -> None:
+        """In the thread of the signs: end a process that does not come back from a callback; nobody else could."""
+        self._beats += 1
+        seconds = self._beats * BEAT_SECONDS
+        if self.begun and self._ends and seconds > self.start_patience:
+            self.get_logger().fatal(f"busy with one thing for {seconds:.0f} s: a law that does not return, say")
+            os._exit(1)
 
     def _wait_for_start(self, now: float) -> None:
         waited = now - self._created
@@ -186,9 +197,11 @@ class PeerNode(GraspNode):
             if since is not None and not gone:
                 del self._silent[name]
                 self.get_logger().warning(f"{name}: is back after {now - since:.1f} s")
+            if need.gone is Gone.STAYS and not gone:
+                self._come_back()
         elif gone and need.gone is Gone.STAYS:
             self._silent.clear()
-            self.leave(trouble.words)
+            self._leave(trouble.words)
         elif (gone and need.gone is Gone.ENDS) or (need.vital and self._ends and trouble.certain):
             self.fail(trouble.words)
         elif since is None and not (trouble.announced and need.gone is Gone.NOTED):
@@ -200,12 +213,17 @@ class PeerNode(GraspNode):
             self.get_logger().error(f"{trouble.words}; waits on")
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
 
-    def leave(self, words: str) -> None:
+    def _leave(self, words: str) -> None:
         """A peer without which this node stays has ended."""
-        self.begun = False
-        self._created = math.inf
-        self.state = f"waiting for another one: {words}"
-        self.get_logger().info(self.state)
+        if not self._left:
+            self._left, self.state = self.state, f"waiting for another one: {words}"
+            self.get_logger().info(self.state)
+
+    def _come_back(self) -> None:
+        """It is there, or another one in its place."""
+        if self._left and self.state.startswith("waiting for another one"):
+            self.state = self._left
+        self._left = ""
 
     def living(self, topic: Topic) -> list[str]:
         """Sources of a topic without processes that are known to be dead."""
@@ -213,7 +231,8 @@ class PeerNode(GraspNode):
 
     def turn(self, topic: Topic) -> int:
         """How often the source of a topic has put its time back, as far as it says so."""
-        return max((sign.turn for sign in self.beats.of(self._last.get(topic) or self.sources(topic))), default=0)
+        signs = self.beats.of(self._last.get(topic) or self.sources(topic))
+        return signs[-1].turn if signs else 0
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; it counts when a living node vouches for it, or when nobody here says such texts."""

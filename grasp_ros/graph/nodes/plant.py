@@ -144,16 +144,21 @@ class Plant(SteppedNode):
         if self.begun and not self.finished:
             self.loop.ask_again(time.monotonic())
 
-    def _insist(self) -> None:
-        others = self.living(JOINT_STATES)
-        if len(others) > 1:
+    def _insist(self) -> list[str]:
+        """Fail if there is another plant; before the start, names of those that give no sign: they may be dead."""
+        names = self.sources(JOINT_STATES)
+        alive = self.beats.alive(names, time.monotonic() - self.patience)
+        strange = self.living(JOINT_STATES) if len(names) > 1 else []
+        if alive or (self.begun and len(strange) > 1):
             topic = self._states.topic_name
-            self.fail(f"{topic}: another plant publishes here, sources {', '.join(others)};"
+            self.fail(f"{topic}: another plant publishes here, sources {', '.join(names)};"
                       " use another ROS_DOMAIN_ID or namespace")
+        return names if len(strange) > 1 else []
 
     def _ready(self) -> bool:
-        self._insist()
-        missing = self.loop.missing()
+        strange = self._insist()
+        missing = [f"{JOINT_STATES.name} from one source alone, not {' and '.join(strange)}"] if strange else []
+        missing += self.loop.missing()
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         self.state = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
