@@ -193,6 +193,20 @@ def test_a_node_listens_on_this_host_alone_unless_asked(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("asked", [False, True])
+def test_the_option_asks_for_the_network(tmp_path: Path, asked: bool) -> None:
+    """What the process of `grasp ctl` has become has it among its variables."""
+    words = [sys.executable, "-m", "grasp_ros.cli", "ctl", "status", *["--network"] * asked]
+    process = subprocess.Popen(words, cwd=tmp_path, env=plain_environment(129), stderr=subprocess.PIPE, text=True)
+    became = Path(f"/proc/{process.pid}/cmdline")
+    wait_for(lambda: b"graph.nodes.start" in became.read_bytes(), "the node")
+    assert (b"ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET" in (became.parent / "environ").read_bytes()) is asked
+    _, err = process.communicate(timeout=DEADLINE)
+    assert process.returncode == 1
+    assert "no plant answers here" in err
+
+
+@pytest.mark.slow
 def test_a_node_that_cannot_be_secure_does_not_start(tmp_path: Path) -> None:
     """Of the wheels' Fast DDS; one that was built with security would ask for the keys."""
     (tmp_path / "keys" / "enclaves" / "grasp").mkdir(parents=True)

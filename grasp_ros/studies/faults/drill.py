@@ -24,6 +24,7 @@ TERMINALS = (*NODES, "run")  # last words of the names of what a user has in a t
 DEADLINE_SECONDS = 30.0
 STILL_SECONDS = 10.0  # without a tick and without a word: it hangs
 GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 2.5  # after the accident: it goes on, and not without its monitor
+LOOK_SECONDS = 0.1
 CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
 
 
@@ -137,9 +138,10 @@ def _close(stage: Stage, wait: bool) -> list[int]:
         if process.poll() is None and not (wait and name == "grasp run"):
             process.send_signal(signal.SIGCONT)
             process.send_signal(signal.SIGINT if name.split()[-1] in TERMINALS else signal.SIGTERM)
-    stage.wait(lambda: all(process.poll() is not None for process in stage.started.values()) and not stage.living(),
-               CLOSE_SECONDS)
-    left = stage.living()
+    end = time.monotonic() + CLOSE_SECONDS
+    stage.wait(lambda: all(process.poll() is not None for process in stage.started.values()), CLOSE_SECONDS)
+    while (left := stage.living()) and time.monotonic() < end:
+        time.sleep(LOOK_SECONDS)
     for pid in left:
         os.kill(pid, signal.SIGKILL)
     for process in stage.started.values():
@@ -182,9 +184,9 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
     if found.difference is not None or (found.problem and not gone):
         evidence.wrong = found.words
     first = _first_gap(recording) if gone else evidence.kept + 1
-    if first <= stage.published:
-        last = min(accident, float(stage.times[stage.published]))
-        evidence.lost = max(0.0, last - float(stage.times[first]))
+    gone_at = [time for time in stage.times[first : stage.published + 1].tolist() if time]  # the onlooker may miss one
+    if gone_at:
+        evidence.lost = max(0.0, min(accident, gone_at[-1]) - gone_at[0])
 
 
 def _first_gap(recording: bag.Recording) -> int:

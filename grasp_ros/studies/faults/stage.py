@@ -24,6 +24,7 @@ from grasp_ros.scene.topics import JOINT_STATES, Topic
 from grasp_ros.studies.faults.output import Output
 
 START_SECONDS = 60.0  # for a graph to start on a machine that is busy
+AHEAD = 10_000  # ticks between two looks at what was published
 BEFORE = 300  # ticks before the accident
 POLL_SECONDS = 0.02
 GRASP = [sys.executable, "-P", "-m", "grasp_ros.cli"]
@@ -95,6 +96,7 @@ class Stage:
         self._scene_file = place / f"{scene.name}.yaml"
         self._scene_file.write_text(scene.to_yaml(), encoding="utf-8")
         self.output = Output()
+        self._reached = -1
         self.terminal = -1  # or a pipe: the end that is read
         self.accident = math.nan  # when it happened, monotonic
         self.started: dict[str, subprocess.Popen[bytes]] = {}
@@ -215,8 +217,16 @@ class Stage:
     @property
     def published(self) -> int:
         """The last tick that has been seen; -1: none."""
-        seen = np.flatnonzero(np.array(self.times))  # a copy: it changes meanwhile
-        return int(seen[-1]) if len(seen) else -1
+        first = self._reached + 1
+        seen = np.flatnonzero(np.array(self.times[first : first + AHEAD]))  # a copy: it changes meanwhile
+        if len(seen):
+            self._reached = first + int(seen[-1])
+        return self._reached
+
+    def forget(self) -> None:
+        """Begin to count anew, for another graph."""
+        self.times[:] = 0.0
+        self._reached = -1
 
     def wait(self, condition: Callable[[], bool], seconds: float) -> bool:
         """Wait for a condition; returns whether it came true."""
