@@ -184,7 +184,7 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
     if found.difference is not None or (found.problem and not gone):
         evidence.wrong = found.words
     first = _first_gap(recording) if gone else evidence.kept + 1
-    gone_at = [time for time in stage.times[first : stage.published + 1].tolist() if time]  # the onlooker may miss one
+    gone_at = [when for when in stage.times[first : stage.published + 1].tolist() if when]  # the onlooker may miss one
     if gone_at:
         evidence.lost = max(0.0, min(accident, gone_at[-1]) - gone_at[0])
 
