@@ -35,8 +35,8 @@ def test_quick_drills_pass_and_are_written(command: Any, tmp_path: Path) -> None
     [
         ({}, Verdict.SENTENCE), ({"went_on": True, "said": "", "noticed": math.nan}, Verdict.SURVIVED),
         ({"traceback": "KeyError: 1", "went_on": True}, Verdict.TRACEBACK), ({"left": 1}, Verdict.LEFT),
-        ({"hung": True}, Verdict.HUNG), ({"lost": 0.3}, Verdict.LOST), ({"kept": -1}, Verdict.LOST),
-        ({"kept": -1, "nothing_to_keep": True}, Verdict.SENTENCE), ({"wrong": "x"}, Verdict.WRONG),
+        ({"hung": True}, Verdict.HUNG), ({"lost": 0.3}, Verdict.LOST),
+        ({"lost": math.inf, "nothing_to_keep": True}, Verdict.SENTENCE), ({"wrong": "x"}, Verdict.WRONG),
         ({"said": ""}, Verdict.SILENT), ({"said": "", "mute": True}, Verdict.SENTENCE),
         ({"noticed": 9.0}, Verdict.LATE), ({"noticed": math.nan}, Verdict.LATE),
         ({"noticed": 9.0, "asked": True}, Verdict.SENTENCE), ({"skipped": "no network"}, Verdict.SKIPPED),

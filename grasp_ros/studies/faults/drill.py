@@ -175,18 +175,23 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
     try:
         recording = bag.read(stage.bag)
     except bag.BagError as error:
-        evidence.wrong = plain(str(error), [stage.place])
-        evidence.lost = math.inf
+        if "holds no tick" in str(error):  # killed before the first was on the disk
+            evidence.lost = _seconds_from(stage, 0, accident)
+        else:
+            evidence.wrong, evidence.lost = plain(str(error), [stage.place]), math.inf
         return
     evidence.kept = int(recording.tick[-1])
     gone = {name: number for name, number in recording.missing.items() if number}
     found = verify(recording)
     if found.difference is not None or (found.problem and not gone):
         evidence.wrong = found.words
-    first = _first_gap(recording) if gone else evidence.kept + 1
-    gone_at = [when for when in stage.times[first : stage.published + 1].tolist() if when]  # the onlooker may miss one
-    if gone_at:
-        evidence.lost = max(0.0, min(accident, gone_at[-1]) - gone_at[0])
+    evidence.lost = _seconds_from(stage, _first_gap(recording) if gone else evidence.kept + 1, accident)
+
+
+def _seconds_from(stage: Stage, tick: int, accident: float) -> float:
+    """Wall time from a tick to the accident, or to the last tick that was published before it."""
+    seen = [when for when in stage.times[tick : stage.published + 1].tolist() if when]  # the onlooker may miss one
+    return max(0.0, min(accident, seen[-1]) - seen[0]) if seen else 0.0
 
 
 def _first_gap(recording: bag.Recording) -> int:
@@ -204,8 +209,8 @@ def lost_words(evidence: Evidence) -> str:
     """What is kept, for a reader."""
     if evidence.nothing_to_keep:
         return "nothing is there to keep"
-    if evidence.kept < 0:
-        return "nothing"
+    if math.isinf(evidence.lost):
+        return evidence.wrong
     if evidence.lost > LOST_SECONDS:
         return f"all but {evidence.lost:.1f} s"
     return "all" if not evidence.lost else f"all but at most {LOST_SECONDS} s"

@@ -53,9 +53,9 @@ def run(drills: Sequence[Drill], output: Path | None) -> bool:
     Refused
         If the page cannot be written, or no ROS domain is free.
     """
-    for number in (signal.SIGINT, signal.SIGQUIT):  # a shell lets what runs in its background ignore them
+    for number in (signal.SIGINT, signal.SIGQUIT):  # a shell lets what runs in its background, and so the drills, ignore
         if signal.getsignal(number) is signal.SIG_IGN:
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, signal.default_int_handler)
     domains: queue.Queue[int] = queue.Queue()
     for domain in free_domains():
         domains.put(domain)

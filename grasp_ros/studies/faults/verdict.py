@@ -43,7 +43,7 @@ class Evidence:
     exits : dict of str to int
         Exit statuses by process.
     kept, published : int
-        Ticks in the bag, and ticks that the plant had published; -1: none.
+        The last tick in the bag, and the last that had been published; -1: none.
     lost : float, s
         Wall time before the accident from which nothing is in the bag.
     went_on, hung : bool
@@ -88,7 +88,7 @@ class Evidence:
         found = {
             Verdict.SKIPPED: bool(self.skipped), Verdict.TRACEBACK: bool(self.traceback),
             Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
-            Verdict.LOST: not self.nothing_to_keep and (self.lost > LOST_SECONDS or self.kept < 0 <= self.published),
+            Verdict.LOST: not self.nothing_to_keep and self.lost > LOST_SECONDS,
             Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent,
             Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= self.patience + SLACK_SECONDS,
         }
