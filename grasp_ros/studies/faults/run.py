@@ -53,7 +53,7 @@ def run(drills: Sequence[Drill], output: Path | None) -> bool:
     Refused
         If the page cannot be written, or no ROS domain is free.
     """
-    for number in (signal.SIGINT, signal.SIGQUIT):  # a shell lets what runs in its background, and so the drills, ignore
+    for number in (signal.SIGINT, signal.SIGQUIT):  # ignored in the background of a shell
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, signal.default_int_handler)
     domains: queue.Queue[int] = queue.Queue()
