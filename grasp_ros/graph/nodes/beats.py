@@ -1,4 +1,4 @@
-"""Signs of life: every node of a graph tells the others five times a second that its process runs, and when it ends.
+"""Signs of life: every node of a graph tells the others every 0.4 s that its process runs, and when it ends.
 
 They come from a thread of their own: a node that computes for long is not silent, one that was stopped or killed is.
 """
@@ -24,9 +24,9 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.scene.topics import ALIVE
 
-BEAT_SECONDS = 0.2
+BEAT_SECONDS = 0.4
 ACKNOWLEDGE_SECONDS = 0.2
-MISSED = 3  # signs, until somebody else may have taken the place
+MISSED = 2.5  # signs, until somebody else may have taken the place
 MOST_SIGNS, MOST_BYTES = 64, 4096  # a stranger may send more; the oldest signs are forgotten
 ENDED = "ended"  # last words of a node that has nothing to say
 STOPPED = "TtZX"  # states of processes in /proc that do nothing

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.nodes.beats import BEAT_SECONDS, ENDED, Beats, digest
-from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
+from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode
 from grasp_ros.graph.processes import PEER_SECONDS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
 from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
 
-LOOK_SECONDS = 0.2
+LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this process itself stood still
 GONE_SECONDS = 0.8  # without a source: its last messages are on the way
 START_SECONDS = 60.0
@@ -91,6 +91,7 @@ class PeerNode(GraspNode):
         self._left = ""  # what it did before a peer ended without which it stays
         self._gone: dict[Topic, float] = {}
         self._last: dict[Topic, list[str]] = {}  # names of the last sources
+        self._cached: dict[Topic, tuple[float, int, list[str]]] = {}
         self._texts: dict[Topic, list[tuple[float, str]]] = {}
         self._takers: dict[Topic, Callable[[str], None]] = {}
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
@@ -116,7 +117,9 @@ class PeerNode(GraspNode):
 
     def report(self) -> None:
         """Publish the counters, and who publishes what somebody else does."""
-        found = {topic.name: self.living(topic) for topic in self._inputs if topic not in (ALIVE, DIAGNOSTICS)}
+        several = [topic for topic in self._inputs
+                   if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1]
+        found = {topic.name: self.living(topic) for topic in several}
         self.strangers = "; ".join(f"{name} has the sources {' and '.join(names)}" for name, names in found.items()
                                    if len(names) > 1)
         if self.strangers:
@@ -163,7 +166,9 @@ class PeerNode(GraspNode):
 
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""
-        names = self.sources(need.topic)
+        names = self._names(need.topic, now)
+        if not names and need.topic not in self._last:  # it has not come yet
+            return None
         if not names:
             if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
                 return None
@@ -188,6 +193,14 @@ class PeerNode(GraspNode):
             words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
             return Trouble(f"{words}, although it lives" if living else words, late > limit)
         return None
+
+    def _names(self, topic: Topic, now: float) -> list[str]:
+        """Sources of a topic, as of the last second unless their number has changed: names cost more than numbers."""
+        when, number, names = self._cached.get(topic, (-math.inf, 0, []))
+        if now - when > REPORT_SECONDS or number != self.count_publishers(topic.name):
+            names = self.sources(topic)
+            self._cached[topic] = now, len(names), names
+        return names
 
     def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:
         """React to what is wrong with a topic, or to its end."""
