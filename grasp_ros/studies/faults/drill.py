@@ -100,7 +100,8 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     left = _close(stage, wait=math.isfinite(ended))
     evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, asked=drill.asked,
                         ended=ended - begin, nothing_to_keep=drill.nothing_to_keep)
-    _read_words(evidence, stage, begin, asked if went_on or hung else math.inf)
+    _read_words(evidence, stage, called, asked if went_on or hung else math.inf)
+    evidence.noticed = max(evidence.noticed - (begin - called), 0.0)
     evidence.exits = {name: process.returncode for name, process in stage.started.items()
                       if name.split()[-1] in TERMINALS and process.returncode is not None}
     evidence.shared = sum(Path(name).exists() for name in shared - stage.shared_memory())
