@@ -32,9 +32,13 @@ def launch() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
     yield call
     for process in started:
-        process.terminate()  # not kill: `grasp run` has processes of its own to end
+        process.terminate()  # a clean end at first: what follows must not meet the processes of `grasp run`
         process.send_signal(signal.SIGCONT)
-        process.wait(DEADLINE)
+        try:
+            process.wait(DEADLINE / 2)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait(DEADLINE)
 
 
 @pytest.fixture
