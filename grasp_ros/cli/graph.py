@@ -103,9 +103,7 @@ def _run(options: argparse.Namespace) -> int:
     begin = time.monotonic()
     try:
         stopped = _live(graph)
-    except GraphError as error:
-        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
-        print(f"grasp: {error}{there}", file=sys.stderr)
+    except GraphError:
         return 1
     seconds = time.monotonic() - begin
     if not (graph.bag / "metadata.yaml").exists():
@@ -122,6 +120,10 @@ def _live(graph: Graph) -> bool:
     try:
         graph.start()
         graph.wait(received)
+    except GraphError as error:  # said before the others are stopped, which takes a while
+        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
+        print(f"grasp: {error}{there}", file=sys.stderr)
+        raise
     finally:
         graph.stop()
         for number, handler in before.items():
