@@ -33,13 +33,15 @@ def row(drill: Drill, evidence: Evidence) -> list[str]:
     left = [f"{evidence.left} processes"] * bool(evidence.left) + [f"{evidence.shared} files"] * bool(evidence.shared)
     verdict = evidence.verdict
     words = f"{verdict.value}: {evidence.wrong}" if verdict is Verdict.WRONG else verdict.value
-    return [drill.fault, said, lost_words(evidence), seconds(evidence.noticed), same, ", ".join(left) or "nothing",
+    return [drill.fault, said, lost_words(evidence), noticed(evidence), same, ", ".join(left) or "nothing",
             words if verdict.passes else f"**{words}**"]
 
 
-def seconds(value: float) -> str:
-    """A time to notice."""
-    return f"{value:.1f} s" if math.isfinite(value) else "never"
+def noticed(evidence: Evidence) -> str:
+    """How long it took until somebody said something; empty where nothing has to be said."""
+    if math.isfinite(evidence.noticed):
+        return f"{evidence.noticed:.1f} s"
+    return "" if evidence.went_on or evidence.mute else "never"
 
 
 def write(path: Path, played: Sequence[Played]) -> None:
@@ -66,8 +68,8 @@ def write(path: Path, played: Sequence[Played]) -> None:
         *Kept* counts the ticks that the plant had published before the accident; where the monitor itself was hit,
         those that it had recorded. *Noticed* is the time from the accident to the first sentence on a terminal or the
         first report on `/diagnostics` that is not OK. *Exit* is the exit status of `grasp run`, or of the nodes that
-        ended. *Left* are processes that had to be killed, and files in /dev/shm of processes that were killed: Fast
-        DDS clears those at its next start. In four terminals, what still waits when plant and monitor have ended is
-        ended with a Ctrl-C.
+        ended. *Left* are processes that had to be killed, and files in /dev/shm of processes that
+        [were killed](graph.md). In four terminals, what still waits when plant and monitor have ended is ended with a
+        Ctrl-C.
         """))
     document.write(path, "\n\n".join(parts) + "\n")

@@ -159,7 +159,7 @@ def _remapped(stage: Stage) -> Evidence:
     for name in NODES:
         stage.signal(name, signal.SIGINT)
     stage.wait(lambda: not stage.living(), 15.0)
-    return Evidence(said=words[-1].rpartition("]: ")[2] if words else "", noticed=0.0, nothing_to_keep=True,
+    return Evidence(said=words[0].rpartition("]: ")[2] if words else "", noticed=0.0, nothing_to_keep=True,
                     exits={name: process.wait() for name, process in stage.started.items()}, left=len(stage.living()),
                     traceback=stage.output.traceback)
 
