@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import signal
 import sys
 import time
@@ -14,6 +15,7 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.integrator import Integrator
+from grasp_ros.graph.host import network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
@@ -47,6 +49,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument(
         "--on-silence", choices=("end", "wait"), default="end", help="what is done when a node is gone or silent"
     )
+    _add_network(sub)
     sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
     sub.add_argument("bag", type=Path)
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
@@ -56,19 +59,33 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    _add_network(sub)
     sub = add_command(commands, "watch", _watch, "watch a running graph, or a bag, in the terminal")
     sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
+    _add_network(sub)
     sub = add_command(commands, "ctl", _ctl, "pause, resume, step or reset a running graph, or ask for its status")
     sub.add_argument("action", choices=("pause", "resume", "step", "reset", "status"))
     sub.add_argument("steps", type=whole(1), nargs="?", default=1, metavar="N", help="control periods of step")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
+    _add_network(sub)
     sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
     sub.add_argument("bag", type=Path)
 
 
+def _add_network(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument("--network", action="store_true", help="let other hosts take part; default: this host alone")
+
+
+def _reach(options: argparse.Namespace) -> None:
+    """Let the processes that come be reached from where the options say."""
+    if options.network:
+        os.environ.update(network(os.environ))
+
+
 def _run(options: argparse.Namespace) -> int:
+    _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
@@ -86,9 +103,7 @@ def _run(options: argparse.Namespace) -> int:
     begin = time.monotonic()
     try:
         stopped = _live(graph)
-    except GraphError as error:
-        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
-        print(f"grasp: {error}{there}", file=sys.stderr)
+    except GraphError:
         return 1
     seconds = time.monotonic() - begin
     if not (graph.bag / "metadata.yaml").exists():
@@ -105,6 +120,10 @@ def _live(graph: Graph) -> bool:
     try:
         graph.start()
         graph.wait(received)
+    except GraphError as error:  # said before the others are stopped, which takes a while
+        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
+        print(f"grasp: {error}{there}", file=sys.stderr)
+        raise
     finally:
         graph.stop()
         for number, handler in before.items():
@@ -162,11 +181,13 @@ def _replay(options: argparse.Namespace) -> int:
     from grasp_ros.graph import bag
 
     bag.names(options.bag)  # refuses what is none
+    _reach(options)
     become("player", {"bag": json.dumps(str(options.bag)), "rate": repr(options.rate)})
 
 
 def _watch(options: argparse.Namespace) -> int:
     if options.bag is None:
+        _reach(options)
         become("watch", {}, options.namespace)
     from grasp_ros.cli.watch import play
     from grasp_ros.graph import bag
@@ -176,6 +197,7 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 def _ctl(options: argparse.Namespace) -> int:
+    _reach(options)
     become("remote", {"action": options.action, "steps": str(options.steps)}, options.namespace)
 
 

@@ -10,6 +10,7 @@ from grasp_ros.graph.recording import Recording
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
+from grasp_ros.physics.errors import printable
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -32,7 +33,7 @@ def table(rows: Iterable[Row]) -> str:
     """Two aligned columns."""
     rows = list(rows)
     width = max(len(name) for name, _ in rows)
-    return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+    return printable("\n".join(f"{name:<{width}}  {value}" for name, value in rows))
 
 
 def describe_trajectory(trajectory: Trajectory) -> list[Row]:

@@ -16,6 +16,7 @@ STUDIES = (
     study_accuracy.add_accuracy, study_accuracy.add_advise, study_costs.add_loop, study_accuracy.add_prediction,
     study_accuracy.add_page, study_accuracy.add_speed, study_costs.add_effects, study_proofs.add_certificate,
     study_proofs.add_paper, study_proofs.add_hard, study_proofs.add_fuzz, study_proofs.add_doors,
+    study_proofs.add_faults,
     study_costs.add_graph, study_costs.add_recorder, study_maps.add_maps, study_maps.add_many,
 )
 

@@ -13,6 +13,7 @@ from grasp_ros.physics.errors import Refused
 
 Parser = argparse.ArgumentParser
 QUICK_STARTS = 4
+LONG_SCENE = "case_01"
 PAPER_PAGE = Path("runs") / "paper.html"
 
 
@@ -135,3 +136,26 @@ def _doors(options: argparse.Namespace) -> int:
     prepare()
     broken = doors.run(options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)
     return 1 if broken else 0
+
+
+def add_faults(commands: Any) -> Parser:
+    """`grasp study faults`."""
+    text = "accidents done to graphs of real processes, and what comes of them, some minutes"
+    sub = add_command(commands, "faults", _faults, text)
+    sub.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these drills alone")
+    sub.add_argument("--quick", action="store_true", help="a handful of drills")
+    sub.add_argument("--ticks", type=whole(1000), metavar="N",
+                     help=f"in place of drills, {LONG_SCENE} in lockstep for N ticks: losses, and memory of processes")
+    add_output(sub, "FILE.md", "write the table as a page too")
+    return sub
+
+
+def _faults(options: argparse.Namespace) -> int:
+    from grasp_ros.studies.faults import endurance, run
+
+    if options.ticks:
+        prepare()
+        return 0 if endurance.run(LONG_SCENE, options.ticks) else 1
+    drills = run.chosen(options.only, options.quick)
+    prepare()
+    return 0 if run.run(drills, options.output) else 1

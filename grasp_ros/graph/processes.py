@@ -38,8 +38,7 @@ def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> No
         Its parameters, as `-p` takes them.
     namespace : str
     """
-    environment = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", **os.environ}
-    os.execve(sys.executable, _command([node], parameters, namespace), environment)
+    os.execv(sys.executable, _command([node], parameters, namespace))
 
 
 def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str) -> list[str]:
@@ -125,11 +124,7 @@ class Graph:
         with writing(self.directory):
             self.directory.mkdir(parents=True)
             scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
-        environment = {
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "ROS_LOG_DIR": str(self.directory / "log"),
-            **os.environ,
-        }
+        environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ}
         shared = {"on_silence": self.on_silence}
         if self.peer_timeout is not None:
             shared["peer_timeout_s"] = repr(self.peer_timeout)

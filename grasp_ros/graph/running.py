@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-import yaml
-
 from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import strict_yaml
 
 REACTIONS = ("hold", "zero", "stop")
 LEAST = 1e-6  # real-time factor
@@ -43,6 +42,8 @@ class Running:
     reactions: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.accuracy < 1.0:
+            raise Refused(f"accuracy: {self.accuracy!r} is not allowed; allowed: a number between 0 and 1")
         for name, value in {f"{side}_timeout_s": seconds for side, seconds in self.timeouts.items()}.items():
             if not 0.0 < value < math.inf:
                 raise Refused(f"{name}: {value!r} is not allowed; allowed: a number > 0")
@@ -66,7 +67,7 @@ class Running:
     def to_yaml(self) -> str:
         """As YAML; `parse` of it gives the same."""
         mode = "lockstep" if self.lockstep else "free-running"
-        return yaml.safe_dump({"mode": mode, **asdict(self)}, sort_keys=False)
+        return strict_yaml.dump({"mode": mode, **asdict(self)})
 
 
 def parse(text: str) -> Running:
@@ -78,8 +79,8 @@ def parse(text: str) -> Running:
         If the text is not such a text.
     """
     try:
-        found: dict[str, Any] = yaml.safe_load(text)
+        found: dict[str, Any] = strict_yaml.load(text)
         found.pop("mode")
         return Running(**found)
-    except (yaml.YAMLError, AttributeError, KeyError, TypeError) as error:
+    except (Refused, AttributeError, KeyError, TypeError) as error:
         raise Refused(f"run: not what a plant says: {' '.join(str(error).split())}") from None

@@ -134,7 +134,7 @@ def open_group(path: Path, mode: str = "r") -> Any:
     import zarr
 
     try:
-        group = zarr.open_group(path, mode=mode)
+        group = zarr.open_group(path, mode=mode, zarr_format=3)  # version 2 has arrays that are code
         if group.attrs.get("format") != FORMAT:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
         parts = (MARKS, STATUS, *(axis["name"] for axis in group.attrs["plan"]["axes"]))
@@ -161,7 +161,7 @@ def read(path: Path) -> Any:
     import xarray
 
     group = open_group(path)
-    data = xarray.open_zarr(path, consolidated=False, chunks=None)
+    data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
     data = data.drop_vars(MARKS)
     return data.set_coords([axis["name"] for axis in group.attrs["plan"]["axes"]])
 

@@ -5,10 +5,18 @@ from __future__ import annotations
 LONGEST = 4000  # characters of a sentence
 
 
+def printable(text: str) -> str:
+    """A text that does nothing to a terminal: control characters as their escapes, lines as they are."""
+    return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)
+
+
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package
-    """Input that is refused: names what, its value and what is allowed; the middle of a very long value is left out."""
+    """Input that is refused: names what, its value and what is allowed.
+
+    The middle of a very long value is left out, and control characters are shown as escapes.
+    """
 
     def __init__(self, sentence: str) -> None:
         if len(sentence) > LONGEST:
             sentence = f"{sentence[: LONGEST // 2]} ... {sentence[-LONGEST // 2 :]}"
-        super().__init__(sentence)
+        super().__init__(printable(sentence))

@@ -12,6 +12,7 @@ from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParam
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
@@ -25,6 +26,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
 
+RCLError = rclpy_implementation.RCLError
 PEER_SECONDS = 0.05
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
@@ -274,11 +276,11 @@ class GraspNode(Node):
 
 @contextmanager
 def _refusing() -> Iterator[None]:
-    """Refuse what rclpy refuses of the parameters that the start has given."""
+    """Refuse what rclpy refuses of the parameters that the start has given, and what DDS cannot be, secure for one."""
     try:
         yield
-    except ParameterException as error:
-        raise Refused(str(error)) from None
+    except (ParameterException, RCLError) as error:
+        raise Refused(" ".join(str(error).split())) from None
 
 
 def _descriptor(parameter: Parameter) -> ParameterDescriptor:

@@ -6,10 +6,12 @@ first and everything else after them.
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 from importlib import import_module
 
+from grasp_ros.graph.host import this_host
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
 
 
@@ -23,6 +25,7 @@ def main(name: str, child: bool = False) -> int:
     if child:
         end_with_parent(received)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
+    os.environ.update(this_host(os.environ))  # before rclpy looks
     module = import_module(f"grasp_ros.graph.nodes.{'controller' if name.endswith('controller') else name}")
     status: int = module.main(name, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
