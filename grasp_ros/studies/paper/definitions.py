@@ -6,7 +6,7 @@ from grasp_ros.simulation.quantities import SETTLED
 from grasp_ros.studies.paper.cases import FARTHEST, NEAREST, OFFSETS, READ_P, SEED
 from grasp_ros.studies.paper.claims import ALMOST_ALL, HALF
 from grasp_ros.studies.paper.compare import SWEPT
-from grasp_ros.studies.paper.measures import BOUNDS, LIMIT, MARGIN, SAMPLE
+from grasp_ros.studies.paper.measures import BOUNDS, LATER, LIMIT, MARGIN, SAMPLE, STRETCH
 from grasp_ros.studies.paper.universal import FEW, FEWER
 
 TITLE = "The paper, reproduced and judged"
@@ -30,7 +30,8 @@ def definitions(starts: int) -> list[tuple[str, str]]:
             "settled",
             (
                 f"no mass leaves {SETTLED:.0%} of the larger initial displacement any more. The settling time is the"
-                f" last time at which one does, from the dense output every {1e3 * SAMPLE:g} ms. A run goes on until"
+                f" last time at which one does, from the dense output every {1e3 * SAMPLE:g} ms, after"
+                f" {STRETCH:g} s every {1e3 * LATER:g} ms. A run goes on until"
                 f" V_c, which never rises, proves that nothing leaves any more, at most {LIMIT:g} s; later counts as"
                 f" never. {bounds} are looked at, too."
             ),
