@@ -52,6 +52,13 @@ class Check(NamedTuple):
     value: str
     share: float  # of the runs that were looked at, 0 to 1
     holds: bool
+    runs: int = 0  # that were drawn, where they were
+
+    @property
+    def close(self) -> bool:
+        """Whether other draws could put the share on the other side of a bound of the rule: two standard errors."""
+        error = (self.share * (1.0 - self.share) / self.runs) ** 0.5 if self.runs else 0.0
+        return any(abs(self.share - bound) < 2.0 * error for bound in (ALMOST_ALL, HALF))
 
 
 class Part(NamedTuple):
@@ -76,6 +83,11 @@ class Part(NamedTuple):
     def limits(self) -> list[Check]:
         """Checks that fail, of those that decide."""
         return [check for check in self.checks if check.kind in DECISIVE and not check.holds]
+
+    @property
+    def close(self) -> list[Check]:
+        """Random starts that others could turn."""
+        return [check for check in self.checks if check.kind is Kind.RANDOM and check.close]
 
     @property
     def turned(self) -> list[Check]:

@@ -193,7 +193,7 @@ class Comparison(NamedTuple):
         value = f"{_percent(share)} of {len(found)}; ratio {middle:.3g}, from {low:.3g} to {high:.3g}"
         if kind is Kind.RANDOM:
             value += where_false(starts, true)
-        return Check(kind, f"{NAMES[word]}, {changed} and {other}", value, share, almost_all(share))
+        return Check(kind, f"{NAMES[word]}, {changed} and {other}", value, share, almost_all(share), len(found))
 
     def _at_all(self, cases: Cases, starts: Sequence[Start], changed: Variant, other: Variant) -> Check:
         """The same without the margin."""
@@ -212,6 +212,9 @@ class Comparison(NamedTuple):
         text = f"{self.letter} beside {standard:g}, median ratio of {len(starts[:SWEPT])} random starts"
         opposite = [value for value, middle in curve if self.true_of(1.0 / middle if middle else np.inf)]
         pairs = ", ".join(f"{value:g}: {middle:.3g}" for value, middle in curve)
+        lowest = min(curve, key=lambda point: point[1])
+        if lowest not in (curve[0], curve[-1]):
+            pairs += f"; lowest at {lowest[0]:g}"
         if opposite:
             pairs += f"; the other way round at {', '.join(f'{value:g}' for value in opposite)}"
         return [Check(Kind.SWEEP, text, pairs, share, share > HALF and not opposite)]

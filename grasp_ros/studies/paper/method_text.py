@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
+from grasp_ros.scene import Scene
 from grasp_ros.studies.paper import motion
+from grasp_ros.studies.paper.cases import Cases
 from grasp_ros.studies.paper.statement import Statement
 from grasp_ros.studies.paper.universal import Universal
 
@@ -41,15 +43,24 @@ def _interpolation() -> Statement:
     return Statement("T10", "p. 246, method", words, (*exact, *order))
 
 
+LONG = 500.0  # s
+
+
+def _long(cases: Cases) -> Scene:
+    return cases[2].changed({"time.duration_s": LONG})
+
+
 def _many_collisions() -> Statement:
     goes_on = [
         Universal(
             f"With a step of {text} it goes on to the end, however many touches come.",
-            "it reaches 20 s, and has touched",
+            "it reaches the end, and has touched",
             partial(motion.goes_on, step),
             "Every step decides anew what is in contact; nothing counts.",
             letter="H",
             values=(1e2, 1e5),
+            extra=((f"No. 2 over {LONG:g} s", _long),),
+            unit=" touches",
         )
         for step, text in STEPS
     ]

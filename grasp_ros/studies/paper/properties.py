@@ -60,8 +60,9 @@ def unequal_pairs() -> tuple[Comparison, ...]:
             " other.",
         ),
         _unequal(
-            "k", 100.0, STANDARD, "The stiff arm hardly gives way and takes little from the object; that is so of both"
-            " equal pairs to a lesser degree.",
+            "k", 100.0, STANDARD, "Arms of different periods meet the object at different times and keep it moving,"
+            " and a"
+            " stiff arm, which hardly gives way, takes little from it.",
         ),
         _unequal("c", 2.0, STANDARD, between + "one damper more is better than none more, and worse than two."),
         _unequal("Kv", 5.0, STANDARD, between + "one arm with more feedback takes energy for both."),
@@ -131,7 +132,7 @@ def damped_arms() -> tuple[Comparison, ...]:
             "c adds to Kv: the envelope of an arm is exp(-C t / 2m) up to critical damping; beyond it the arm creeps"
             " back, as exp(-K t / C).",
             "c",
-            wide(0.2),
+            (*wide(0.2), 50.0, 100.0),
             SETTLING,
         ),
     )

@@ -110,7 +110,9 @@ def _chaos(found: Chaos) -> Result:
         f" {SMALL:g} sqrt(V(0)) apart are {found.far:.2g} sqrt(V(0)) apart after {found.apart[0][-1]:g} s. The largest"
         f" Lyapunov exponent is {found.exponent:.3f} +- {found.error:.3f} /s over {found.t[-1]:g} s (standard error of"
         f" ten blocks), a factor of {np.exp(20.0 * found.exponent):.1e} in the 20 s of Fig. 3. In {found.seconds:g} s"
-        f" the motion comes back to its start no nearer than {found.near:.3f} sqrt(V(0)), at {found.near_time:.1f} s."
+        f" the motion comes back to its start no nearer than some {found.near:.2g} sqrt(V(0)); after"
+        f" {-np.log(np.spacing(1.0)) / found.exponent:.0f} s or so what is computed is one of the motions that begin"
+        " within rounding of this one."
         " From a start that is symmetric to the last bit the object rests and the arms are periodic: the return is"
         f" within {found.periodic:.1e}, and the exponent of offsets that keep the symmetry tends to 0"
         f" ({found.symmetric:.3f} /s). Any other offset leaves that motion faster still, at {found.across:.2f} /s."
@@ -119,14 +121,14 @@ def _chaos(found: Chaos) -> Result:
         (
             _at(PRINTED),
             f"{found.exponent:.3f} +- {found.error:.3f}",
-            f"{found.near:.4f}",
-            f"{found.near_time:.3f}",
+            f"{found.near:.2g}",
+            f"{found.near_time:.0f}",
         ),
         (
             f"{_at(SYMMETRIC)}, within symmetry",
             f"{found.symmetric:.3f}",
             f"{found.periodic:.1e}",
-            f"{found.periodic_time:.3f}",
+            f"{found.periodic_time:.1f}",
         ),
         (f"{_at(SYMMETRIC)}, across it", f"{found.across:.3f}", "", f"over {WITHIN:g}"),
     ]
@@ -228,7 +230,9 @@ def _damped(rows: Sequence[Damped]) -> Result:
         " at one state, not two motions."
     )
     table = [
-        (f"{row.C:g}", f"{row.together:.2f}", f"{row.alone:.2f}", f"{row.together / row.alone:.2f}", f"{row.later:.0%}")
+        (f"{row.C:g}", f"{row.together:.3g}", f"{row.alone:.3g}", f"{row.together / row.alone:.2f}", f"{row.later:.0%}")
+        if np.isfinite(row.alone)
+        else (f"{row.C:g}", f"{float(f'{row.together:.2g}'):g}", "never", "", f"{row.later:.0%}")
         for row in rows
     ]
     return Result(

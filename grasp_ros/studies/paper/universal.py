@@ -78,11 +78,12 @@ class Universal(NamedTuple):
         return Part(self.statement, self.threshold, self.why, checks, self.reading)
 
     def _random(self, cases: Cases, few: Sequence[Start]) -> list[Check]:
-        """Cases of which it is always true together, and every other by itself, so that no case hides in a crowd."""
+        """Cases of which it is always, or never, true together, and others by themselves: none hides in a crowd."""
         drawn = {number: [self.test(started(cases[number], start)) for start in few] for number in self.cases}
-        always = [number for number, found in drawn.items() if all(each.holds for each in found)]
-        groups = [always] if always else []
-        groups += [[number] for number in self.cases if number not in always]
+        shares = {number: sum(each.holds for each in found) / len(found) for number, found in drawn.items()}
+        always, never = ([number for number in self.cases if shares[number] == share] for share in (1.0, 0.0))
+        mixed = [[number] for number in self.cases if number not in always + never]
+        groups = [group for group in (always, never, *mixed) if group]
         return [
             self._all(Kind.RANDOM, _named(group), [each for number in group for each in drawn[number]])
             for group in groups
@@ -163,7 +164,7 @@ class Share(NamedTuple):
             f"{100.0 * share:.3g} % of {len(drawn)}; {values[len(values) // 2]:.3g}{self.unit} in the middle, "
             f"from {values[0]:.3g} to {values[-1]:.3g}"
         )
-        return Check(kind, text, value, share, almost_all(share))
+        return Check(kind, text, value, share, almost_all(share), len(drawn))
 
 
 def _named(numbers: Sequence[int]) -> str:
