@@ -61,8 +61,7 @@ def unequal_pairs() -> tuple[Comparison, ...]:
         ),
         _unequal(
             "k", 100.0, STANDARD, "Arms of different periods meet the object at different times and keep it moving,"
-            " and a"
-            " stiff arm, which hardly gives way, takes little from it.",
+            " and a stiff arm, which hardly gives way, takes little from it.",
         ),
         _unequal("c", 2.0, STANDARD, between + "one damper more is better than none more, and worse than two."),
         _unequal("Kv", 5.0, STANDARD, between + "one arm with more feedback takes energy for both."),
