@@ -13,7 +13,7 @@ from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of, keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
-from grasp_ros.exact.observer import leave_step, notify
+from grasp_ros.exact.observer import leave_orders, leave_step, notify
 from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
 from grasp_ros.exact.records import (
@@ -183,8 +183,9 @@ def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, b
 def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """One Taylor step to its first event, whose transitions it makes, or to the end of the span; its time, or nan."""
     out.work[Work.CONTACT_STEPS] += 1
-    c, at, y, mode, n = tables.c, tables.at, state.y, state.mode, settings.order
-    step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings), span)
+    c, at, y, mode = tables.c, tables.at, state.y, state.mode
+    step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
+    n = step.order
     h = accepted_length(tables, step, h, settings, out.work)
     left = pair_candidate(tables, plant, state, n, LEFT, h, out.work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
@@ -210,6 +211,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     deliver(tables, step, s, t, flies, free, state, out)
     tick(state.clock, t)
     leave_step(tables, s, step.unit)
+    leave_orders(tables, n, out)
     notify(out, Segment.CONTACT, t)
     make_transitions(plant, state, left, right, slide, s, out)
     return t

@@ -30,6 +30,7 @@ from grasp_ros.physics.layout import (
 )
 
 SHORT = 0.25  # of the time constants: there the power series keeps all digits
+INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 25))])  # a quotient would keep the next one waiting
 FLIGHT_ORDER = np.int64(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
 
 
@@ -110,10 +111,12 @@ def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float)
     position = v * t
     velocity = v
     n = 1
+    drag, spring = -2.0 * sigma * t, -omega0_2 * t * t
     while n < 24:
         velocity += term
-        position += term * t / (n + 1)
-        following = -t * (2.0 * sigma * term + omega0_2 * before * t / n) / (n + 1)
+        share = INVERSE[n + 1]
+        position += (term * t) * share
+        following = (drag * term + spring * (before * INVERSE[n])) * share
         before, term = term, following
         n += 1
         if abs(term) <= 1e-18 * abs(velocity) and abs(before) <= 1e-18 * abs(velocity):

@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.records import Output, Tables
-from grasp_ros.physics.layout import CHECK, TIME, Filled, Segment
+from grasp_ros.physics.layout import CHECK, LANES, TIME, Filled, Segment
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -59,3 +59,11 @@ def notify(out: Output, kind: Segment, t: float) -> None:
 def leave_step(tables: Tables, s: float, unit: float) -> None:
     """Leave the end of a step, in units of its variable, and that unit, where an observer finds them."""
     tables.size[TIME], tables.size[CHECK] = s, unit
+
+
+@inlined
+def leave_orders(tables: Tables, order: int, out: Output) -> None:
+    """Clear what a series of a lower order leaves of another one: an observer reads all that there is room for."""
+    if out.filled[Filled.OBSERVER] != 0:
+        for i in range(LANES * (order + 1), LANES * len(tables.row)):
+            tables.c[i] = 0.0

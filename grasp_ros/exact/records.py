@@ -42,8 +42,8 @@ class Settings(NamedTuple):
     """What the accuracy of a run rests on."""
 
     tolerance: float  # first neglected Taylor term, relative to the impact
-    order: int  # of the Taylor series
-    first: float  # tolerance^(1 / (order + 1)): where the first neglected term of a series with radius 1 reaches it
+    order: int  # of the Taylor series, unless a step is short
+    first: float  # of a step of that order, see `Step`
     rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `scales.rate_bound`
 
 
@@ -110,6 +110,7 @@ class Step(NamedTuple):
     """A Taylor step: what its series stand for."""
 
     order: int
+    first: float  # tolerance^(1 / (order + 1)): where the first neglected term of a series with radius 1 reaches it
     unit: float  # of s, such that the radius of convergence is about 1
     left: bool  # whether the left pair is in contact
     right: bool

@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import other, reduced_mass, relative_motion
+from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
 from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
@@ -19,11 +19,14 @@ from grasp_ros.physics.layout import (
     RIGHT,
     STIFFNESS,
     U_L,
+    U_R,
     Body,
     Filled,
     Pair,
 )
 
+RADIUS = 0.5  # of convergence of the series of a step, in its units: the least that is usual
+LEAST = 12  # order of a Taylor step
 STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
 
 
@@ -104,10 +107,38 @@ def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
 
 
 @inlined
-def new_step(plant: Plant, state: State, settings: Settings) -> Step:
+def reach_of_span(state: State, left: bool, right: bool, unit: float, span: float) -> float:
+    """About the s / unit at which a contact has lasted for a span in s: dt = 2 G ds, with G and G' as they begin."""
+    y, g, bend = state.y, 1.0, 0.0
+    if left:
+        g, bend = math.sqrt(y[U_L]), approach(y, LEFT)
+    if right:
+        w = math.sqrt(y[U_R])
+        bend = w * w * bend + g * g * approach(y, RIGHT) if left else approach(y, RIGHT)
+        g *= w
+    pace = unit * (g + math.sqrt(max(g * g + bend * span, 0.0)))
+    return span / pace if pace > 0.0 else math.inf
+
+
+@inlined
+def order_for(settings: Settings, reach: float) -> tuple[int, float]:
+    """Even order that suffices for a step to a reach in units, at most that of the settings, and its `Step.first`."""
+    part = reach / RADIUS
+    if not part < settings.first:
+        return settings.order, settings.first
+    order = 2 * math.ceil(0.5 * (math.log(settings.tolerance) / math.log(part) - 1.0))
+    order = max(order, LEAST)
+    if order >= settings.order:
+        return settings.order, settings.first
+    return order, math.exp(math.log(settings.tolerance) / (order + 1))
+
+
+@inlined
+def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Step:
     """A step from here, in a unit of s in which its coefficients neither grow nor shrink by many decades.
 
-    With both pairs in contact dt = 2 w_l w_r ds: each turns at its rate times the w of the other one.
+    With both pairs in contact dt = 2 w_l w_r ds: each turns at its rate times the w of the other one. A step that a
+    span will end needs fewer orders.
     """
     left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
     w_l, rate_l, w_r, rate_r = 1.0, 0.0, 1.0, 0.0
@@ -117,7 +148,8 @@ def new_step(plant: Plant, state: State, settings: Settings) -> Step:
         w_r, rate_r = turning_rate(plant, state, RIGHT)
     fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
     unit = 1.0 / fastest if fastest > 0.0 else 1.0
-    return Step(settings.order, unit, left, right)
+    order, first = order_for(settings, reach_of_span(state, left, right, unit, span))
+    return Step(order, first, unit, left, right)
 
 
 @inlined

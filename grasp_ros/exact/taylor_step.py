@@ -129,7 +129,7 @@ def length(tables: Tables, plant: Plant, y: Array, step: Step, settings: Setting
     size[CHECK] = 0.0
     for lane in range(LANES):
         size[lane] = 1.0 / size[lane] if size[lane] > SMALLEST else 0.0
-    return step_size(c, size, step.order, settings.first)
+    return step_size(c, size, step.order, step.first)
 
 
 @inlined
@@ -156,7 +156,7 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
             if apart or tables.at[TIME] >= span:
                 return step, 1.0
         unit = step.unit * math.ldexp(1.0, orders_to_one(h, MOST))
-        step = Step(step.order, unit, step.left, step.right)
+        step = Step(step.order, step.first, unit, step.left, step.right)
     return step, math.nan
 
 

@@ -204,7 +204,7 @@ def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
             tables.c[Z_R if left else Z_L] = START["both"][5 if left else 4]
             expand_one(tables.c, tables.f, BODIES, PAIRS, LEFT if left else RIGHT, 1.0, n)
             start = tables.c[: LANES * (n + 1)].reshape(n + 1, LANES)
-        s = invert_time(tables_of(start), Step(n, 1.0, *touching), tau, high, at(start, high)[TIME])
+        s = invert_time(tables_of(start), Step(n, 0.0, 1.0, *touching), tau, high, at(start, high)[TIME])
         end = at(start, s)
         end[[Z_L, Z_R]] **= np.where(touching, 2, 1)
         ends.append(end[[V_L, X_O, V_O, V_R, Z_L, Z_R]])
@@ -240,7 +240,7 @@ def settings_of(tolerance: float) -> Settings:
 def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[Tables, Step, float]:
     """A workspace with the series of a start, what they stand for, and how far they go."""
     plant, state = motion(name)
-    step = new_step(plant, state, settings)
+    step = new_step(plant, state, settings, np.inf)
     if unit is not None:
         step = step._replace(unit=unit)
     tables = new_tables(settings.order)
@@ -320,7 +320,7 @@ def test_time_is_inverted_to_rounding(name: str) -> None:
     c, high = expand(name, n, unit=unit), 0.3 if "both" in name else 0.2
     for s in (1e-9, 0.03, 0.17, high):
         tau, total = at(c, s)[TIME], at(c, high)[TIME]
-        found = invert_time(tables_of(c), Step(n, unit, *sides(name)), tau, high, total)
+        found = invert_time(tables_of(c), Step(n, 0.0, unit, *sides(name)), tau, high, total)
         assert at(c, found)[TIME] == pytest.approx(tau, rel=1e-15, abs=1e-17)
 
 
@@ -351,7 +351,7 @@ def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -
     y = np.array([u, speed, 0.0, 0.0, -u if both else 1.0, -speed, u, u if both else -1.0])
     state = State(y, np.array([Pair.CONTACT, Pair.CONTACT if both else Pair.OPEN, Slide.FREE]), np.zeros(3))
     plant, settings = Plant(bodies, bodies, pairs, 0.0), settings_of(1e-14)._replace(rate=0.0)
-    step, tables = new_step(plant, state, settings), new_tables(settings.order)
+    step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.order)
     begin_series(tables, state)
     expand_step(tables, plant, step)
     h = length(tables, plant, y, step, settings, 1.0)
