@@ -30,6 +30,7 @@ setup(
         "zstandard",
         "numba",
         "matplotlib",
+        "pillow",
         "tqdm",
         "PyYAML",
         "jinja2",

@@ -180,10 +180,14 @@ def inputs(axes: Axes, motion: Motion) -> None:
             axes.plot(motion.t, motion.command[:, side], label=f"$f_{letter}$", color=color, linewidth=1.0)
     if motion.scene.values.keys() == PAPER:
         _widen(axes, PAPER_INPUT, motion.command)
-        for edge in PAPER_INPUT:  # where the paper's axis ends, if the input goes on
-            if not axes.get_ylim()[0] <= 2.0 * edge <= axes.get_ylim()[1]:
-                continue
-            axes.axhline(edge, color="black", linewidth=0.6, linestyle=":")
+        low, high = axes.get_ylim()
+        if any(low <= 2.0 * edge <= high for edge in PAPER_INPUT):  # the input goes on beyond the paper's axis
+            for edge in PAPER_INPUT:
+                axes.axhline(edge, color="black", linewidth=0.6, linestyle=":")
+            axes.text(
+                0.99, PAPER_INPUT[0], "the paper's axis ends", transform=axes.get_yaxis_transform(), ha="right",
+                va="top", fontsize="x-small",
+            )
 
 
 def impacts(axes: Axes, motion: Motion) -> None:

@@ -114,22 +114,22 @@ def power_lost(system: System, state: Array) -> Losses:
     return Losses(dampers, feedback, impacts, friction)
 
 
-def edges_of(run: Trajectory) -> Array:
+def edges_of(run: Trajectory, longest: float = LONGEST) -> Array:
     """Ends of the stretches of a motion in which everything is smooth: events, and cuts of the long flights, in s."""
     events = np.unique(np.concatenate([[0.0], run.event_table[:, 0], run.t[-1:]]))
-    cuts = [np.linspace(a, b, int(np.ceil((b - a) / LONGEST)) + 1)[1:] for a, b in pairwise(events.tolist())]
+    cuts = [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[1:] for a, b in pairwise(events.tolist())]
     return np.concatenate([[0.0], *cuts])
 
 
-def running_losses(run: Trajectory) -> tuple[Array, Losses]:
-    """Energy lost so far by each cause: times (n,) in s, and arrays (n,) in J of V.
+def running_losses(run: Trajectory, longest: float = LONGEST) -> tuple[Array, Losses]:
+    """Energy lost so far by each cause: times (n,), at most `longest` s apart, in s, and arrays (n,) in J of V.
 
     Under continuous feedback of `exact` the run is integrated again at the nodes of Gauss and Legendre: between events
     the rates are analytic functions of theta in t = middle - half cos(theta), because u^(3/2) becomes theta^3 times
     one. Other runs, those that stopped and those of more than MOST stretches have their output times: the trapezoidal
     rule.
     """
-    system, edges = run.scene.system, edges_of(run)
+    system, edges = run.scene.system, edges_of(run, longest)
     located = run.method == EXACT and run.status is Status.DONE and not (run.sampled or system.external)
     if not located or len(edges) > MOST:
         lost = power_lost(system, run.state)

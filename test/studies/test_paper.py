@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
 from functools import cache
 
 import numpy as np
 import pytest
 
 from grasp_ros.physics.layout import LEFT, Transition
-from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
-from grasp_ros.studies.paper import arms, beyond
-from grasp_ros.studies.paper.cases import SYMMETRIC, load_cases, random_starts, started, with_values
+from grasp_ros.studies.paper import arms, beyond, by_hand
+from grasp_ros.studies.paper.cases import SYMMETRIC, load_cases, random_starts, started
 from grasp_ros.studies.paper.claims import Check, Claim, Kind, Part, Verdict
-from grasp_ros.studies.paper.equations import equations
+from grasp_ros.studies.paper.conditions import condition_rows
+from grasp_ros.studies.paper.doubts import doubts
+from grasp_ros.studies.paper.equations import equations, form_equations
 from grasp_ros.studies.paper.judgement import judge
-from grasp_ros.studies.paper.measures import measure
+from grasp_ros.studies.paper.knife_edge import knife_edge
+from grasp_ros.studies.paper.measures import measure, seconds, settlings
 from grasp_ros.studies.paper.quantities import quantities
 from grasp_ros.studies.paper.replay import COLUMNS, frames
-from grasp_ros.studies.paper.results import doubts
+from grasp_ros.studies.paper.sample import Sample
+from grasp_ros.studies.paper.symmetry import asymmetry, where_false
 from grasp_ros.verification.oracles import elastic_period
 
 CASES = load_cases()
@@ -30,11 +33,6 @@ HOLDS, LIMITED, FAILS = Verdict.HOLDS, Verdict.LIMITED, Verdict.FAILS
 @cache
 def claim_of(key: str) -> Claim:
     return judge(CASES, STARTS, [key])[key]
-
-
-def broken(key: str, number: int, change: Callable[[Scene], Scene]) -> Claim:
-    """The verdict with one of the cases replaced."""
-    return judge({**CASES, number: change(CASES[number])}, STARTS, [key])[key]
 
 
 def test_all_equations_are_there_and_agree() -> None:
@@ -64,30 +62,13 @@ def test_the_rule_of_the_verdict() -> None:
     assert part((Kind.PRINTED, 0.0, False), *yes[1:]).verdict is LIMITED
     assert part(*yes[:2], (Kind.RANDOM, 0.7, False)).verdict is LIMITED
     assert part(*yes[:2], (Kind.RANDOM, 0.4, False)).verdict is FAILS
+    assert part(*yes[:2], (Kind.RANDOM, 1.0, True), (Kind.RANDOM, 0.0, False)).verdict is LIMITED
+    assert part(*yes[:2], (Kind.RANDOM, 0.1, False), (Kind.RANDOM, 0.0, False)).verdict is FAILS
     assert part((Kind.PRINTED, 0.0, False)).verdict is FAILS
+    beside = part((Kind.PRINTED, 0.0, False))._replace(reading=True)
+    assert Claim("", "", "", [part(*yes), beside]).verdict is HOLDS
+    assert Claim("", "", "", [part(*yes), beside]).turned == [beside]
     assert Claim("", "", "", [part(*yes), part((Kind.PRINTED, 0.0, False))]).verdict is FAILS
-
-
-@pytest.mark.parametrize(
-    ("key", "number", "values"),
-    [
-        ("C2", 3, {"p": 0.0}),  # lossy impacts without a loss
-        ("O7", 8, {"c": 0.02}),  # "more damping" that is less
-        ("O11", 10, {"Kv": 0.05}),
-        ("C3", 6, {"m_l": 1.0}),  # equal arms
-    ],
-)
-def test_a_claim_that_is_broken_on_purpose_does_not_hold(key: str, number: int, values: dict[str, float]) -> None:
-    assert claim_of(key).verdict is not FAILS
-    assert broken(key, number, lambda scene: with_values(scene, values)).verdict is FAILS
-
-
-def test_claims_that_fail_come_true_when_the_case_is_changed() -> None:
-    """Observation 5 says that heavier arms swing faster, 10 that stiffer feedback settles later."""
-    assert [each.verdict for each in claim_of("O5").parts] == [FAILS, HOLDS]
-    assert broken("O5", 5, lambda scene: with_values(scene, {"m": 0.1})).parts[0].verdict is not FAILS
-    assert claim_of("O10").parts[1].verdict is FAILS
-    assert broken("O10", 9, lambda scene: with_values(scene, {"Kv": 0.0})).parts[1].verdict is not FAILS
 
 
 def test_periodic_only_from_a_symmetric_start() -> None:
@@ -95,14 +76,12 @@ def test_periodic_only_from_a_symmetric_start() -> None:
     assert (constant.verdict, periodic.verdict) == (HOLDS, FAILS)
     assert {check.text for check in periodic.turned} == {
         "x_l(0) = -0.5, x_r(0) = 0.5 m", "x_l(0) = -0.3, x_r(0) = 0.3 m"}
-    even = judge({**CASES, 2: with_values(CASES[2], {"p": 0.5})}, STARTS, ["T12"])["T12"]
-    assert even.parts[0].verdict is FAILS
 
 
 def test_the_printed_V_rises_for_large_p_and_V_c_does_not() -> None:
-    own, any_p, repaired = claim_of("C1").parts
-    assert (own.verdict, any_p.verdict, repaired.verdict) == (HOLDS, LIMITED, HOLDS)
-    assert any(check.text.startswith("p = 30") for check in any_p.limits)
+    own, slow, any_p, repaired = claim_of("C1").parts
+    assert (own.verdict, slow.verdict, any_p.verdict, repaired.verdict) == (HOLDS, HOLDS, LIMITED, HOLDS)
+    assert any(", p = 30," in check.text for check in any_p.limits)
 
 
 def test_settling_is_certain() -> None:
@@ -119,6 +98,43 @@ def test_settling_is_certain() -> None:
 def test_the_object_mass_does_not_matter_from_a_symmetric_start() -> None:
     light, heavy = (measure(started(CASES[number], SYMMETRIC)).settling for number in (1, 11))
     assert light == pytest.approx(heavy, rel=1e-12)
+
+
+def test_a_symmetric_start_is_a_knife_edge() -> None:
+    """A nanometre becomes a millimetre within seconds, but not where the arms are damped strongly."""
+    rows = {row.case: row for row in knife_edge(CASES)}
+    assert all(row.rest == 0.0 for row in rows.values())
+    assert rows[2].visible < 8.0
+    assert 1.5 < rows[2].rate < 3.0
+    assert rows[7].visible < rows[1].visible < rows[5].visible < 20.0
+    assert rows[8].apart.max() < 1e-6
+    assert rows[1].settling[0] == pytest.approx(9.39, abs=0.01)
+    assert rows[1].settling[-1] > 1.5 * rows[1].settling[0]
+    assert rows[5].settling[1] > 1.5 * rows[5].settling[0]
+
+
+def test_times_beyond_what_can_be_known_are_ranges() -> None:
+    assert seconds(settlings(CASES[1])) == "18.2 s"
+    assert re.fullmatch(r"4\d\d to [56]\d\d s", seconds(settlings(CASES[3])))
+    assert seconds([np.inf, np.inf]) == "never"
+
+
+def test_a_border_in_asymmetry_is_named_where_there_is_one() -> None:
+    starts = random_starts(60)
+    far = [asymmetry(start) > 0.05 for start in starts]
+    assert "is below 0.0" in where_false(starts, far)
+    assert where_false(starts, [place % 3 > 0 for place in range(60)]) == ""
+
+
+def test_an_equation_written_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each against values written out by hand: V, its rate, its parts, and the entries of P."""
+    sample = Sample(CASES[4])
+    right = {row.number for row in (*form_equations([sample]), *condition_rows([sample])) if row.agrees}
+    for name in ("matrix", "level", "rate", "parts"):
+        own = getattr(by_hand, name)
+        monkeypatch.setattr(by_hand, name, lambda scene, y, own=own: 1.001 * own(scene, y))
+    left = {row.number for row in (*form_equations([sample]), *condition_rows([sample])) if row.agrees}
+    assert right - left >= {"(11)", "(12)", "(16)", "(18)", "(21)", "(23)", "(28)", "(29)"}
 
 
 def test_gap_and_repair() -> None:
@@ -156,6 +172,7 @@ def test_stiffer_arms_lose_more_in_harder_impacts(monkeypatch: pytest.MonkeyPatc
     assert stiff.share > 2.0 * soft.share
     assert stiff.speed > 1.5 * soft.speed
     assert stiff.alone == pytest.approx(soft.alone, rel=0.1)
+    assert stiff.settling < soft.settling
 
 
 def test_collisions_slow_damped_arms_and_stop_undamped_ones(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -167,6 +184,9 @@ def test_collisions_slow_damped_arms_and_stop_undamped_ones(monkeypatch: pytest.
 
 
 def test_the_papers_own_method_at_plausible_steps() -> None:
+    for first in arms.stepped({1: CASES[1]}):
+        assert 0.8 < first.touches < 1.2
+        assert 0.0 < first.first < 1e-2 * first.step
     fine, coarse = arms.stepped({2: CASES[2]})
     assert -0.01 < fine.drift < -0.001
     assert -0.6 < coarse.drift < -0.2
@@ -187,6 +207,8 @@ def test_quantities_have_a_column_for_each_case() -> None:
     amounts = {row[0]: row[1:] for row in rows}
     assert amounts["contacts left, right"][0] == "22, 22"
     assert amounts["largest input, N"] == ("2.50", "2.50")
+    assert amounts["largest impact force, N"] == ("73.67", "41.64")  # the grid of 10 ms cuts the first to 72.9
+    assert amounts["settled: left, s"] == ("16.6", "3.05")
 
 
 def test_frames_are_states_of_the_run() -> None:

@@ -19,6 +19,7 @@ from grasp_ros.simulation import simulate
 pytestmark = pytest.mark.slow  # the whole study, with few random starts
 
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+A4 = 718  # px, the width of the sheet of paper less the margins of the browser
 CONTENT = (
     "Judgement", "Replay", "Figures 2 to 12", "Quantities", "Equations (1) to (37)", "What the paper could not show",
     "Doubts about the source", "Definitions",
@@ -57,7 +58,7 @@ def test_the_version_for_the_documentation_shows_every_figure(made: Path) -> Non
     shown = set(re.findall(r"\]\(paper/([^)]+)\)", text))
     lying = {path.name for path in (made / "docs" / "paper").iterdir()}
     assert shown == lying
-    assert len(shown) >= 11 + 1 + 6
+    assert len(shown) >= 11 + 1 + 7
     assert all(f"## {title}" in text for title in CONTENT if title != "Replay")
     for table in re.findall(r"(?:^\|.*\n)+", text, re.M):
         widths = {len(re.findall(r"(?<!\\)\|", line)) for line in table.splitlines()}
@@ -141,3 +142,9 @@ def test_it_is_legible_on_a_phone_and_in_print(page: Any) -> None:
     page.emulate_media(media="print")
     assert not page.is_visible("#replay")
     assert page.is_visible("#equations")
+    page.set_viewport_size({"width": A4, "height": 800})
+    page.evaluate("document.querySelectorAll('details').forEach((each) => { each.open = true; })")
+    ends = page.evaluate(
+        "Array.from(document.querySelectorAll('table, img'), (each) => each.getBoundingClientRect().right)"
+    )
+    assert max(ends) <= A4

@@ -31,6 +31,7 @@ class Stiffer(NamedTuple):
     rate: float  # touches per s, up to the settling time or 20 s
     speed: float  # m/s, root mean square speed of approach at a touch
     share: float  # of the energy lost within 20 s: by impacts
+    starts: int
 
 
 def stiffer(cases: Cases, starts: Sequence[Start]) -> list[Stiffer]:
@@ -39,7 +40,8 @@ def stiffer(cases: Cases, starts: Sequence[Start]) -> list[Stiffer]:
     for k in STIFFNESSES:
         scenes = [started(with_values(cases[STANDARD], {"k": k}), start) for start in starts[:MANY]]
         rows = [_row(scene) for scene in scenes]
-        found.append(Stiffer(k, *(float(np.median([row[column] for row in rows])) for column in range(5))))
+        settling, alone, rate, speed, share = np.median(rows, axis=0).tolist()
+        found.append(Stiffer(k, settling, alone, rate, speed, share, len(rows)))
     return found
 
 
@@ -60,6 +62,7 @@ class Damped(NamedTuple):
     together: float  # settling time with the object, s
     alone: float  # without, s
     later: float  # share of the starts in which the object makes it later
+    starts: int
 
 
 def damped(cases: Cases, starts: Sequence[Start]) -> list[Damped]:
@@ -70,7 +73,8 @@ def damped(cases: Cases, starts: Sequence[Start]) -> list[Damped]:
         scenes = [started(with_values(cases[STANDARD], numbers), start) for start in starts[:FEW]]
         together = np.array([measure(scene).settling for scene in scenes])
         alone = np.array([alone_settling(scene) if C > 0.0 else np.inf for scene in scenes])
-        found.append(Damped(C, float(np.median(together)), float(np.median(alone)), float(np.mean(together > alone))))
+        medians = float(np.median(together)), float(np.median(alone))
+        found.append(Damped(C, *medians, float(np.mean(together > alone)), len(scenes)))
     return found
 
 
@@ -103,6 +107,6 @@ def _stepped(number: int, scene: Scene, step: float) -> Stepped:
         error,
         float((level[-1] - own[-1]) / own[0]),
         rise,
-        contacts_found(step, scene).value,
+        contacts_found(step, scene),
         first_contact_error(step, scene).value,
     )

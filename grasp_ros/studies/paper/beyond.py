@@ -26,6 +26,7 @@ SMALL = 1e-9  # relative size of the perturbation behind a Lyapunov exponent
 EVERY = 0.5  # s between two renormalisations
 CHAOS_SECONDS = 1000.0
 RETURN_SECONDS = 2000.0
+WITHIN = 200.0  # s, how long an offset across the symmetry is followed
 BLOCKS = 10  # of the time, for the standard error of the exponent
 
 
@@ -97,6 +98,9 @@ class Chaos(NamedTuple):
     near_time: float  # s
     seconds: float  # how long it was looked for
     periodic: float  # the same for a symmetric start
+    periodic_time: float  # s
+    across: float  # 1/s, growth of an offset that breaks the symmetry of that motion
+    far: float  # distance at the end of `apart`
 
 
 def stretching(scene: Scene, seconds: float, push: Array) -> Array:
@@ -144,7 +148,9 @@ def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Cha
     within = np.array([1.0, 1.0, 0.0, 0.0, -1.0, -1.0])  # keeps the symmetry
     even = stretching(symmetric, seconds / 5.0, within)
     near_time, near = nearest_return(scene, RETURN_SECONDS)
-    _, periodic = nearest_return(symmetric, 20.0)
+    periodic_time, periodic = nearest_return(symmetric, 20.0)
+    breaking = np.array([1.0, 1.0, 0.5, 0.5, 1.0, 1.0])
+    apart = _apart(scene, push)
     t: Array = EVERY * np.arange(1, len(logs) + 1, dtype=float)
     return Chaos(
         t,
@@ -152,11 +158,14 @@ def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Cha
         float(logs.sum() / seconds),
         float(blocks.std(ddof=1) / np.sqrt(BLOCKS)),
         float(even.sum() / (seconds / 5.0)),
-        _apart(scene, push),
+        apart,
         near,
         near_time,
         RETURN_SECONDS,
         periodic,
+        periodic_time,
+        float(stretching(symmetric, WITHIN, breaking).sum() / WITHIN),
+        float(apart[1][-1]),
     )
 
 

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 
 Cases = Mapping[int, Scene]  # by the paper's number
-
 
 
 class Start(NamedTuple):
@@ -26,21 +26,29 @@ STANDARD = 1
 NUMBERS = tuple(range(1, 12))
 PRINTED = Start(-0.3, 0.5)
 SYMMETRIC = Start(-0.5, 0.5)
+NEARLY = Start(-0.501, 0.5)  # what a symmetric start is in practice
+MIRRORED = Start(-0.5, 0.3)  # the printed start seen from behind: no other motion, unless the arms differ
+ALIKE = (PRINTED, SYMMETRIC, NEARLY)
 LITERAL = Start(0.3, 0.5)  # Table 1 without the minus
-READ_STARTS: Mapping[str, Start] = {
-    "x_l(0) = -0.3, x_r(0) = 0.5 m": PRINTED,
+READ_STARTS: Mapping[str, Start] = {  # beside the printed one
     "x_l(0) = -0.5, x_r(0) = 0.5 m": SYMMETRIC,
+    "x_l(0) = -0.501, x_r(0) = 0.5 m": NEARLY,
     "x_l(0) = -0.3, x_r(0) = 0.3 m": Start(-0.3, 0.3),
-    "x_l(0) = -0.5, x_r(0) = 0.3 m": Start(-0.5, 0.3),
+    "x_l(0) = -0.5, x_r(0) = 0.3 m": MIRRORED,
     "x_l(0) = -0.3, x_o(0) = 0.1, x_r(0) = 0.5 m": Start(-0.3, 0.5, 0.1),
     "x_l(0) = +0.3 as printed, inside the object": LITERAL,
 }
+READ_P = (0.2, 0.5, 2.0, 5.0)  # s/m, of No. 4, for which the paper says "larger"
+OFFSETS = (0.0, 1e-12, -1e-9, 1e-6)  # m, added to x_l(0): far below what anybody could read from the paper
 SEED = 1990
 NEAREST, FARTHEST = 0.1, 0.5  # m, of random starts
 SIDES = ("left", "right")
 KEYS: Mapping[str, tuple[str, ...]] = {  # letters of the paper to keys of a scene, both sides where there are two
     "m": ("left_arm.mass_kg", "right_arm.mass_kg"),
     "m_l": ("left_arm.mass_kg",),
+    "k_l": ("left_arm.stiffness_N_per_m",),
+    "c_l": ("left_arm.damping_Ns_per_m",),
+    "Kv_l": ("left_feedback.velocity_gain_Ns_per_m",),
     "m_o": ("object.mass_kg",),
     "k": ("left_arm.stiffness_N_per_m", "right_arm.stiffness_N_per_m"),
     "c": ("left_arm.damping_Ns_per_m", "right_arm.damping_Ns_per_m"),
@@ -48,6 +56,9 @@ KEYS: Mapping[str, tuple[str, ...]] = {  # letters of the paper to keys of a sce
     "Kv": ("left_feedback.velocity_gain_Ns_per_m", "right_feedback.velocity_gain_Ns_per_m"),
     "p": ("left_contact.dissipation_s_per_m", "right_contact.dissipation_s_per_m"),
     "H": ("left_contact.hertz_N_per_m1_5", "right_contact.hertz_N_per_m1_5"),
+}
+UNIT_OF: Mapping[str, str] = {
+    "m": "kg", "k": "N/m", "c": "N s/m", "Kp": "N/m", "Kv": "N s/m", "p": "s/m", "H": "N/m^1.5",
 }
 
 
@@ -118,3 +129,26 @@ def start_of(scene: Scene) -> Start:
     """Where the arms of a scene begin."""
     state = scene.initial_state.tolist()
     return Start(state[0], state[4], state[2])
+
+
+def moved(scene: Scene, offset: float) -> Scene:
+    """A scene whose left arm begins a little farther to the right, by an offset in m."""
+    return scene.changed({"left_arm.position_m": start_of(scene).x_l + offset}) if offset else scene
+
+
+def text_of(scene: Scene) -> str:
+    """All numbers of a scene, to know it again by."""
+    return repr(scene.values)
+
+
+def even(scene: Scene) -> bool:
+    """Whether both arms and both contacts are equal, so that the mirrored start is no other start."""
+    system = scene.system
+    rows = (system.closed_loop, system.bodies, system.pairs)
+    return all(bool((row[LEFT] == row[RIGHT]).all()) for row in rows)
+
+
+def read_starts(*several: Scene) -> dict[str, Start]:
+    """Other starts that the source may mean, for scenes that are compared."""
+    plain = all(even(scene) for scene in several)
+    return {text: start for text, start in READ_STARTS.items() if not (plain and start == MIRRORED)}

@@ -4,11 +4,13 @@ A part of a statement is checked in up to six ways. Its verdict follows from fou
 the same start for both cases, random starts, and a sweep of the parameter behind it.
 
 * *holds*: all of these hold; of random starts, at least 95 % do.
-* *does not hold*: less than half of the random starts hold, or of the paper's own cases where no start is random.
+* *does not hold*: less than half of the random starts hold, in whatever case and against whatever it is compared with;
+  where no start is random, of the paper's own cases.
 * *holds within stated limits*: all else; the checks that fail are the limits.
 
 Other readings of the source and other measures of the same word do not enter the verdict: those by which it would come
-out the other way are named beside it. A statement of several parts holds as far as its weakest part does.
+out the other way are named beside it. A statement of several parts holds as far as its weakest part does; a part may
+restate another reading of the whole sentence, and does not enter then either.
 """
 
 from __future__ import annotations
@@ -50,6 +52,13 @@ class Check(NamedTuple):
     value: str
     share: float  # of the runs that were looked at, 0 to 1
     holds: bool
+    runs: int = 0  # that were drawn, where they were
+
+    @property
+    def close(self) -> bool:
+        """Whether other draws could put the share on the other side of a bound of the rule: two standard errors."""
+        error = (self.share * (1.0 - self.share) / self.runs) ** 0.5 if self.runs else 0.0
+        return any(abs(self.share - bound) < 2.0 * error for bound in (ALMOST_ALL, HALF))
 
 
 class Part(NamedTuple):
@@ -59,6 +68,7 @@ class Part(NamedTuple):
     threshold: str
     why: str  # the physics behind it, a sentence
     checks: Sequence[Check]
+    reading: bool = False  # of another reading of the sentence
 
     @property
     def verdict(self) -> Verdict:
@@ -67,12 +77,17 @@ class Part(NamedTuple):
             return Verdict.HOLDS
         drawn = [check.share for check in self.checks if check.kind is Kind.RANDOM]
         decisive = drawn or [check.share for check in self.checks if check.kind is Kind.PRINTED]
-        return Verdict.FAILS if sum(decisive) < HALF * len(decisive) else Verdict.LIMITED
+        return Verdict.FAILS if all(share < HALF for share in decisive) else Verdict.LIMITED
 
     @property
     def limits(self) -> list[Check]:
         """Checks that fail, of those that decide."""
         return [check for check in self.checks if check.kind in DECISIVE and not check.holds]
+
+    @property
+    def close(self) -> list[Check]:
+        """Random starts that others could turn."""
+        return [check for check in self.checks if check.kind is Kind.RANDOM and check.close]
 
     @property
     def turned(self) -> list[Check]:
@@ -97,7 +112,12 @@ class Claim(NamedTuple):
     def verdict(self) -> Verdict:
         """That of the weakest part."""
         order = list(Verdict)
-        return min((part.verdict for part in self.parts), key=order.index)
+        return min((part.verdict for part in self.parts if not part.reading), key=order.index)
+
+    @property
+    def turned(self) -> list[Part]:
+        """Parts that read the sentence in another way and come to another verdict."""
+        return [part for part in self.parts if part.reading and part.verdict is not self.verdict]
 
 
 def almost_all(share: float) -> bool:

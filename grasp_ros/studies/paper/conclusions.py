@@ -5,7 +5,7 @@ from __future__ import annotations
 from grasp_ros import scene as scenes
 from grasp_ros.studies.paper import motion
 from grasp_ros.studies.paper.observations import LOSSY_IMPACTS
-from grasp_ros.studies.paper.properties import HEAVY_LEFT
+from grasp_ros.studies.paper.properties import unequal_pairs
 from grasp_ros.studies.paper.statement import Statement
 from grasp_ros.studies.paper.universal import Universal
 
@@ -22,7 +22,19 @@ def conclusions() -> list[Statement]:
                     "In the paper's cases the printed V never rises.",
                     "rise of V between output times <= 1e-12 V(0)",
                     motion.paper_V_falls,
-                    "With p v < 1 no pair separates at 1/p, so the second half of (10) never acts.",
+                    "V jumps only where a pair that separates at 1/p takes its Hertz term up again (next part).",
+                    letter="H",
+                    values=(1e2, 1e3, 1e5),
+                ),
+                Universal(
+                    "In the paper's cases no pair separates faster than 1/p while it penetrates.",
+                    "smallest p u' while u > 0: above -1",
+                    motion.separates_slowly,
+                    "Where p is below sqrt(mu / V_c(0)) none can (theorem 2 of docs/certificate.md); No. 4 is beyond"
+                    " that, touches faster than 1/p, and still leaves more slowly, since impacts take speed.",
+                    letter="p",
+                    values=(0.01, 0.3, 1.0),
+                    least=True,
                 ),
                 Universal(
                     "The printed V never rises, whatever p.",
@@ -63,6 +75,6 @@ def conclusions() -> list[Statement]:
             "C3",
             "p. 248, conclusion (3)",
             "Unequal arms under the same control are less controllable than equal ones.",
-            (HEAVY_LEFT,),
+            unequal_pairs(),
         ),
     ]

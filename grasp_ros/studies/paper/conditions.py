@@ -8,6 +8,7 @@ from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
+from grasp_ros.studies.paper import by_hand
 from grasp_ros.studies.paper.sample import Equation, Sample
 
 DRAWS = 4000  # random states at which positivity is looked at
@@ -33,17 +34,21 @@ def _condition(samples: list[Sample], mode: Mode, numbers: tuple[str, str, str, 
     for sample in samples:
         here = sample.where(mode)
         if here.any():
-            parts = lyapunov.parts(sample.system, sample.state[here])
-            value = max(value, float(np.abs(sum(parts) / sample.level.V[here] - 1.0).max()))
+            states = sample.state[here]
+            written = np.array([by_hand.level(sample.scene, state) for state in states])
+            value = max(value, float(np.abs(sample.level.V[here] / written - 1.0).max()))
+            value = max(value, float(np.abs(sum(lyapunov.parts(sample.system, states)) / written - 1.0).max()))
+            stated = np.array([by_hand.rate(sample.scene, state) for state in states])
             scale = float(np.abs(sample.level.V_rate).max()) or 1.0
-            rate = max(rate, float(np.abs(sample.V_rate[here] - sample.level.V_rate[here]).max()) / scale)
+            rate = max(rate, float(np.abs(sample.V_rate[here] - stated).max()) / scale)
+            rate = max(rate, float(np.abs(sample.level.V_rate[here] - stated).max()) / scale)
             highest = max(highest, float(sample.level.V_rate[here].max()))
     rows = (
         Equation(
             numbers[0],
             f"V, {text}",
             f"physics.lyapunov.parts; {V_FUNCTION}",
-            "sum of its parts against V, relative",
+            "V and the sum of its parts against the printed sum by hand, relative",
             value,
             1e-14,
         ),
@@ -51,7 +56,7 @@ def _condition(samples: list[Sample], mode: Mode, numbers: tuple[str, str, str, 
             numbers[1],
             f"V > 0 for x != 0, {text}",
             V_FUNCTION,
-            f"smallest V / |x|^2 of {DRAWS} random states, J",
+            f"smallest V / x'x of {DRAWS} random states in m and m/s",
             _smallest(samples[0], mode),
             0.0,
             margin=True,
@@ -60,7 +65,7 @@ def _condition(samples: list[Sample], mode: Mode, numbers: tuple[str, str, str, 
             numbers[2],
             f"V', {text}",
             RATE,
-            "V differentiated against the printed rate, in the largest rate",
+            "V differentiated, and V_rate, against the printed rate by hand, in the largest rate",
             rate,
             1e-7,
         ),
@@ -101,31 +106,32 @@ def _constant(samples: list[Sample], number: str) -> Equation:
 
 def _flight(samples: list[Sample]) -> list[Equation]:
     """(28) to (34)."""
-    total, rates, lowest = 0.0, np.zeros(3), np.inf
+    total, rates, apart = 0.0, np.zeros(3), 0.0
     for sample in samples:
         here = sample.where(Mode.NONE)
         parts = lyapunov.parts(sample.system, sample.state[here])
-        V = sample.level.V[here]
-        total = max(total, float(np.abs((parts.V_l + parts.V_o + parts.V_r) / V - 1.0).max()))
+        written = np.array([by_hand.parts(sample.scene, state) for state in sample.state[here]])
+        total = max(total, float(np.abs(sample.level.V[here] / written.sum(axis=1) - 1.0).max()))
+        own = np.column_stack(parts[:3])
+        apart = max(apart, float((np.abs(own - written) / np.maximum(written.sum(axis=1), 1e-300)[:, None]).max()))
         stencils = lyapunov.parts(sample.system, sample.stencils[here])
         scale = float(np.abs(sample.level.V_rate).max()) or 1.0
         damping = sample.system.closed_loop[:, 2]
         for row, (part, body, column) in enumerate(((stencils.V_l, 0, 1), (stencils.V_r, 1, 5), (stencils.V_o, 2, 3))):
             stated = -2.0 * damping[body] * sample.state[here, column] ** 2
             rates[row] = max(rates[row], float(np.abs(sample.differentiated(part) - stated).max()) / scale)
-        lowest = min(lowest, *(float(part.min()) for part in parts[:3]))
     function = "physics.lyapunov.parts"
     rate = "differentiated against -2 C x'^2, in the largest V'"
     return [
-        Equation("(28)", "V, none in contact", V_FUNCTION, "V_l + V_o + V_r against V, relative", total, 1e-14),
+        Equation("(28)", "V, none in contact", V_FUNCTION, "V against V_l + V_o + V_r by hand, relative", total, 1e-14),
         Equation(
-            "(29)", "V_l, V_o, V_r", function, "how far the smallest of them is below 0, J", max(-lowest, 0.0), 0.0
+            "(29)", "V_l, V_o, V_r", function, "each against its printed terms by hand, in V", apart, 1e-15
         ),
         Equation(
             "(30)",
             "V_l > 0 but at rest in 0",
             function,
-            f"smallest V_l / (x_l^2 + x_l'^2) of {DRAWS} states, J",
+            f"smallest V_l / (x_l^2 + x_l'^2) of {DRAWS} states in m and m/s",
             _smallest_part(samples[0], 0),
             0.0,
             margin=True,
@@ -136,7 +142,7 @@ def _flight(samples: list[Sample]) -> list[Equation]:
             "(33)",
             "V_o > 0 but at rest anywhere",
             function,
-            f"smallest V_o / x_o'^2 of {DRAWS} states, J",
+            f"smallest V_o / x_o'^2 of {DRAWS} states in m/s",
             _smallest_part(samples[0], 1),
             0.0,
             margin=True,

@@ -11,9 +11,10 @@ from collections.abc import Callable
 import numpy as np
 
 from grasp_ros.physics import lyapunov
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, X_L, X_O, X_R, Transition
 from grasp_ros.physics.model import acceleration, impact_force, in_contact, penetration
 from grasp_ros.scene import SceneError
+from grasp_ros.studies.paper import by_hand
 from grasp_ros.studies.paper.cases import Cases, with_values
 from grasp_ros.studies.paper.conditions import condition_rows
 from grasp_ros.studies.paper.sample import Equation, Sample, relative
@@ -64,7 +65,7 @@ def force_equations(samples: list[Sample]) -> list[Equation]:
             Equation(
                 f"({4 + side})",
                 f"input of the {name} arm",
-                "physics.control.ControlLaw.command",
+                "physics.system.System.feedback",
                 "command against -Kp x - Kv x', N",
                 float(inputs[side]),
                 1e-14,
@@ -112,7 +113,7 @@ def condition_equations(samples: list[Sample]) -> list[Equation]:
         Equation(
             "(9)",
             "p and H are not negative",
-            "scene.effects.contact",
+            "scene.effects.contact.PARAMETERS",
             "negative H, p that a scene accepts, of 2",
             2.0 - refused,
             0.0,
@@ -125,31 +126,43 @@ def condition_equations(samples: list[Sample]) -> list[Equation]:
             float(wrong),
             0.0,
         ),
-        Equation("(10)", "touch and release at u = 0", "exact.modes", "largest |u| at an event, m", at_events, 1e-15),
+        Equation(
+            "(10)", "touch and release at u = 0", "exact.modes.make_transition", "largest |u| at an event, m",
+            at_events, 1e-15,
+        ),
     ]
 
 
 def form_equations(samples: list[Sample]) -> list[Equation]:
     """(11) to (15)."""
-    form, order, stiffness, symmetric = 0.0, 0.0, np.zeros(2), 0.0
+    form, order, stiffness, entries = 0.0, 0.0, np.zeros(2), 0.0
     for sample in samples:
         y = sample.state
         P = lyapunov.matrix(sample.system, y)
-        form = max(form, relative(lyapunov.quadratic_form(sample.system, y), sample.level.V))
-        symmetric = max(symmetric, float(np.abs(P - np.swapaxes(P, -1, -2)).max()))
-        order = max(order, *(relative(sample.rate[:, x], y[:, x + 1]) for x in (0, 4)))
+        written = np.array([by_hand.matrix(sample.scene, each) for each in y])
+        entries = max(entries, float(np.abs(P - written).max() / np.abs(written).max()))
+        squared = np.einsum("ni,nij,nj->n", y, written, y)
+        form = max(form, relative(squared, sample.level.V))
+        form = max(form, relative(lyapunov.quadratic_form(sample.system, y), squared))
+        moving = [x for x in (X_L, X_O, X_R) if y[:, x + 1].any()]  # the object of a symmetric case rests
+        order = max(order, *(relative(sample.rate[:, x], y[:, x + 1]) for x in moving))
         for side, stored in enumerate(lyapunov.parts(sample.system, y)[3:]):
             if stored.max() > 0.0:
                 x = 0 if side == LEFT else 4
                 stiffness[side] = max(stiffness[side], relative(-P[:, x, 2] * sample.pair(side)[0] ** 2, stored))
     return [
-        Equation("(11)", "V = x' P(x) x", "physics.lyapunov.quadratic_form", "x' P x against V, relative", form, 1e-13),
-        Equation("(12)", "P(x)", "physics.lyapunov.matrix", "P against its transpose, N/m", symmetric, 0.0),
+        Equation(
+            "(11)", "V = x' P(x) x", "physics.lyapunov.quadratic_form",
+            "x' P x, with P by hand and without, against V, relative", form, 1e-13,
+        ),
+        Equation(
+            "(12)", "P(x)", "physics.lyapunov.matrix", "its 36 entries against (12) by hand, relative", entries, 1e-15
+        ),
         Equation(
             "(13)",
             "order of the state",
-            "physics.layout",
-            "each position differentiated against the next column, relative",
+            "physics.layout.X_L, V_L, X_O, V_O, X_R, V_R",
+            "x_l, x_o, x_r differentiated against the columns behind them, relative",
             order,
             1e-9,
         ),

@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, plots, simulate
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
@@ -23,6 +24,9 @@ from grasp_ros.studies.paper.cases import STANDARD, Figure, Start, start_of, sta
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
 PALE = 0.35  # of the standard case behind a changed one
 CONTACT_POINTS = 400
+IN_CONTACT = 60  # output times in each contact, so that no peak is cut
+CLOSE = 0.02  # s between two values of the losses
+PAGE = 170.0 / 25.4  # in, the width of a page in print
 
 
 class Pictured(NamedTuple):
@@ -38,18 +42,29 @@ def pictured(figure: Figure, cases: Mapping[int, Scene]) -> Pictured:
     scene = cases[figure.case]
     start: Start = start_of(scene)
     beside = None if figure.case == STANDARD else simulate(started(cases[STANDARD], start))
-    return Pictured(figure, simulate(scene), beside)
+    return Pictured(figure, _fine(scene), beside)
+
+
+def _fine(scene: Scene) -> Trajectory:
+    """A motion at the scene's output times and at many in every contact."""
+    run = simulate(scene)
+    spans = np.concatenate([contact_intervals(run, side) for side in (LEFT, RIGHT)]).tolist()
+    inside = [np.linspace(begin, end, IN_CONTACT) for begin, end in spans]
+    return simulate(scene, grid=np.unique(np.concatenate([run.t, *inside])))
 
 
 def style() -> dict[str, object]:
     """Letters, lines, and text as paths: the same picture everywhere."""
-    return {"font.size": 8.5, "svg.fonttype": "path", "svg.hashsalt": "grasp", "axes.linewidth": 0.7}
+    return {
+        "font.size": 7.0, "axes.titlepad": 3.0, "axes.labelpad": 2.0, "axes.linewidth": 0.6, "lines.linewidth": 0.9,
+        "svg.fonttype": "path", "svg.hashsalt": "grasp",
+    }
 
 
 def sheet(several: Sequence[Pictured]) -> Drawing:
     """All eleven in the layout of the paper: displacements above, inputs below."""
     with plt.rc_context(style()):
-        figure: Drawing = plt.figure(figsize=(11.0, 14.6), layout="constrained")
+        figure: Drawing = plt.figure(figsize=(PAGE, 8.9), layout="constrained")
         cells: Any = figure.subfigures(4, 3, wspace=0.02, hspace=0.02)
         cells = cells.ravel()
         for cell, each in zip(cells, several, strict=False):
@@ -61,7 +76,7 @@ def sheet(several: Sequence[Pictured]) -> Drawing:
                 axes.grid(alpha=0.25)
                 axes.set_xlim(0.0, each.run.scene.duration)
             top.set_title(
-                _math(f"Fig. {each.figure.number}  {each.figure.change or 'standard'}"), fontsize="medium", loc="left"
+                _math(f"Fig. {each.figure.number}  {each.figure.change or 'standard'}"), fontsize="small", loc="left"
             )
             top.set_ylabel("displacement, m")
             bottom.set_ylabel("input, N")
@@ -79,15 +94,15 @@ def _key(axes: Axes) -> None:
         ("$x_r$, $f_r$, right contact", RIGHT_COLOR),
     ):
         axes.plot([], [], color=color, label=label)
-    axes.legend(loc="center", frameon=False, fontsize="large")
+    axes.legend(loc="center", frameon=False)
     axes.set_axis_off()
 
 
 def large(each: Pictured) -> Drawing:
     """One case: the paper's two panels, and below them what it does not draw; one contact and the losses beside."""
     with plt.rc_context(style()):
-        figure: Drawing = plt.figure(figsize=(10.2, 9.6), layout="constrained")
-        halves: Any = figure.subfigures(1, 2, width_ratios=(3.4, 1.0))
+        figure: Drawing = plt.figure(figsize=(PAGE, 6.9), layout="constrained")
+        halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
         wide, narrow = halves
         left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
         for axes, (draw, label) in zip(left, plots.PANELS, strict=False):
@@ -128,7 +143,7 @@ def _behind(axes: Axes, draw: object, run: Trajectory) -> None:
 
 def _losses(axes: Axes, run: Trajectory) -> None:
     """Energy lost so far by each cause, one above the other, in percent of V_c(0)."""
-    t, lost = running_losses(run)
+    t, lost = running_losses(run, CLOSE)
     whole = float(run.energy.V_c[0])
     shown = [
         (name, color, getattr(lost, name) / whole * 100.0) for name, color in CAUSES if getattr(lost, name)[-1] > 0.0
@@ -136,6 +151,8 @@ def _losses(axes: Axes, run: Trajectory) -> None:
     if shown:
         names, colors, values = zip(*shown, strict=True)
         axes.stackplot(t, *values, labels=names, colors=colors, alpha=0.85, linewidth=0)
+    else:
+        axes.text(0.5, 0.5, "nothing is lost", ha="center", va="center", transform=axes.transAxes)
     axes.set_ylim(0.0, 105.0)
     axes.set_ylabel("lost, % of $V_c(0)$")
 
@@ -182,16 +199,18 @@ def _bars(axes: Axes, run: Trajectory) -> None:
     whole = float(lost.total[-1]) or 1.0
     shown = [(name, color, 100.0 * float(getattr(lost, name)[-1]) / whole) for name, color in CAUSES]
     shown = [each for each in shown if each[2] > 1e-6]
-    axes.set_title("lost by cause, %", fontsize="small")
+    axes.set_title("% of what was lost", fontsize="small")
     if not shown:
         axes.text(0.5, 0.5, "nothing is lost", ha="center", va="center", transform=axes.transAxes)
         axes.set_axis_off()
         return
-    bars = axes.bar(
+    shown.reverse()
+    bars = axes.barh(
         [name for name, _, _ in shown], [part for _, _, part in shown], color=[color for _, color, _ in shown]
     )
     axes.bar_label(bars, fmt="%.1f", padding=2, fontsize="small")
-    axes.set_ylim(0.0, 115.0)
+    axes.set_xlim(0.0, 135.0)
+    axes.set_xticks([0, 50, 100])
 
 
 def close(drawing: Drawing) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from functools import partial
 
 from grasp_ros.scene import Scene
-from grasp_ros.studies.paper.cases import PRINTED, Cases, Start, started, value_of
-from grasp_ros.studies.paper.compare import Comparison
-from grasp_ros.studies.paper.measures import measure, ratio
-from grasp_ros.studies.paper.properties import SETTLING, tenfold
+from grasp_ros.studies.paper.cases import STANDARD, Cases, Start, started, value_of
+from grasp_ros.studies.paper.compare import Comparison, Variant
+from grasp_ros.studies.paper.measures import MARGIN, measure, ratio
+from grasp_ros.studies.paper.properties import SETTLING, tenfold, wide
 from grasp_ros.studies.paper.universal import Found, Share
 
 
@@ -24,15 +26,19 @@ def _damping_ratio(scene: Scene) -> float:
 def _more_damped(number: int, more: bool, cases: Cases, start: Start) -> Found:
     del start  # the damping ratio does not depend on it
     share = _damping_ratio(cases[number]) / _damping_ratio(cases[1])
-    return Found(share, share > 1.05 if more else share < 1.0 / 1.05)
+    return Found(share, share > MARGIN if more else share < 1.0 / MARGIN)
 
 
 def _gain_matters(number: int, cases: Cases, start: Start) -> Found:
     """Largest change of settling time or frequency, as a ratio above 1."""
     a, b = measure(started(cases[number], start)), measure(started(cases[1], start))
     changes = [ratio(a.settling, b.settling), ratio(a.frequency, b.frequency)]
-    change = max(max(each, 1.0 / each) for each in changes)
-    return Found(change, change > 1.05)
+    change = max(max(each, 1.0 / each) if each else math.inf for each in changes)
+    return Found(change, change > MARGIN)
+
+
+def _both(number: int, cases: Cases, start: Start) -> Iterator[Scene]:
+    yield from (started(cases[each], start) for each in (number, STANDARD))
 
 
 def any_gain() -> tuple[Share, ...]:
@@ -40,12 +46,15 @@ def any_gain() -> tuple[Share, ...]:
     return tuple(
         Share(
             f"No. {number} differs from No. 1 in settling time or frequency.",
-            "by more than 5 %",
-            lambda cases, start, number=number: _gain_matters(number, cases, start),  # type: ignore[misc]
+            f"the ratio, above or below 1, exceeds {MARGIN:g}",
+            partial(_gain_matters, number),
             "Kp adds to the stiffness of an arm, Kv to its damping.",
-            PRINTED,
+            (number, STANDARD),
+            letter=letter,
+            values=tenfold(standard),
+            measured=partial(_both, number),
         )
-        for number in (9, 10)
+        for number, letter, standard in ((9, "Kp", 5.0), (10, "Kv", 0.5))
     )
 
 
@@ -55,7 +64,7 @@ def position_gain() -> tuple[Comparison | Share, ...]:
         Comparison(
             "The largest input force of No. 9 is above that of No. 1.",
             "input",
-            9,
+            Variant(9),
             True,
             "From rest the largest input is Kp x(0), unless Kv v exceeds it later.",
             "Kp",
@@ -64,7 +73,7 @@ def position_gain() -> tuple[Comparison | Share, ...]:
         Comparison(
             "No. 9 needs longer to settle than No. 1.",
             "settling",
-            9,
+            Variant(9),
             True,
             "The envelope of an arm, exp(-C t / 2m), does not know Kp; more and faster impacts take more.",
             "Kp",
@@ -73,10 +82,12 @@ def position_gain() -> tuple[Comparison | Share, ...]:
         ),
         Share(
             "The damping ratio of an arm falls.",
-            "C / (2 sqrt(K m)) of No. 9 over No. 1 below 0.952",
-            lambda cases, start: _more_damped(9, False, cases, start),
+            f"C / (2 sqrt(K m)) of No. 9 over No. 1 below {1.0 / MARGIN:.3g}",
+            partial(_more_damped, 9, False),
             "K grows and C does not.",
-            PRINTED,
+            (9, STANDARD),
+            letter="Kp",
+            values=tenfold(5.0),
         ),
     )
 
@@ -87,18 +98,21 @@ def velocity_gain() -> tuple[Comparison | Share, ...]:
         Comparison(
             "No. 10 settles sooner than No. 1.",
             "settling",
-            10,
+            Variant(10),
             False,
-            "Kv adds to c: the envelope of an arm is exp(-C t / 2m) up to critical damping.",
+            "Kv adds to c: the envelope of an arm is exp(-C t / 2m) up to critical damping; beyond it the arm creeps"
+            " back, as exp(-K t / C).",
             "Kv",
-            (1.0, 1.5, 2.5, 5.0, 10.0),
+            (*wide(0.5), 100.0),
             SETTLING,
         ),
         Share(
             "The damping ratio of an arm grows.",
-            "C / (2 sqrt(K m)) of No. 10 over No. 1 above 1.05",
-            lambda cases, start: _more_damped(10, True, cases, start),
+            f"C / (2 sqrt(K m)) of No. 10 over No. 1 above {MARGIN:g}",
+            partial(_more_damped, 10, True),
             "C grows and K does not.",
-            PRINTED,
+            (10, STANDARD),
+            letter="Kv",
+            values=tenfold(0.5),
         ),
     )

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
-from grasp_ros import scene as scenes
-from grasp_ros.studies.paper.cases import Cases, Start
+from grasp_ros.scene import Scene
+from grasp_ros.studies.paper.cases import Cases, Start, text_of
 from grasp_ros.studies.paper.claims import Claim
 from grasp_ros.studies.paper.conclusions import conclusions
 from grasp_ros.studies.paper.measures import Measures, measure, remember
@@ -20,7 +20,8 @@ def statements() -> dict[str, Statement]:
     return {each.key: each for each in (*observations(), *conclusions(), *running_text())}
 
 
-Wanted = tuple[str, bool]  # a scene as text, and whether it is to be measured until it settles
+Wanted = tuple[str, bool]  # a scene by its numbers, and whether it is to be measured until it settles
+Wish = tuple[Scene, bool]
 
 
 class Task(NamedTuple):
@@ -32,20 +33,21 @@ class Task(NamedTuple):
     known: dict[Wanted, Measures]
 
 
-def wanted_of(cases: Cases, starts: Sequence[Start], keys: Iterable[str]) -> list[Wanted]:
-    """What the statements compare, each once."""
+def wanted_of(cases: Cases, starts: Sequence[Start], keys: Iterable[str]) -> dict[str, dict[Wanted, Wish]]:
+    """What each statement compares; what settles is measured until then everywhere, and only once."""
     known = statements()
-    return list(dict.fromkeys(wanted for key in keys for wanted in _wanted(known[key], cases, starts)))
+    found = {key: list(known[key].scenes(cases, starts)) for key in keys}
+    settling = {text_of(scene) for wishes in found.values() for scene, settle in wishes if settle}
+    return {
+        key: {(text := text_of(scene), text in settling): (scene, text in settling) for scene, _ in wishes}
+        for key, wishes in found.items()
+    }
 
 
-def _wanted(statement: Statement, cases: Cases, starts: Sequence[Start]) -> Iterator[Wanted]:
-    return ((scene.to_yaml(), settle) for scene, settle in statement.scenes(cases, starts))
-
-
-def measured(wanted: Wanted) -> tuple[Wanted, Measures]:
+def measured(wish: Wish) -> tuple[Wanted, Measures]:
     """A scene and its measures; for a process."""
-    text, settle = wanted
-    return wanted, measure(scenes.parse(text, "a scene of the study", "a scene of the study"), settle)
+    scene, settle = wish
+    return (text_of(scene), settle), measure(scene, settle)
 
 
 def judged(task: Task) -> Claim:
@@ -54,12 +56,11 @@ def judged(task: Task) -> Claim:
     return statements()[task.key].judge(task.cases, task.starts)
 
 
-def tasks(cases: Cases, starts: Sequence[Start], known: dict[Wanted, Measures]) -> list[Task]:
+def tasks(
+    cases: Cases, starts: Sequence[Start], wanted: Mapping[str, Iterable[Wanted]], known: Mapping[Wanted, Measures]
+) -> list[Task]:
     """A task for each statement, with the measures that it asks for."""
-    return [
-        Task(key, cases, starts, {wanted: known[wanted] for wanted in _wanted(statement, cases, starts)})
-        for key, statement in statements().items()
-    ]
+    return [Task(key, cases, starts, {each: known[each] for each in own}) for key, own in wanted.items()]
 
 
 def judge(cases: Cases, starts: Sequence[Start], keys: Iterable[str]) -> dict[str, Claim]:

@@ -6,7 +6,7 @@ bound of `physics.lyapunov.displacement_bound`; once that bound is inside the di
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +18,14 @@ from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.quantities import SETTLED, last_outside, settled_distance
+from grasp_ros.studies.paper.cases import OFFSETS, moved, text_of
 
 STRETCH = 20.0  # s, the paper's time axis; a run is a whole number of them
-SAMPLE = 4e-3  # s, how closely |x| is looked at; between two samples it is taken to be linear
+SAMPLE, LATER = 4e-3, 1e-2  # s, how closely |x| is looked at, and after the first stretch; between it is linear
 LIMIT = 2400.0  # s; what has not settled by then counts as never
 BOUNDS = (0.01, SETTLED, 0.05)
+MARGIN = 1.05  # a measure is higher or lower if it is so by more than 5 %
+ALIKE = 0.005  # times that differ by less are one
 
 
 class Measures(NamedTuple):
@@ -62,23 +65,33 @@ UNITS: Mapping[str, str] = {
     "input": " N",
     "lopsided": "",
 }
+SHORT: Mapping[str, str] = {  # ratios, where there is little room
+    "settling": "settling time, ratio",
+    "rest": "$V_c$ at 20 s, ratio",
+    "size": "rms displacement, ratio",
+    "frequency": "frequency, ratio",
+    "input": "largest input, ratio",
+    "lopsided": "largest $|x_l + x_r|$, ratio",
+}
 
 
 _KNOWN: dict[tuple[str, bool], Measures] = {}
 
 
 def measure(scene: Scene, settle: bool = True) -> Measures:
-    """Measure a scene, or remember it; without `settle` over 20 s only, and the settling times are NaN.
+    """Measure a scene, or remember it; without `settle` over 20 s only, and the settling times may be NaN.
 
     Raises
     ------
     RuntimeError
         If a run does not reach its end.
     """
-    key = scene.to_yaml(), settle
-    if key not in _KNOWN:
-        _KNOWN[key] = _measure(scene, settle)
-    return _KNOWN[key]
+    text = text_of(scene)
+    if (text, True) in _KNOWN:
+        return _KNOWN[text, True]
+    if (text, settle) not in _KNOWN:
+        _KNOWN[text, settle] = _measure(scene, settle)
+    return _KNOWN[text, settle]
 
 
 def remember(known: Mapping[tuple[str, bool], Measures]) -> None:
@@ -90,11 +103,11 @@ def _measure(scene: Scene, settle: bool) -> Measures:
     system = scene.system
     distances = [settled_distance(scene, part) for part in BOUNDS]
     integrator = Integrator(system, continuous=True)
-    local = np.linspace(0.0, STRETCH, round(STRETCH / SAMPLE) + 1)
     last = np.zeros((len(BOUNDS), 3))
     first: Array = np.empty((0, 6))
     reached, certain = 0.0, False
     while not certain and reached < LIMIT:
+        local = np.linspace(0.0, STRETCH, round(STRETCH / (LATER if reached else SAMPLE)) + 1)
         states = integrator.advance(STRETCH, local, start=reached)
         if integrator.status is not Status.DONE:
             raise RuntimeError(f"{scene.name}: {integrator.stop}")
@@ -143,3 +156,20 @@ def ratio(changed: float, other: float) -> float:
     if np.isinf(changed) and np.isinf(other):
         return 1.0
     return changed / other if other else np.inf
+
+
+def settlings(scene: Scene) -> list[float]:
+    """Settling times from a start that is moved by OFFSETS, in s: digits that differ among them mean nothing."""
+    return [measure(moved(scene, offset)).settling for offset in OFFSETS]
+
+
+def seconds(times: Sequence[float]) -> str:
+    """Times in s as text: their range where they differ by more than half a percent, and no digits that differ."""
+    if all(map(np.isinf, times)):
+        return "never"
+    low, high = min(times), max(times)
+    if np.isinf(high):
+        return f"{low:.3g} s to never"
+    if high - low <= ALIKE * high:
+        return f"{low:.3g} s"
+    return f"{low:.3g} to {high:.3g} s"

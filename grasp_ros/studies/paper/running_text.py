@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 
 from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 from grasp_ros.studies.paper import motion
-from grasp_ros.studies.paper.cases import NUMBERS, PRINTED, Cases, Start
+from grasp_ros.studies.paper.cases import NUMBERS, Cases, Start, started
+from grasp_ros.studies.paper.compare import Comparison, Variant
+from grasp_ros.studies.paper.measures import MARGIN
+from grasp_ros.studies.paper.method_text import method_text
 from grasp_ros.studies.paper.observations import DAMPED, LOSSY_IMPACTS
 from grasp_ros.studies.paper.statement import Statement
 from grasp_ros.studies.paper.universal import Found, Share, Universal
 
+EVERY = 10**6  # of the random starts
 ANY_P = ("p", (0.1, 1.0, 10.0))
 NO_RISE = "<= 1e-12 V(0) a second"
 
@@ -20,19 +25,44 @@ def _helped(number: int, cases: Cases, start: Start) -> Found:
     return motion.collisions_help(cases, number, start)
 
 
-def _help(number: int, what: str) -> Share:
+def _alone(number: int) -> Share:
     return Share(
-        f"{what}: with the object between them the arms settle sooner than alone.",
-        f"settling time of No. {number} over that of its arms without an object below 0.952",
+        f"Read as: collisions at all. No. {number} settles sooner than its arms would without an object.",
+        f"settling time of No. {number} over that of its arms without an object below {1.0 / MARGIN:.3g}",
         partial(_helped, number),
         "Impacts move energy into the object, which has no damper, and give it back to the arms later.",
-        PRINTED,
+        (number,),
+        starts=EVERY,
+        letter="p",
+        values=(0.0, 1.0, 10.0),
+        measured=partial(_one, number),
+        reading=True,
+    )
+
+
+def _one(number: int, cases: Cases, start: Start) -> Iterator[Scene]:
+    yield started(cases[number], start)
+
+
+def _with_loss() -> Comparison:
+    """The collision term against none, in the cases whose arms have dampers."""
+    return Comparison(
+        "A motion with the collision term settles sooner than without it.",
+        "settling",
+        Variant(1),
+        False,
+        "The term takes energy in impacts; where dampers take it sooner, little is left for it.",
+        "p",
+        (0.1, 0.2, 0.5, 1.0, 2.0, 5.0),
+        ("settling_5", "rest"),
+        others=(Variant(1, (("p", 0.0),)),),
+        pairs=tuple((Variant(number), Variant(number, (("p", 0.0),))) for number in (4, 8, 10)),
     )
 
 
 def running_text() -> list[Statement]:
     """Statements of pages 245 to 247 that are neither an observation nor a conclusion."""
-    return [*_proof(), *_effect(), _grip(), *_simulation()]
+    return [*_proof(), *_effect(), _grip(), *method_text()]
 
 
 def _proof() -> list[Statement]:
@@ -62,19 +92,24 @@ def _proof() -> list[Statement]:
                     "moved before the first touch: 0",
                     motion.object_rests_until_touched,
                     "Without contact nothing pushes the object, (3).",
+                    letter="m_o",
+                    values=(0.05, 0.5, 50.0),
                 ),
             ),
         ),
         Statement(
             "T3",
             "p. 245, after (34)",
-            "The object may stay at a place off its origin.",
+            "The same sentence (T2), read as for good: an object off its origin stays there.",
             (
                 Universal(
                     "It rests for good.",
-                    "moved within 20 s: at most 1e-9 of its displacement",
+                    f"moved within 20 s: at most {motion.DRIFT:g} of its displacement",
                     motion.object_stays,
-                    "The arms swing to 0 and meet the object on their way; the only common rest is the origin.",
+                    "The arms swing to 0 and meet the object on their way; the only common rest is the origin, as T5"
+                    " says.",
+                    letter="m_o",
+                    values=(0.05, 0.5, 50.0),
                 ),
             ),
         ),
@@ -103,9 +138,12 @@ def _proof() -> list[Statement]:
                     "All masses settle, with or without losses.",
                     "all within 2 % before the limit of time",
                     motion.converges,
-                    "Without any loss V_c keeps its value, and the motion returns.",
+                    "It takes one loss, of dampers (C > 0) or of impacts (p > 0); No. 2 has none, keeps its V_c, and is"
+                    " the counterexample to any condition.",
                     NUMBERS,
-                    unit=" s",
+                    "p",
+                    (0.0, 1.0, 10.0),
+                    base=2,
                 ),
                 Universal(
                     "All masses settle where the arms have dampers.",
@@ -115,7 +153,6 @@ def _proof() -> list[Statement]:
                     DAMPED,
                     "p",
                     (0.0, 0.1, 1.0, 10.0),
-                    unit=" s",
                 ),
             ),
         ),
@@ -144,8 +181,8 @@ def _effect() -> list[Statement]:
         Statement(
             "T7",
             "p. 245, after (27)",
-            "Therefore collision stabilises, with dampers too.",
-            (_help(1, "Table 1"), _help(8, "More damping"), _help(10, "More velocity feedback")),
+            "The term makes V' smaller than without it, which implies that collision stabilises.",
+            (_with_loss(), *map(_alone, (1, 8, 10))),
         ),
         Statement(
             "T8",
@@ -158,6 +195,9 @@ def _effect() -> list[Statement]:
                     motion.falls_only_in_contact,
                     "With C = 0 the collision terms alone are left of (18).",
                     (3,),
+                    "p",
+                    (0.01, 0.1, 1.0),
+                    base=3,
                 ),
                 LOSSY_IMPACTS,
             ),
@@ -173,7 +213,7 @@ def _grip() -> Statement:
         (
             Universal(
                 "Both arms press the object in the end.",
-                "impact forces at 20 s above 0 N",
+                f"both impact forces above 0 N through the last {motion.LAST:g} s",
                 motion.holds_on,
                 "Both arms are regulated to the same point: no deformation is left to press with.",
                 least=True,
@@ -186,62 +226,3 @@ def _grip() -> Statement:
 
 def _preload(_: Cases) -> Scene:
     return scenes.load("preload")
-
-
-def _simulation() -> list[Statement]:
-    steps = ((1e-3, "1 ms"), (1e-2, "10 ms"))
-    return [
-        Statement(
-            "T10",
-            "p. 246, method",
-            "Linear interpolation gives the exact time of a contact.",
-            tuple(
-                Universal(
-                    f"With a step of {text}.",
-                    "error of the first time of contact at most 1e-9 s",
-                    partial(motion.first_contact_error, step),
-                    "Interpolation between the ends of a step leaves an error of the order of its square.",
-                    unit=" s",
-                )
-                for step, text in steps
-            ),
-        ),
-        Statement(
-            "T11",
-            "p. 246, method",
-            "The method can follow any number of collisions.",
-            tuple(
-                Universal(
-                    f"With a step of {text} it finds every touch within 20 s.",
-                    "touches found over those that are there: 1",
-                    partial(motion.contacts_found, step),
-                    "Contact is decided at the ends of a step; what opens and closes in between is not seen.",
-                    least=True,
-                )
-                for step, text in steps
-            ),
-        ),
-        Statement(
-            "T12",
-            "p. 246, No. 2",
-            "No. 2 goes on periodically and neither diverges nor converges.",
-            (
-                Universal(
-                    "It neither diverges nor converges.",
-                    "V_c changes by at most 1e-9",
-                    motion.keeps_V,
-                    "There is no term left in V_c'.",
-                    (2,),
-                ),
-                Universal(
-                    "It is periodic.",
-                    "it comes back to its start within 20 s, to 0.001 of sqrt(V(0))",
-                    motion.returns,
-                    "Three masses with impacts have no common period, but for a symmetric start, where the object"
-                    " rests.",
-                    (2,),
-                    least=True,
-                ),
-            ),
-        ),
-    ]

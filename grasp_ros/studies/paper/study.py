@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import PIL.Image
 from tqdm import tqdm
 
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
@@ -19,6 +20,7 @@ from grasp_ros.studies.paper import arms, beyond, beyond_figures, figures
 from grasp_ros.studies.paper.cases import (
     FIGURES,
     SYMMETRIC,
+    UNIT_OF,
     Cases,
     Figure,
     Start,
@@ -27,18 +29,21 @@ from grasp_ros.studies.paper.cases import (
     started,
     value_of,
 )
-from grasp_ros.studies.paper.compare import Comparison
+from grasp_ros.studies.paper.compare import Comparison, Variant
 from grasp_ros.studies.paper.definitions import SUBTITLE, SWEEPS, TITLE, definitions
+from grasp_ros.studies.paper.doubts import doubts
 from grasp_ros.studies.paper.equations import equations
 from grasp_ros.studies.paper.judgement import Wanted, judged, measured, statements, tasks, wanted_of
-from grasp_ros.studies.paper.measures import Measures, remember
+from grasp_ros.studies.paper.knife_edge import knife_edge
+from grasp_ros.studies.paper.measures import SHORT, Measures, remember
 from grasp_ros.studies.paper.page import Image, Picture, Report, agreement, short_svg, summary
 from grasp_ros.studies.paper.quantities import quantities
 from grasp_ros.studies.paper.replay import replay
-from grasp_ros.studies.paper.results import Beyond, doubts, results
+from grasp_ros.studies.paper.results import Beyond, results
 from grasp_ros.studies.paper.ros import HEADS, through_the_graph
 
-DPI = 110
+DPI = 220
+COLORS = 64  # of a PNG file
 CHUNK = 8  # scenes that a process measures before it reports
 Job = tuple[str, Callable[..., Any], tuple[Any, ...]]
 
@@ -54,7 +59,8 @@ def report(graph: bool, starts: int) -> Report:
         Random starts.
     """
     cases, drawn = load_cases(), random_starts(starts)
-    wanted = wanted_of(cases, drawn, statements())
+    asked = wanted_of(cases, drawn, statements())
+    wanted = list({key: wish for own in asked.values() for key, wish in own.items()}.values())
     context = multiprocessing.get_context("spawn")
     with context.Pool(os.cpu_count() or 1) as pool, tqdm(
         total=len(wanted), desc="random starts and sweeps", file=sys.stderr
@@ -64,7 +70,7 @@ def report(graph: bool, starts: int) -> Report:
             known[each] = found
             bar.update()
         remember(known)
-        jobs = [*_jobs(cases, drawn), *(("claim", judged, (task,)) for task in tasks(cases, drawn, known))]
+        jobs = [*_jobs(cases, drawn), *(("claim", judged, (task,)) for task in tasks(cases, drawn, asked, known))]
         bar.reset(len(jobs))
         bar.set_description("figures, verdicts, what the paper lacks")
         done: dict[str, list[Any]] = {}
@@ -92,6 +98,7 @@ def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
         ("found", _gap, (cases,)),
         ("found", _tail, (cases,)),
         ("found", _stepped, (cases,)),
+        ("found", _edge, (cases,)),
         ("quantities", quantities, (cases,)),
         ("doubts", doubts, (cases,)),
         ("replays", _replays, (cases,)),
@@ -105,9 +112,17 @@ def image(drawing: Any) -> Image:
         file = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
-        files.append(file.getvalue())
+        files.append(file)
     figures.close(drawing)
-    return Image(short_svg(files[0]), files[1])
+    return Image(short_svg(files[0].getvalue()), _few_colors(files[1]))
+
+
+def _few_colors(png: io.BytesIO) -> bytes:
+    """A PNG file with a palette, which is a third as large."""
+    small = io.BytesIO()
+    with PIL.Image.open(png) as picture:
+        picture.convert("RGB").quantize(COLORS, dither=PIL.Image.Dither.NONE).save(small, format="png", optimize=True)
+    return small.getvalue()
 
 
 def _sheet(cases: Cases) -> tuple[str, Image]:
@@ -147,6 +162,11 @@ def _stepped(cases: Cases) -> tuple[str, Any, Image]:
     return "stepped", arms.stepped(cases), image(beyond_figures.stepped(cases))
 
 
+def _edge(cases: Cases) -> tuple[str, Any, Image]:
+    found = knife_edge(cases)
+    return "edge", found, image(beyond_figures.edge(found))
+
+
 def _replays(cases: Cases) -> list[dict[str, Any]]:
     return [replay(figure, cases[figure.case]) for figure in FIGURES]
 
@@ -175,12 +195,18 @@ def _same_V(run: Any) -> bool:
 
 def _curves(cases: Cases, drawn: list[Start]) -> list[beyond_figures.Curve]:
     found: list[beyond_figures.Curve] = []
+    seen: set[tuple[str, str, Variant]] = set()
     for key, statement in statements().items():
         for part in statement.parts:
-            if isinstance(part, Comparison) and part.values and key.startswith("O"):
-                title = f"{key}: {part.measure}"
-                value = value_of(cases[part.changed], part.letter)
-                found.append((title, part.letter, value, part.higher, part.curve(cases, drawn)))
+            known = isinstance(part, Comparison) and (part.letter, part.measure, part.other) in seen
+            if isinstance(part, Comparison) and part.values and key.startswith("O") and not known:
+                seen.add((part.letter, part.measure, part.other))
+                value = value_of(part.changed.scene(cases), part.letter)
+                label = f"{part.letter}, {UNIT_OF[part.letter[:2].rstrip('_')]}"
+                curve = part.curve(cases, drawn)
+                found.append(
+                    beyond_figures.Curve(f"{key} {part.changed}", label, SHORT[part.measure], value, part.higher, curve)
+                )
     return found
 
 
