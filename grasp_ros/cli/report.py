@@ -74,7 +74,7 @@ def _amounts(trajectory: Trajectory) -> list[Row]:
         rows.append((f"settled to {SETTLED:.0%}", text))
     largest = [f"{name} {value:.4g} N" for name, value in _largest(trajectory) if value > 0.0]
     if largest:
-        rows.append(("largest forces at these times", ", ".join(largest)))
+        rows.append(("largest forces seen", ", ".join(largest)))
     if len(trajectory.t) > 1 and not system.external:
         lost = losses(trajectory)
         parts = [f"{name} {float(value):.4g}" for name, value in lost._asdict().items() if float(value) != 0.0]
