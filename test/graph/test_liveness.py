@@ -74,7 +74,7 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
     (tmp_path / "scene.yaml").write_text(scene.load("case_01", ["time.duration_s=3600"]).to_yaml())
     graph = Terminals(launch, tmp_path, str(tmp_path / "scene.yaml"))
     needs = {  # who misses a message of the first
-        "left_controller": ("plant", r"left/effort_command: no (sign of life|answer).* of /left_controller for 1\.\d s"),
+        "left_controller": ("plant", r"effort_command: no (sign of life|answer).* of /left_controller for 1\.\d s"),
         "monitor": ("plant", r"lyapunov: no (sign of life|answer).* of /monitor for 1\.\d s"),
         "plant": ("right_controller", r"joint_states: no sign of life of /plant for 1\.5 s"),
     }

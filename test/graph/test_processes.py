@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import DEADLINE, children, wait_for
+from processes import DEADLINE, START, children, wait_for
 
-from grasp_ros.graph import bag
+from grasp_ros.graph import bag, shared_memory
 from grasp_ros.scene.topics import JOINT_STATES
 
 pytestmark = pytest.mark.slow  # real processes
@@ -78,6 +78,19 @@ def test_a_terminal_that_is_closed_ends_a_run_cleanly(launch: Any, tmp_path: Pat
     assert run.wait(DEADLINE) in (0, 1)
     assert not children(tmp_path)
     check_bag(tmp_path)
+
+
+def test_shared_memory_of_a_killed_process_is_removed_and_no_other(launch: Any) -> None:
+    before = shared_memory.segments()
+    node = launch(*START, "left_controller", stderr=subprocess.DEVNULL)
+    maps = Path(f"/proc/{node.pid}/maps")
+    wait_for(lambda: any(name in maps.read_text() for name in shared_memory.segments() - before), "its segment")
+    own = {name for name in shared_memory.segments() - before if name in maps.read_text()}
+    assert not shared_memory.remove_unused(own)
+    node.kill()
+    node.wait(DEADLINE)
+    assert set(shared_memory.remove_unused(own)) == own
+    assert not own & shared_memory.segments()
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
