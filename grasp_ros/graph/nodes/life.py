@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -14,6 +15,7 @@ from rclpy.signals import SignalHandlerOptions
 from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.errors import Refused
 
+BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
 POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
 
 
@@ -66,10 +68,21 @@ def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
         waited_for = [node for node in nodes if not node.stays] or list(nodes)
         while not (received or all(node.finished for node in waited_for) or any(node.exit_code for node in nodes)):
             executor.spin_once(timeout_sec=POLL_SECONDS)
+        if received and len(nodes) == 1:  # of several, nobody is behind
+            _take_what_came(executor, nodes[0])
         executor.shutdown()
     finally:
         for node in nodes:
             node.end()
+
+
+def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:
+    """After a signal, which all nodes of a graph may get at once: a recorder may be behind the plant."""
+    end, before = time.monotonic() + BEHIND_SECONDS, None
+    while (now := node.behind()) != before and not node.finished and time.monotonic() < end:
+        before, look = now, time.monotonic() + QUIET_SECONDS
+        while time.monotonic() < look:
+            executor.spin_once(timeout_sec=QUIET_SECONDS)
 
 
 def _init() -> None:

@@ -74,6 +74,7 @@ class Monitor(PeerNode):
         self._recorder: Recorder | None = None
         self._values: list[float] = []  # of the last tick
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
+        self._leaving = False  # after a signal
         self._plant = ""  # identity of the one that is recorded
         self._seen: object = -1  # ticks at the last report
         self._stuck = 0  # reports in a row without a new tick
@@ -97,6 +98,16 @@ class Monitor(PeerNode):
     def progress(self) -> object:
         """The ticks so far."""
         return self.counters["ticks"]
+
+    def behind(self) -> object:
+        """The ticks so far: it records what had arrived before a signal, and needs nobody any more."""
+        self._leaving = True
+        return self.counters["ticks"]
+
+    def look(self) -> None:
+        """See to it that everybody is there, unless it is about to end itself."""
+        if not self._leaving:
+            super().look()
 
     def heard(self) -> None:
         """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end."""

@@ -259,6 +259,10 @@ class GraspNode(Node):
             if header is not None:
                 service.send_response(service.callback(request, service.srv_type.Response()), header)
 
+    def behind(self) -> object:
+        """What changes while it takes what had arrived before a signal; None: nothing that must be taken."""
+        return None
+
     def end(self) -> None:
         """Close and destroy, once."""
         if not self._ended:

@@ -16,8 +16,9 @@ import numpy as np
 from grasp_ros.graph import bag
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, WINDOW, Topic
+from grasp_ros.studies.faults.companion import Failed
 from grasp_ros.studies.faults.output import NO_NEWS, SENTENCE, plain
-from grasp_ros.studies.faults.stage import NODES, Failed, Stage
+from grasp_ros.studies.faults.stage import NODES, Stage
 from grasp_ros.studies.faults.verdict import LOST_SECONDS, Evidence
 
 TERMINALS = (*NODES, "run")  # last words of the names of what a user has in a terminal

@@ -12,7 +12,8 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.studies.faults.stage import NODES, Companion, Stage, free_domains
+from grasp_ros.studies.faults.companion import Companion, free_domains
+from grasp_ros.studies.faults.stage import NODES, Stage
 
 LOOK_SECONDS = 0.5
 MOST_GROWTH = 0.05  # of the memory of a process, between a tenth of the run and its end

@@ -15,8 +15,9 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.studies.faults import network, page, signals, strays, surroundings
+from grasp_ros.studies.faults.companion import Companion, Failed, free_domains
 from grasp_ros.studies.faults.drill import Drill, Skipped, play
-from grasp_ros.studies.faults.stage import Companion, Failed, Stage, free_domains
+from grasp_ros.studies.faults.stage import Stage
 from grasp_ros.studies.faults.verdict import Evidence
 
 TOGETHER = 2
