@@ -52,20 +52,26 @@ def level_of(body: Array, x: float, v: float, way: float, t: float) -> Level:
     if force != 0.0:
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
-    return Level(value, size, 0.0)
+    return Level(value, size, 0.0, 0.0)
 
 
 @inlined
-def jump(plant: Plant, y: Array, side: Body) -> float:
-    """What an arm gains or loses where it is put where object and u say, as at a touch, J of V.
+def apart(y: Array, side: Body) -> float:
+    """Distance in m between the place of an arm and where object and u say that it is.
 
-    Place and u are carried beside each other, with roundings of the whole way, which may have been much longer than the
-    places are now.
+    Both are carried beside each other, with roundings of the whole way, which may have been much longer than the places
+    are now.
     """
     x, _, sign = arm_of(y, side)
-    apart = abs(sign * (x - y[X_O]) - y[U_L + side])
-    return apart * (2.0 * abs(plant.given[side, FORCE] - plant.given[side, STIFFNESS] * x)
-                    + abs(plant.given[side, STIFFNESS]) * apart)
+    return abs(sign * (x - y[X_O]) - y[U_L + side])
+
+
+@kernel
+def jump(plant: Plant, y: Array, side: Body, way: float) -> float:
+    """What an arm gains or loses where it is put where object and u say, as at a touch, J of V."""
+    body = plant.given[side]
+    held = abs(body[FORCE]) + abs(body[STIFFNESS]) * (abs(arm_of(y, side)[0]) + way)
+    return 2.0 * held * way
 
 
 @inlined
@@ -81,8 +87,8 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
         u = y[U_L + side]
         if u > 0.0 and state.mode[side] != Pair.ABSENT:
             impact += 2.0 * stored_energy(plant.pairs[side, HERTZIAN], u)
-    loose = jump(plant, y, LEFT) + jump(plant, y, RIGHT)
-    return Level(left.value + right.value + own.value + impact, left.size + right.size + own.size + impact, loose)
+    return Level(left.value + right.value + own.value + impact, left.size + right.size + own.size + impact,
+                 apart(y, LEFT), apart(y, RIGHT))
 
 
 @kernel
@@ -127,11 +133,12 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     if penetrates(state, LEFT, t) or penetrates(state, RIGHT, t):
         return Outcome.PENETRATES
     rise, size = after.value - before.value, max(after.size, before.size)
-    rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + before.loose + UNDERFLOW
+    rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + UNDERFLOW
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
-    if rise > 0.0:
+    rounding += jump(plant, state.y, LEFT, before.left) + jump(plant, state.y, RIGHT, before.right)
+    if rise > rounding:
         return Outcome.ENERGY_RISES
     rounding += 2.0 * settings.rate * t * size  # what dampers take at most
     if clamped or -rise <= rounding or -rise <= rounding + other_losses(plant, state, size, t):

@@ -217,4 +217,5 @@ class Level(NamedTuple):
 
     value: float  # J of V
     size: float  # J, sum of the sizes of its terms
-    loose: float  # J by which it changes where an arm is put where object and u say
+    left: float  # m between the place of an arm and where object and u say that it is
+    right: float
