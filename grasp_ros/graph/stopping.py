@@ -45,8 +45,16 @@ def raise_on_signals() -> None:
         os.register_at_fork(after_in_child=give_back)
 
 
-def end_with_parent(received: list[int]) -> None:
-    """Note the end of the process that holds the other end of the standard input; then end, if late by force."""
+def end_with_parent(received: list[int], name: str) -> None:
+    """Note the end of the process that holds the other end of the standard input; then end, if late by force.
+
+    Parameters
+    ----------
+    received : list of int
+        Gets a SIGHUP.
+    name : str
+        Of the node.
+    """
     if sys.platform == "linux":  # a process that was stopped could not end: its parent's death lets it go on
         with suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGCONT)
@@ -55,6 +63,8 @@ def end_with_parent(received: list[int]) -> None:
         with suppress(OSError):
             while os.read(0, 1):
                 pass
+        with suppress(OSError):  # nobody may read it
+            print(f"{name}: what started this process has ended; it ends, too", file=sys.stderr)
         received.append(signal.SIGHUP)
         threading.Event().wait(GRACE_SECONDS)
         os._exit(1)

@@ -23,7 +23,7 @@ def main(name: str, child: bool = False) -> int:
     received: list[int] = []
     note_signals(received)
     if child:
-        end_with_parent(received)
+        end_with_parent(received, name)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
     os.environ.update(this_host(os.environ))  # before rclpy looks
     module = import_module(f"grasp_ros.graph.nodes.{'controller' if name.endswith('controller') else name}")
