@@ -43,7 +43,7 @@ from grasp_ros.studies.paper.results import Beyond, results
 from grasp_ros.studies.paper.ros import HEADS, through_the_graph
 
 DPI = 220
-COLORS = 64  # of a PNG file
+COLORS = 256  # of a PNG file
 CHUNK = 8  # scenes that a process measures before it reports
 Job = tuple[str, Callable[..., Any], tuple[Any, ...]]
 
@@ -121,7 +121,8 @@ def _few_colors(png: io.BytesIO) -> bytes:
     """A PNG file with a palette, which is a third as large."""
     small = io.BytesIO()
     with PIL.Image.open(png) as picture:
-        picture.convert("RGB").quantize(COLORS, dither=PIL.Image.Dither.NONE).save(small, format="png", optimize=True)
+        few = picture.convert("RGB").quantize(COLORS, PIL.Image.Quantize.FASTOCTREE, dither=PIL.Image.Dither.NONE)
+        few.save(small, format="png", optimize=True)
     return small.getvalue()
 
 
