@@ -80,13 +80,14 @@ def freeze_all(stage: Stage) -> None:
 
 
 def suspend(stage: Stage) -> None:
-    """Stop all processes, as a machine does that goes to sleep."""
-    stage.happens()
+    """Stop all processes, as a machine does that goes to sleep; before it wakes up nobody can notice anything."""
     there = stage.living()
-    for number in (signal.SIGSTOP, signal.SIGCONT):
-        for pid in there:
-            os.kill(pid, number)
-        time.sleep(FROZEN_SECONDS if number == signal.SIGSTOP else 0.0)
+    for pid in there:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(FROZEN_SECONDS)
+    stage.happens()
+    for pid in there:
+        os.kill(pid, signal.SIGCONT)
 
 
 def _at_other_moments() -> list[Drill]:
