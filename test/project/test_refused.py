@@ -77,8 +77,6 @@ def test_nothing_else_is_raised_for_input() -> None:
         "graph/nodes/law.py",  # what a user's law raises ends the run with its line
         "graph/nodes/life.py",  # a fault of ours ends a node in one line
         "exact/foreign.py",  # what a user's controller raises goes around the kernel, and on behind it
-        "graph/nodes/law.py",  # the same in a node
-        "graph/nodes/life.py",  # a node ends with a sentence and where it comes from
     }
 
 
