@@ -18,20 +18,19 @@ from grasp_ros.cli.arguments import Command
 from grasp_ros.graph.stopping import raise_on_signals
 from grasp_ros.physics.errors import Refused
 
-NOBODY = (errno.EPIPE, errno.EIO)  # the reader of our output, `head` say, has had enough; the terminal is gone
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `grasp`; returns the exit status."""
     try:
         return _status(arguments)
     except OSError as error:
-        if error.errno not in NOBODY:
+        enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
+        if not enough and error.errno != errno.EIO:  # EIO: the terminal is gone
             raise
         nothing = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):
             os.dup2(nothing, stream.fileno())
-        return 0 if error.errno == errno.EPIPE else 1
+        return 0 if enough else 1
 
 
 def _status(arguments: Sequence[str] | None) -> int:

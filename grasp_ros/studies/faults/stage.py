@@ -26,6 +26,7 @@ START_SECONDS = 60.0  # for a graph to start on a machine that is busy
 AHEAD = 10_000  # ticks between two looks at what was published
 BEFORE = 300  # ticks before the accident
 POLL_SECONDS = 0.02
+END_SECONDS = 1.0  # for the last words of processes that were killed
 GRASP = [sys.executable, "-P", "-m", "grasp_ros.cli"]
 NODE = [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start"]
 NODES = ("plant", "left_controller", "right_controller", "monitor")
@@ -219,6 +220,10 @@ class Stage:
             os.kill(pid, signal.SIGKILL)
         for process in self.started.values():
             process.wait()
+        self.output.finish(END_SECONDS)
+        for process in self.started.values():
+            if process.stdout is not None:
+                process.stdout.close()
         if self.companion is self._others:
             self.companion.ask("close")
         else:
