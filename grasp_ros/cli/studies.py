@@ -6,7 +6,7 @@ import argparse
 from functools import partial
 from typing import Any
 
-from grasp_ros.cli import study_accuracy, study_costs, study_maps, study_proofs
+from grasp_ros.cli import study_accuracy, study_costs, study_graph, study_maps, study_proofs
 from grasp_ros.cli.arguments import Command
 from grasp_ros.physics.errors import Refused
 
@@ -17,7 +17,8 @@ STUDIES = (
     study_accuracy.add_page, study_accuracy.add_speed, study_costs.add_effects, study_proofs.add_certificate,
     study_proofs.add_paper, study_proofs.add_hard, study_proofs.add_fuzz, study_proofs.add_doors,
     study_proofs.add_faults,
-    study_costs.add_graph, study_costs.add_recorder, study_maps.add_maps, study_maps.add_many,
+    study_graph.add_graph, study_graph.add_steering, study_graph.add_free_running,
+    study_costs.add_recorder, study_maps.add_maps, study_maps.add_many,
 )
 
 

@@ -1,4 +1,4 @@
-"""The studies of what a loop, an effect, a graph and a bag cost: `loop`, `effects`, `graph` and `recorder`."""
+"""The studies of what a loop, an effect and a bag cost: `loop`, `effects` and `recorder`."""
 
 from __future__ import annotations
 
@@ -60,22 +60,6 @@ def _effects(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene, options.settings)
     prepare()
     effects.run(scene, options.output)
-    return 0
-
-
-def add_graph(commands: Any) -> Parser:
-    """`grasp study graph`."""
-    sub = add_command(commands, "graph", _graph, "lockstep ticks per second, beside a bare rclpy graph")
-    add_scene(sub)
-    return sub
-
-
-def _graph(options: argparse.Namespace) -> int:
-    from grasp_ros.studies import graph
-
-    scene = load_scene(options.scene, options.settings)
-    prepare()
-    graph.run(scene)
     return 0
 
 

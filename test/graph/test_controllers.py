@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -11,6 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import SECOND_DOMAIN
+from flipped import with_a_flipped_bit
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
@@ -18,7 +21,8 @@ from std_srvs.srv import Trigger
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.verify import laws_of, verify
-from grasp_ros.physics.layout import LEFT
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import SampledPlant, simulate
 
@@ -72,30 +76,75 @@ def test_a_controller_that_we_did_not_write_is_recorded_and_verified(launch: Any
     assert "NOT EQUAL" not in out
 
 
-def test_an_object_as_controller_gives_the_same_bits_as_without_ros(launch: Any, tmp_path: Path) -> None:
+FOREIGN = """
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from own_law import Limited
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node("foreign")
+commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
+law, said = Limited(), {}
+def answer(state):
+    i, stamp = state.name.index("left"), (state.header.stamp.sec, state.header.stamp.nanosec)
+    if stamp not in said:  # otherwise it comes again
+        said[stamp] = law(0, 0.0, state.position[i], state.velocity[i])
+    command = WrenchStamped(header=state.header)
+    command.wrench.force.x = said[stamp]
+    commands.publish(command)
+while commands.get_subscription_count() < 2:
+    rclpy.spin_once(node, timeout_sec=0.01)
+node.create_subscription(JointState, "joint_states", answer, 1000)
+rclpy.spin(node)
+"""
+
+
+def test_a_law_with_limits_and_memory_gives_the_same_bits_in_four_processes_in_one_and_without_ros(
+    launch: Any, tmp_path: Path, command: Any
+) -> None:
+    """In four processes on the left as a node that we did not write, on the right as an object."""
     (tmp_path / "own_law.py").write_text(OWN)
-    run = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=0.5", "-o", "run",
-        "--controller", "left=own_law:Limited", cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )
-    out, err = run.communicate(timeout=DEADLINE)
-    assert run.returncode == 0, out + err
-    recording = bag.read(tmp_path / "run" / "bag")
+    run = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=0.5"]
+    words = {
+        "four": ["--without", "left_controller", "--controller", "right=own_law:Limited"],
+        "one": ["--one-process", "--controller", "left=own_law:Limited", "--controller", "right=own_law:Limited"],
+    }
+    domains = {"four": os.environ["ROS_DOMAIN_ID"], "one": SECOND_DOMAIN}
+    runs = {
+        name: launch(*run, *words[name], "-o", name, cwd=tmp_path, env={**os.environ, "ROS_DOMAIN_ID": domain},
+                     stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        for name, domain in domains.items()
+    }
+    launch(sys.executable, "-c", FOREIGN, cwd=tmp_path, stderr=subprocess.DEVNULL)
     names: dict[str, Any] = {}
     exec(OWN, names)
-    law, case = names["Limited"](), recording.scene
-    simulated = simulate(case, controllers={"left": names["Limited"]})
-    assert simulated.state.tobytes() == recording.state.tobytes()
+    case = scene.load("case_01", ["time.duration_s=0.5"])
+    simulated = simulate(case, controllers=dict.fromkeys(("left", "right"), names["Limited"]))
+    for name, process in runs.items():
+        out, err = process.communicate(timeout=DEADLINE)
+        assert process.returncode == 0, out + err
+        recording = bag.read(tmp_path / name / "bag")
+        assert recording.state.tobytes() == simulated.state.tobytes()
+        assert recording.command.tobytes() == simulated.command.tobytes()
+        assert verify(recording).words == "501 states follow from the recorded inputs, bit for bit"
+        assert all(law.startswith("foreign: ") for law in laws_of(recording).values())
     plant, states = SampledPlant(case.system, case.period_ns), []
-    for tick in range(len(recording.tick)):
+    laws = {LEFT: names["Limited"](), RIGHT: names["Limited"]()}
+    for tick in range(len(simulated.t)):
         states.append(plant.state.copy())
-        commands = case.system.commands(tick, plant.state)
-        commands[LEFT] = law(tick, case.time_of(tick), *plant.state[:2].tolist())
+        commands = np.zeros(3)
+        for body, law in laws.items():
+            commands[body] = law(tick, case.time_of(tick), *plant.state[COLUMN[body] :][:2].tolist())
         plant.step(commands)
-    assert np.array(states).tobytes() == recording.state.tobytes()
-    laws = laws_of(recording)
-    assert laws["right"] == "the scene's law"
-    assert laws["left"].startswith("foreign: ")
+    assert np.array(states).tobytes() == simulated.state.tobytes()
+    copy = with_a_flipped_bit(tmp_path / "four" / "bag" / "bag.mcap", tmp_path / "copy.mcap", "/joint_states", 300)
+    found = command("verify", str(copy))
+    assert found.returncode == 1
+    assert "NOT EQUAL, first at tick 300, joint_states, right position: recorded " in found.stdout
+
+
+def test_a_force_that_was_not_commanded_is_found(two_runs: tuple[Path, Path]) -> None:
+    recording = bag.read(two_runs[0] / "bag")
     effort = recording.effort.copy()
     effort[300, 0] = np.nextafter(effort[300, 0], np.inf)
     found = verify(replace(recording, effort=effort)).difference

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -89,22 +90,27 @@ class Bare(Node):
             self._outputs[0].publish(messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
 
 
-def main(name: str, ticks: int) -> None:
-    """Run one node; the plant prints its ticks per second and ends, the others run until they are stopped."""
+def main(names: Sequence[str], ticks: int) -> None:
+    """Run one node, or several in one thread; the plant prints its ticks per second and ends the process.
+
+    The others run until they are stopped.
+    """
     rclpy.init()
-    node = Bare(name, ticks)
+    nodes = [Bare(name, ticks) for name in names]
     executor = EventsExecutor()
-    executor.add_node(node)
+    for node in nodes:
+        executor.add_node(node)
     settled = time.monotonic() + SETTLE_SECONDS
     while time.monotonic() < settled:
         executor.spin_once(timeout_sec=0.1)
     begin = time.monotonic()
-    if name == "plant":
-        node.publish_state()
-    while not node.finished:
+    plant = next((node for node in nodes if node.get_name() == "plant"), nodes[0])
+    if plant.get_name() == "plant":
+        plant.publish_state()
+    while not plant.finished:
         executor.spin_once(timeout_sec=0.2)
     print(f"{ticks / (time.monotonic() - begin):.1f} ticks/s", file=sys.stderr)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[2:], int(sys.argv[1]))

@@ -95,9 +95,9 @@ class Steering:
         if self.reset_due:
             return _answer(response, False, "a reset is already on its way")
         self.reset_due = True
-        number = self._plant.resets + 1
+        number, tick = self._plant.resets + 1, self._plant.tick  # which may be over when `advance` returns
         self._plant.advance()
-        return _answer(response, True, f"reset number {number}, as soon as tick {self._plant.tick} is answered")
+        return _answer(response, True, f"reset number {number}, as soon as tick {tick} is answered")
 
     def _status(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         plant = self._plant

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 
 PERCENTILE = 99.0
+OLDEST = 10_000  # periods that are told apart over the whole run
 
 
 class Timing:
@@ -31,6 +33,7 @@ class Timing:
         self.lost = 0.0
         self._overruns = 0
         self._before = math.nan
+        self._all: dict[str, Counter[int]] = {side: Counter() for side in sides}  # ages since the start
         self._clear()
 
     def _clear(self) -> None:
@@ -49,13 +52,14 @@ class Timing:
     def age(self, side: str, periods: int) -> None:
         """Age of the command that acts, in control periods: how much older the state is that it answers."""
         self._ages[side].append(periods)
+        self._all[side][min(periods, OLDEST)] += 1
 
     def take(self) -> dict[str, float]:
         """What was collected since the last call, by name; nothing where there was no period.
 
         `period_s` is the mean interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were
         computed, `overruns` how many were later than a whole period since the start, and `left_age_p99` and so on the
-        age of the commands in periods.
+        age of the commands in periods; `left_age_p99_all` is that since the start.
         """
         if not self._lateness or not self._intervals:
             return {}
@@ -67,5 +71,16 @@ class Timing:
         for side, ages in self._ages.items():
             values[f"{side}_age_p99"] = float(np.percentile(ages, PERCENTILE))
             values[f"{side}_age_max"] = float(np.max(ages))
+            values[f"{side}_age_p99_all"] = _percentile(self._all[side])
         self._clear()
         return values
+
+
+def _percentile(ages: Counter[int]) -> float:
+    """The smallest age that PERCENTILE of all do not exceed."""
+    left = ages.total() * PERCENTILE / 100.0
+    for age in sorted(ages):
+        left -= ages[age]
+        if left <= 0.0:
+            return float(age)
+    return math.nan
