@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY, Integrator, Status
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics import energy as certificate
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST, compile_kernels
-from grasp_ros.exact.jit import COMPILING, kernels_on_disk
+from grasp_ros.exact.disk import COMPILING, kernels_on_disk
+from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
@@ -130,6 +130,8 @@ def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:
 
 def prepare() -> None:
     """Compile the kernels where that has not been done, and say so."""
+    from grasp_ros.exact.integrator import compile_kernels
+
     if not kernels_on_disk():
         print(COMPILING, file=sys.stderr)
     compile_kernels()

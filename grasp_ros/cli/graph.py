@@ -14,7 +14,7 @@ from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
-from grasp_ros.exact.integrator import Integrator
+from grasp_ros.exact.disk import kernels_on_disk
 from grasp_ros.graph.host import network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
@@ -89,11 +89,11 @@ def _run(options: argparse.Namespace) -> int:
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
-    Integrator(scene.system, continuous=False, accuracy=options.accuracy)  # refuses what is wrong
-    prepare()
+    Running(options.accuracy, real_time_factor=options.free_running or 0.0)  # refuses what is wrong
+    if not kernels_on_disk():  # otherwise the plant alone loads them
+        prepare()
     plant = {"paused": str(options.paused).lower()}
     if options.free_running is not None:
-        Running(real_time_factor=options.free_running)  # refuses what is wrong
         plant.update(free_running="true", real_time_factor=repr(options.free_running))
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,

@@ -12,11 +12,17 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 
-from grasp_ros.cli import graph, map, plot, simulate, studies
 from grasp_ros.cli.arguments import Command
 from grasp_ros.graph.stopping import raise_on_signals
 from grasp_ros.physics.errors import Refused
+
+SUBJECTS = {  # files of this room, and their commands: what is not asked for is not imported, which takes a while
+    "simulate": ("scenes", "methods", "simulate"), "map": ("map",),
+    "graph": ("run", "recover", "inspect", "replay", "watch", "ctl", "verify"), "plot": ("plot",),
+    "studies": ("study",),
+}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,7 +43,8 @@ def _status(arguments: Sequence[str] | None) -> int:
     """Run a command; in one line what it refuses."""
     try:
         raise_on_signals()
-        options = _parser().parse_args(arguments)
+        words = sys.argv[1:] if arguments is None else arguments
+        options = _parser(words[0] if words else "").parse_args(words)
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
@@ -50,9 +57,11 @@ def _status(arguments: Sequence[str] | None) -> int:
         return 130
 
 
-def _parser() -> argparse.ArgumentParser:
+def _parser(wanted: str) -> argparse.ArgumentParser:
+    """A parser of one command, or of all of them where it is none."""
     parser = argparse.ArgumentParser(prog="grasp", description="Simulate, run, inspect and draw a colliding grasp.")
     commands = parser.add_subparsers(required=True, metavar="command")
-    for subject in (simulate, map, graph, plot, studies):
-        subject.add_to(commands)
+    known = [subject for subject, names in SUBJECTS.items() if wanted in names]
+    for subject in known or SUBJECTS:
+        import_module(f"grasp_ros.cli.{subject}").add_to(commands)
     return parser

@@ -22,9 +22,10 @@ from grasp_ros.cli.arguments import (
     whole,
 )
 from grasp_ros.cli.controllers import load_controllers
-from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import GRID_POINTS, simulate
 

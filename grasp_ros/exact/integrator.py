@@ -16,14 +16,13 @@ from grasp_ros.exact.sight import Wanted
 from grasp_ros.exact.squeezed import creep
 from grasp_ros.exact.watcher import Watcher
 from grasp_ros.exact.workspace import workspace
+from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
-ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
-FINEST, COARSEST = 1e-16, 1e-3
 MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for about a minute
 BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
 

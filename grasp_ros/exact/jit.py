@@ -3,9 +3,6 @@
 `NUMBA_DISABLE_JIT=1` in the environment runs the same source uncompiled.
 """
 
-import hashlib
-import os
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -16,40 +13,13 @@ from typing import Any
 import numba
 from numba.core.registry import CPUDispatcher
 
+from grasp_ros.exact.disk import cache_directory
+
 # Off by default in numba; it turns the eight independent sums of `series.convolve` into vector instructions, which
 # makes a contact several times faster. It never reorders a floating-point sum.
 numba.config.SLP_VECTORIZE = 1
 
 DEEP_STACK = 70_000  # slots; more than half a megabyte
-
-
-def sources_digest(room: Path) -> str:
-    """A short name of the sources of this room, of the physics whose constants it uses, and of a room that calls it."""
-    digest = hashlib.sha256()
-    own = Path(__file__).parent
-    for source in sorted({*own.glob("*.py"), *(own.parent / "physics").glob("*.py"), *room.glob("*.py")}):
-        digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-@cache
-def _cache_directory(room: Path) -> Path:
-    """A writable directory for the kernels of a room.
-
-    numba looks for changes only in the file of the function that is called, not in those that it calls from other
-    files: without the digest an edited kernel would go on running as it was.
-    """
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    directory = Path(base) / "grasp_ros" / sources_digest(room)
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        directory = Path(tempfile.mkdtemp(prefix="grasp_ros"))
-    return directory
-
-
-COMPILING = "compiling the kernels; this happens once after an installation and takes some 20 s"
-CACHE_DIRECTORY = _cache_directory(Path(__file__).parent)
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]
@@ -114,7 +84,7 @@ def compiled_address(function: Any, signature: str) -> int:
 
 def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False, inline: bool = False) -> Any:
     """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
-    before, room = numba.config.CACHE_DIR, _cache_directory(Path(function.__code__.co_filename).parent)
+    before, room = numba.config.CACHE_DIR, cache_directory(Path(function.__code__.co_filename).parent)
     numba.config.CACHE_DIR = str(room / "doors" if door else room)  # a function may have machine code of both kinds
     try:
         found = numba.njit(
@@ -137,8 +107,3 @@ def _where_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
             save(*arguments)
 
     return attempt
-
-
-def kernels_on_disk() -> bool:
-    """Whether the integrator has machine code on disk, so that its first call need not wait for the compiler."""
-    return bool(numba.config.DISABLE_JIT) or any(CACHE_DIRECTORY.rglob("*.advance-*.nbi"))

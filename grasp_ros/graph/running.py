@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST
+from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
 

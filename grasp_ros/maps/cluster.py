@@ -15,9 +15,9 @@ from typing import Any
 
 from grasp_ros.maps.plan import Plan
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import Chunk, compute
 from grasp_ros.simulation.ensemble import Span
-from grasp_ros.simulation.versions import versions
 
 AHEAD = 3  # chunks for each worker that are handed out
 TIMEOUT_S = 10

@@ -18,10 +18,10 @@ import numpy as np
 from grasp_ros.maps.plan import Plan
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import DAMAGE, writing
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import STATUSES, Chunk
 from grasp_ros.simulation.ensemble import Span
 from grasp_ros.simulation.outcomes import find
-from grasp_ros.simulation.versions import versions
 
 FORMAT, MARKS, STATUS = "grasp_ros map", "done", "status"
 AGAIN = "what is done is kept: the same command goes on"

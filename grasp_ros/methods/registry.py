@@ -5,11 +5,12 @@ from __future__ import annotations
 import importlib.util
 from functools import partial
 
-from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST, MAX_WORK
+from grasp_ros.exact.integrator import MAX_WORK
 from grasp_ros.methods import discrete_gradient, exact, fixed_step, library
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, Method
 from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
+from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import PAPER, Scene
 

@@ -13,9 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Integrator, Status
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
 from grasp_ros.exact.rows import Rows, integrate_rows
 from grasp_ros.exact.sight import SEEN, Seen, Wanted
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EVENT_BODY, EVENT_KIND, LEFT, RIGHT, Transition
 from grasp_ros.physics.layout import Outcome as Ended

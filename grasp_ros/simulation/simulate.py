@@ -9,10 +9,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
 from grasp_ros.methods import registry
 from grasp_ros.methods.contract import ACCURACY_KNOB, Problem
 from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.events import Event, to_events
-from grasp_ros.exact.integrator import ACCURACY, Status
+from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT, METHODS, find
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition

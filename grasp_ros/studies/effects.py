@@ -26,9 +26,9 @@ from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import EFFECTS
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.trajectory import tick_times
-from grasp_ros.simulation.versions import versions
 from grasp_ros.studies import page_figures
 from grasp_ros.studies.document import put, read, write
 

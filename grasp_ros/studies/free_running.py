@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph, GraphError
 from grasp_ros.graph.rosbag2 import decode
 from grasp_ros.graph.verify import verify
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import TIMING

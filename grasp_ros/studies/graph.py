@@ -18,11 +18,11 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene import Scene
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.versions import versions
 from grasp_ros.studies import recorder
 
 REPEATS = 5

@@ -14,8 +14,8 @@ from tqdm import tqdm
 from grasp_ros.exact.events import Event
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.versions import versions
 from grasp_ros.studies import page_figures
 from grasp_ros.studies.document import prose, put, read, table, write
 from grasp_ros.verification.cases.case import Case, Product, Unfinished, Verdict, evaluate

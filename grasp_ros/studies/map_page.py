@@ -10,7 +10,7 @@ import numpy as np
 from grasp_ros.maps import figures
 from grasp_ros.maps.plan import Plan
 from grasp_ros.scene.files import writing
-from grasp_ros.simulation.versions import versions
+from grasp_ros.scene.versions import versions
 from grasp_ros.studies import document, map_figures, maps
 from grasp_ros.studies.document import prose, table
 

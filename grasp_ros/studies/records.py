@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from grasp_ros import methods
-from grasp_ros.exact.jit import sources_digest
+from grasp_ros.exact.disk import sources_digest
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import decoding, read_text, writing

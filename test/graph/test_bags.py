@@ -17,10 +17,10 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
 
 from grasp_ros import scene
-from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph import bag
 from grasp_ros.graph.comparison import compare_recording
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT
 from grasp_ros.physics.model import impact_forces

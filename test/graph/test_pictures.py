@@ -19,10 +19,10 @@ from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros import scene
-from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
 from grasp_ros.scene.topics import LYAPUNOV_NAMES, ROBOT_DESCRIPTION

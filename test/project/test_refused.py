@@ -13,9 +13,10 @@ import pytest
 import grasp_ros
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.exact.integrator import ACCURACY, Integrator
+from grasp_ros.exact.integrator import Integrator
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import decoding, reading, writing
 from grasp_ros.simulation import plots, simulate

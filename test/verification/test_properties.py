@@ -14,8 +14,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.exact.workspace import workspace
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import DAMPING
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene

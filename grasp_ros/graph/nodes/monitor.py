@@ -43,7 +43,7 @@ from grasp_ros.scene.topics import (
     Topic,
     state_of,
 )
-from grasp_ros.simulation.versions import versions
+from grasp_ros.scene.versions import versions
 
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**20  # of what does not come with every state: of one; in a second
 GIVE_UP_REPORTS = 3  # reports without a new tick after which a message is lost

@@ -16,8 +16,8 @@ from typing import Any
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import ACCURACY, Integrator, Status, compile_kernels
-from grasp_ros.exact.jit import COMPILING, kernels_on_disk
+from grasp_ros.exact.disk import COMPILING, kernels_on_disk
+from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.free_running import FreeRunning
@@ -27,6 +27,7 @@ from grasp_ros.graph.nodes.peers import Need
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.running import Running
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE

@@ -26,11 +26,22 @@ def main(name: str, child: bool = False) -> int:
         end_with_parent(received, name)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
     os.environ.update(this_host(os.environ))  # before rclpy looks
+    if name == "plant":
+        _spare_the_plant()
     module = import_module(f"grasp_ros.graph.nodes.{'controller' if name.endswith('controller') else name}")
     status: int = module.main(name, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)
     return status
+
+
+def _spare_the_plant() -> None:
+    """Let numba not find what it would import beside itself, which takes half as long as all the rest of the plant.
+
+    scipy has BLAS, which no kernel uses; a plant runs no code but the package's own.
+    """
+    for module in ("coverage", "scipy"):
+        sys.modules.setdefault(module, None)  # type: ignore[arg-type]
 
 
 def plant() -> int:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from grasp_ros.exact.integrator import ACCURACY
 from grasp_ros.graph import bag
 from grasp_ros.graph.comparison import compare_recording
 from grasp_ros.graph.processes import Graph
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.studies.paper.cases import Cases
 
 HEADS = ("case", "ticks", "beside the same without ROS", "largest distance of a position from continuous feedback, m")

@@ -14,8 +14,8 @@ from tqdm import tqdm
 
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.scene import Scene
+from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.versions import versions
 from grasp_ros.studies.paper import arms, beyond, beyond_figures, figures
 from grasp_ros.studies.paper.cases import (
     FIGURES,

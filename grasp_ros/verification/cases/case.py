@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 
 from grasp_ros.exact.events import Event
-from grasp_ros.exact.integrator import ACCURACY, MAX_EVENTS, MAX_WORK, Status
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
