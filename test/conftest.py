@@ -46,14 +46,18 @@ def command(
 
 @pytest.fixture(scope="session")
 def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """Directories of two runs of `grasp run` at the same time: case 1 over its first contacts, in a domain each."""
+    """Directories of two runs of `grasp run` at the same time: case 1 over its first contacts, in a domain each.
+
+    The first has four processes, the second has one.
+    """
     os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("log"))
     command = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=3", "-o", "run #1"]
     started = []
-    for name, domain in (("first", os.environ["ROS_DOMAIN_ID"]), ("second", SECOND_DOMAIN)):
+    runs = (("first", os.environ["ROS_DOMAIN_ID"], []), ("second", SECOND_DOMAIN, ["--one-process"]))
+    for name, domain, words in runs:
         cwd, environment = tmp_path_factory.mktemp(name), {**os.environ, "ROS_DOMAIN_ID": domain}
         run = subprocess.Popen(
-            command, cwd=cwd, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            [*command, *words], cwd=cwd, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
         started.append((cwd, run))
     for cwd, run in started:

@@ -1,4 +1,4 @@
-"""All nodes in one process, and the node classes as an API."""
+"""The node classes as an API; that one process records the same bytes as four stands in `test_bags`."""
 
 from __future__ import annotations
 
@@ -8,28 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import grasp
 from processes import DEADLINE
-
-from grasp_ros import scene
-from grasp_ros.graph import bag
-from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real nodes
 PAGE = Path(__file__).parents[2] / "docs" / "graph.md"
-
-
-def test_one_process_records_the_same_bits(tmp_path: Path) -> None:
-    settings = ["time.duration_s=0.6"]
-    found = grasp("run", "case_01", "--set", *settings, "--one-process", "-o", "run", cwd=tmp_path)
-    assert found.returncode == 0, found.stderr
-    assert "equal, bit for bit" in found.stdout
-    recording = bag.read(tmp_path / "run" / "bag")
-    simulated = simulate(scene.load("case_01", settings), sampled=True)
-    assert recording.state.tobytes() == simulated.state.tobytes()
-    assert recording.command.tobytes() == simulated.command.tobytes()
-    assert not any(recording.missing.values())
-    assert recording.closed
 
 
 def test_the_example_of_the_page_runs() -> None:

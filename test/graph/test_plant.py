@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+import re
 import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -47,16 +50,25 @@ REFUSED = [
 ]
 
 
+ONE_BY_ONE = """
+import json, sys
+from grasp_ros.graph.nodes import start
+for name, arguments in json.loads(sys.argv[1]):
+    sys.argv[1:] = [name, "--ros-args", *arguments.split()]
+    status = start.main(name)
+    print(f"exit status {status}", file=sys.stderr, flush=True)
+"""
+
+
 @pytest.fixture(scope="module")
 def refusals(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[int, str]]:
-    """Exit status and messages of all refused nodes, which start together."""
+    """Exit status and messages of all refused nodes, one after the other in one process."""
     cwd = tmp_path_factory.mktemp("refused")
-    nodes = [
-        subprocess.Popen([*START, name, "--ros-args", *arguments.split()], cwd=cwd, stderr=subprocess.PIPE, text=True)
-        for name, arguments, _ in REFUSED
-    ]
-    messages = [node.communicate(timeout=DEADLINE)[1] for node in nodes]
-    return list(zip([node.returncode for node in nodes], messages, strict=True))
+    nodes = json.dumps([(name, arguments) for name, arguments, _ in REFUSED])
+    found = subprocess.run([sys.executable, "-c", ONE_BY_ONE, nodes], cwd=cwd, stderr=subprocess.PIPE, text=True,
+                           timeout=DEADLINE, check=True)
+    parts = re.split(r"exit status (\d+)\n", found.stderr)
+    return [(int(status), message) for message, status in zip(parts[0:-1:2], parts[1::2], strict=True)]
 
 
 @pytest.mark.parametrize("row", range(len(REFUSED)), ids=[f"{name} {arguments}" for name, arguments, _ in REFUSED])

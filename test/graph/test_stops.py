@@ -90,7 +90,7 @@ def is_seen(observer: Any, name: str) -> bool:
 def test_run_notices_a_plant_that_was_stopped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Any, signal_handlers: None
 ) -> None:
-    monkeypatch.setattr(processes, "TOGETHER_SECONDS", 1.0)
+    monkeypatch.setattr(processes, "TOGETHER_SECONDS", 0.2)  # the monitor itself notices later
     graphs: list[Graph] = []
     start = Graph.start
 

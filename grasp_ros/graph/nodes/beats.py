@@ -25,6 +25,7 @@ from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.scene.topics import ALIVE
 
 BEAT_SECONDS = 0.4
+GREET_SECONDS = 0.05  # between signs to newcomers, which would otherwise wait for the next one
 ACKNOWLEDGE_SECONDS = 0.2
 MISSED = 2.5  # signs, until somebody else may have taken the place
 MOST_SIGNS, MOST_BYTES = 64, 4096  # a stranger may send more; the oldest signs are forgotten
@@ -106,6 +107,7 @@ class Beats:
         self._heard, self._beaten = heard, beaten
         self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", _process(str(os.getpid()))[1])
         self._signs: dict[str, Sign] = {}
+        self._told = 0.0  # wall time of the last own sign
         self.publisher = node.publisher(ALIVE)
         node.subscribe(ALIVE, self._on_beat)
         self._stop = threading.Event()
@@ -119,7 +121,7 @@ class Beats:
                 self._beaten()
 
     def _beat(self) -> None:
-        own = self.own
+        own, self._told = self.own, time.monotonic()
         content = [own.node, own.identity, own.turn, own.texts, own.ended, own.process]
         self.publisher.publish(messages.text(json.dumps(content)))
 
@@ -141,7 +143,8 @@ class Beats:
         if sign is None or sign.identity == self.own.identity:
             return
         sign.heard = time.monotonic()
-        self._signs.pop(sign.identity, None)
+        if self._signs.pop(sign.identity, None) is None and sign.heard > self._told + GREET_SECONDS:
+            self._beat()
         self._signs[sign.identity] = sign
         oldest = next(iter(self._signs.values()))
         if len(self._signs) > MOST_SIGNS or oldest.heard < sign.heard - LEASE_SECONDS:

@@ -73,9 +73,6 @@ class Plant(SteppedNode):
         self.scene = scene.changed(self.declare_scene(scene, "plant"))
         for warning in self.scene.warnings:
             self.get_logger().warning(warning)
-        if not kernels_on_disk():
-            self.get_logger().info(COMPILING)
-        compile_kernels()
         self._plant = self._new_plant()
         self.resets, self.asked = 0, math.inf
         self._begin = math.nan
@@ -91,6 +88,9 @@ class Plant(SteppedNode):
         self.beats.own.texts = [digest(text) for text in texts]
         for publisher, text in zip(self._descriptions, texts, strict=True):
             publisher.publish(messages.text(text))
+        if not kernels_on_disk():
+            self.get_logger().info(COMPILING)
+        compile_kernels()  # while others get ready for this scene
         self.loop = FreeRunning(self, steering, running) if free else Lockstep(self, steering)
         if progress:
             self.wall_timer(0.1, self._show)
