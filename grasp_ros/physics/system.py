@@ -88,7 +88,8 @@ class System:
     @property
     def present(self) -> list[int]:
         """Bodies that are there, in the order of the state."""
-        return [body for body in BODIES if self.bodies[body, MASS] > 0.0]
+        masses = self.bodies[:, MASS].tolist()  # a list is read faster, and a monitor asks often
+        return [body for body in BODIES if masses[body] > 0.0]
 
     @property
     def absent(self) -> list[int]:
@@ -98,7 +99,8 @@ class System:
     @property
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
-        return [side for side in (LEFT, RIGHT) if self.pairs[side, HERTZIAN] > 0.0]
+        hertzian = self.pairs[:, HERTZIAN].tolist()
+        return [side for side in (LEFT, RIGHT) if hertzian[side] > 0.0]
 
     @property
     def closed_loop(self) -> Array:

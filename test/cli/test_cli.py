@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import argparse
 import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from grasp_ros import scene, simulation
+from grasp_ros.cli import main
 
 
 def test_scenes_lists_all_with_their_titles(command: Any) -> None:
@@ -71,3 +74,14 @@ def test_methods_lists_order_source_and_touch(command: Any) -> None:
     text = command("methods").stdout
     assert text.startswith("exact\n  order: ")
     assert text.count("at a touch:") == 13
+
+
+def test_commands_are_found_in_the_files_that_have_them_and_a_run_needs_no_compiler() -> None:
+    for subject, names in main.SUBJECTS.items():
+        commands = argparse.ArgumentParser().add_subparsers()
+        import_module(f"grasp_ros.cli.{subject}").add_to(commands)
+        assert tuple(commands.choices) == names
+    program = ("import sys; from grasp_ros.cli import graph, main; from grasp_ros.graph.nodes import monitor;"
+               " print({'numba', 'scipy', 'matplotlib'} & {*sys.modules})")
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert found.stdout == "set()\n"

@@ -20,6 +20,8 @@ from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.simulation import simulate
 
 ROOT = Path(__file__).parents[2]
+PYPI = {"mcap", "rosbags", "zstandard"}  # not known to rosdep
+ROSDEP = {"PyYAML": "yaml", "pillow": "pil"}
 
 
 @pytest.mark.slow  # real processes
@@ -55,6 +57,9 @@ def test_the_package_lists_what_its_nodes_import_and_how_to_cite_it() -> None:
     sources = "\n".join(path.read_text() for path in (ROOT / "grasp_ros" / "graph" / "nodes").glob("*.py"))
     imported = set(re.findall(r"^from (\w+_(?:msgs|srvs|interfaces))\.", sources, re.M)) | {"rclpy"}
     assert imported <= listed
+    [required] = re.findall(r"install_requires=\[(.*?)\]", (ROOT / "setup.py").read_text(), re.S)
+    names = {name for name in re.findall(r'"([\w-]+)(?:\[\w+\])?"', required) if not name.startswith("ros-")} - PYPI
+    assert {f"python3-{ROSDEP.get(name, name)}" for name in names} <= listed
     version = (manifest.findtext("version"), manifest.findtext("license"))
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert (cited["version"], cited["license"]) == version

@@ -101,7 +101,7 @@ def test_each_library_has_its_place(name: str) -> None:
         assert "numba" not in found
     if not name.startswith("verification/"):
         assert not {"gmpy2", "mpmath"} & found
-    if name.startswith(("physics/", "exact/")) and name != "exact/jit.py":
+    if name.startswith(("physics/", "exact/")) and name not in ("exact/disk.py", "exact/jit.py"):
         assert not {"yaml", "pathlib", "time", "datetime"} & found
 
 
