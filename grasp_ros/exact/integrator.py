@@ -56,13 +56,7 @@ _STATUS = {
 
 
 def check_accuracy(accuracy: float) -> None:
-    """Check the first neglected term of a contact, relative.
-
-    Raises
-    ------
-    Refused
-        If it is outside its range.
-    """
+    """Raise `Refused` if the first neglected term of a contact, relative, is outside its range."""
     if not FINEST <= accuracy <= COARSEST:
         raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
 
