@@ -16,7 +16,7 @@ from grasp_ros.exact.sight import Wanted
 from grasp_ros.exact.squeezed import creep
 from grasp_ros.exact.watcher import Watcher
 from grasp_ros.exact.workspace import workspace
-from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
+from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
@@ -80,8 +80,7 @@ class Integrator:
         self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = MAX_EVENTS,
         max_work: int = MAX_WORK,
     ) -> None:
-        if not FINEST <= accuracy <= COARSEST:
-            raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+        check_accuracy(accuracy)
         state = system.state
         if state.shape != (6,) or not np.isfinite(state).all():
             raise Refused(f"state: {state!r} is not an array of six finite numbers")

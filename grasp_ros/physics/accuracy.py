@@ -1,4 +1,12 @@
 """How accurately contacts are integrated: their first neglected Taylor term, relative to the impact."""
 
+from grasp_ros.physics.errors import Refused
+
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
+
+
+def check_accuracy(accuracy: float) -> None:
+    """Raise `Refused` if an accuracy is outside its range."""
+    if not FINEST <= accuracy <= COARSEST:
+        raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
