@@ -15,8 +15,11 @@ from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from processes import DEADLINE, START
 
+from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.verify import verify
+from grasp_ros.physics.accuracy import ACCURACY
 
 pytestmark = pytest.mark.slow  # real processes
 PAGE = Path(__file__).parents[2] / "docs" / "graph.md"
@@ -60,3 +63,22 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
     assert plant.returncode == status
     assert f"left: no command for 0.25 s at tick 250: {reaction}" in errors
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
+
+
+def test_a_plant_that_is_faster_than_its_monitor_loses_no_state(tmp_path: Path, command: Any) -> None:
+    """Three seconds in a sixtieth of one: it waits for what records it; what its controllers answer acts late."""
+    plant = {"free_running": "true", "real_time_factor": "180", "left_timeout_s": "9", "right_timeout_s": "9"}
+    case = scene.load("case_01", ["time.duration_s=3"])
+    graph = Graph(case, tmp_path / "run", ACCURACY, errors=subprocess.DEVNULL, plant=plant)
+    graph.start()
+    try:
+        graph.wait([])
+    finally:
+        graph.stop()
+    recording = bag.read(graph.bag)
+    assert recording.tick.tolist() == list(range(3001))
+    assert verify(recording).words == "3001 states follow from the recorded inputs, bit for bit"
+    assert recording.missing["joint_states"] == recording.missing["contact/left"] == 0
+    refused = command("study", "free-running", "case_01", "--factor", "0")
+    assert refused.returncode == 2
+    assert "--seconds 60 --factor 0: not allowed; allowed: a factor > 0" in refused.stderr

@@ -22,7 +22,7 @@ from grasp_ros.graph.nodes.timing import Timing
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic
+from grasp_ros.scene.topics import LYAPUNOV, TIMING, WINDOW, Topic
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
 BURST_SECONDS = 0.05  # of catching up at a time, so that commands and services get their turn
@@ -71,7 +71,10 @@ class FreeRunning:
             side: max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
             for side, seconds in running.timeouts.items()
         }
-        plant.counters.update({"stale commands": 0, "refused commands": 0, "timeouts": 0})
+        plant.counters.update({"stale commands": 0, "refused commands": 0, "refused records": 0, "timeouts": 0})
+        self._recorded = -1  # last tick that the monitor has complete
+        if plant.monitored:
+            plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         commands = plant.scene.controllers.values()
         self._sides = [topic.name.split("/")[0] for topic in commands]
         self._held = {side: Held() for side in self._sides}
@@ -112,13 +115,25 @@ class FreeRunning:
         else:
             held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
 
+    def _on_lyapunov(self, cdr: bytes) -> None:
+        time_ns = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
+        if 0 <= time_ns <= self._plant.tick * self._plant.scene.period_ns:
+            self._recorded = time_ns // self._plant.scene.period_ns
+        else:
+            self._plant.refuse("refused records", LYAPUNOV)
+
+    @property
+    def _ahead(self) -> bool:
+        """Whether the plant has to wait for its monitor, which would lose states."""
+        return self._plant.monitored and self._plant.tick - self._recorded > WINDOW
+
     def advance(self) -> None:
         """Compute the periods that are over."""
         plant = self._plant
         if plant.finished or math.isnan(self._anchor):
             return
         if self._steering.reset_due:
-            self._held = {side: Held() for side in self._sides}
+            self._held, self._recorded = {side: Held() for side in self._sides}, -1
             self._steering.reset_done()
             self._set_anchor()
         if self._steering.steps:  # asked for: not with the clock
@@ -136,7 +151,7 @@ class FreeRunning:
             self._set_anchor()
         while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
             due = self._anchor + (plant.tick + 1) * self._period
-            if now < due:
+            if now < due or self._ahead:
                 return
             if plant.at_end:
                 plant.finish()

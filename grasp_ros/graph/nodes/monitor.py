@@ -107,6 +107,8 @@ class Monitor(PeerNode):
     def look(self) -> None:
         """See to it that everybody is there, unless it is about to end itself."""
         if not self._leaving:
+            if self.progress() != self._before:  # it is behind: a plant that has ended is missed when all is recorded
+                self._gone.pop(JOINT_STATES, None)
             super().look()
 
     def heard(self) -> None:
