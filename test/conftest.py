@@ -18,7 +18,7 @@ os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 
 RUN_SECONDS = 90.0
-SECOND_DOMAIN = str(124 + WORKER)  # beside those of this test run and of lonely nodes
+SECOND_DOMAIN = str(102 + os.getpid() % 18)  # beside those of test runs and of lonely nodes
 
 
 def grasp(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -13,13 +14,16 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from processes import DEADLINE, START
+from processes import DEADLINE, START, wait_for
+from rclpy.executors import SingleThreadedExecutor
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.verify import verify
-from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
 
 pytestmark = pytest.mark.slow  # real processes
 PAGE = Path(__file__).parents[2] / "docs" / "graph.md"
@@ -65,20 +69,34 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
 
 
-def test_a_plant_that_is_faster_than_its_monitor_loses_no_state(tmp_path: Path, command: Any) -> None:
-    """Three seconds in a sixtieth of one: it waits for what records it; what its controllers answer acts late."""
-    plant = {"free_running": "true", "real_time_factor": "180", "left_timeout_s": "9", "right_timeout_s": "9"}
-    case = scene.load("case_01", ["time.duration_s=3"])
-    graph = Graph(case, tmp_path / "run", ACCURACY, errors=subprocess.DEVNULL, plant=plant)
-    graph.start()
-    try:
-        graph.wait([])
-    finally:
-        graph.stop()
-    recording = bag.read(graph.bag)
-    assert recording.tick.tolist() == list(range(3001))
-    assert verify(recording).words == "3001 states follow from the recorded inputs, bit for bit"
-    assert recording.missing["joint_states"] == recording.missing["contact/left"] == 0
+def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
+    launch: Any, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    """A monitor that says when it has recorded: what is more than WINDOW ahead of it could be lost."""
+    peer, executor = node
+    period_ns, ticks = scene.load("arm_alone").period_ns, []
+
+    def note(message: JointState) -> None:
+        ticks.append(messages.to_ns(message.header.stamp) // period_ns)
+
+    peer.create_subscription(JointState, JOINT_STATES.name, note, messages.qos(JOINT_STATES))
+    recorded = peer.create_publisher(JointState, LYAPUNOV.name, messages.qos(LYAPUNOV))
+    status = peer.create_client(Trigger, "plant/status")
+    launch(
+        *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
+        "real_time_factor:=50", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL,
+    )
+    for last, next_one in ((WINDOW, 400), (400 + WINDOW + 1, 900)):
+        wait_for(lambda last=last: executor.spin_once(timeout_sec=0.05) or ticks[-1:] == [last], f"tick {last}")
+        for _ in range(3):
+            answer = status.call_async(Trigger.Request())
+            executor.spin_until_future_complete(answer, timeout_sec=DEADLINE)
+            assert json.loads(answer.result().message)["tick"] == last
+        recorded.publish(messages.lyapunov(next_one * period_ns, [0.0] * len(LYAPUNOV_NAMES)))
+    assert ticks == list(range(len(ticks)))
+
+
+def test_a_free_run_without_time_is_refused(command: Any) -> None:
     refused = command("study", "free-running", "case_01", "--factor", "0")
     assert refused.returncode == 2
     assert "--seconds 60 --factor 0: not allowed; allowed: a factor > 0" in refused.stderr
