@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
 import sys
@@ -20,7 +19,9 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.verify import laws_of, verify
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
@@ -100,30 +101,30 @@ rclpy.spin(node)
 
 
 def test_a_law_with_limits_and_memory_gives_the_same_bits_in_four_processes_in_one_and_without_ros(
-    launch: Any, tmp_path: Path, command: Any
+    launch: Any, tmp_path: Path, command: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In four processes on the left as a node that we did not write, on the right as an object."""
+    """In four processes on the left as a node that we did not write, on the right as an object; both at a time."""
     (tmp_path / "own_law.py").write_text(OWN)
-    run = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=0.5"]
-    words = {
-        "four": ["--without", "left_controller", "--controller", "right=own_law:Limited"],
-        "one": ["--one-process", "--controller", "left=own_law:Limited", "--controller", "right=own_law:Limited"],
-    }
-    domains = {"four": os.environ["ROS_DOMAIN_ID"], "one": SECOND_DOMAIN}
-    runs = {
-        name: launch(*run, *words[name], "-o", name, cwd=tmp_path, env={**os.environ, "ROS_DOMAIN_ID": domain},
-                     stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        for name, domain in domains.items()
-    }
-    launch(sys.executable, "-c", FOREIGN, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    place, case = "own_law:Limited", scene.load("case_01", ["time.duration_s=0.5"])
     names: dict[str, Any] = {}
     exec(OWN, names)
-    case = scene.load("case_01", ["time.duration_s=0.5"])
     simulated = simulate(case, controllers=dict.fromkeys(("left", "right"), names["Limited"]))
-    for name, process in runs.items():
-        out, err = process.communicate(timeout=DEADLINE)
-        assert process.returncode == 0, out + err
-        recording = bag.read(tmp_path / name / "bag")
+    four = Graph(case, tmp_path / "four", ACCURACY, without=["left_controller"], laws={"right_controller": place})
+    laws_of_both = dict.fromkeys(case.controllers, place)
+    one = Graph(case, tmp_path / "one", ACCURACY, laws=laws_of_both, one_process=True)
+    launch(sys.executable, "-c", FOREIGN, cwd=tmp_path, stderr=subprocess.DEVNULL)
+    monkeypatch.chdir(tmp_path)
+    try:
+        four.start()
+        monkeypatch.setenv("ROS_DOMAIN_ID", SECOND_DOMAIN)
+        one.start()
+        four.wait([])
+        one.wait([])
+    finally:
+        four.stop()
+        one.stop()
+    for graph in (four, one):
+        recording = bag.read(graph.bag)
         assert recording.state.tobytes() == simulated.state.tobytes()
         assert recording.command.tobytes() == simulated.command.tobytes()
         assert verify(recording).words == "501 states follow from the recorded inputs, bit for bit"
@@ -137,7 +138,7 @@ def test_a_law_with_limits_and_memory_gives_the_same_bits_in_four_processes_in_o
             commands[body] = law(tick, case.time_of(tick), *plant.state[COLUMN[body] :][:2].tolist())
         plant.step(commands)
     assert np.array(states).tobytes() == simulated.state.tobytes()
-    copy = with_a_flipped_bit(tmp_path / "four" / "bag" / "bag.mcap", tmp_path / "copy.mcap", "/joint_states", 300)
+    copy = with_a_flipped_bit(four.bag / "bag.mcap", tmp_path / "copy.mcap", "/joint_states", 300)
     found = command("verify", str(copy))
     assert found.returncode == 1
     assert "NOT EQUAL, first at tick 300, joint_states, right position: recorded " in found.stdout
