@@ -182,7 +182,7 @@ class PeerNode(GraspNode):
         if self._excused < now - patience and (quiet := self.beats.quiet(names, now - patience)):
             if any(sign.runs for sign in self.beats.of(quiet)):  # on this machine, and busy or without its turn
                 patience *= SLOW
-                quiet = self.beats.quiet(names, now - patience)
+                quiet = self.beats.quiet(names, now - patience) if self._excused < now - patience else []
             if quiet:
                 words = f"{need.topic.name}: no sign of life of {' and '.join(quiet)} for {patience:g} s"
                 return Trouble(words, True)
