@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import UNKNOWN
 from grasp_ros.graph.nodes.peers import Gone, Need
 from grasp_ros.graph.nodes.sources import Sources
@@ -54,14 +55,15 @@ class Lockstep:
         self._timer: Any = None
         self._going = True  # the timer
         plant.counters.update({
-            "stale commands": 0, "repeated commands": 0, "refused commands": 0, "repeated states": 0,
-            "refused records": 0, "commands while sources change": 0,
+            "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
+            "commands while sources change": 0, "repeated states": 0, "refused records": 0,
         })
         self.topics = list(plant.scene.controllers.values())
         self._sources = {
             topic: Sources(plant.subscribe(topic, partial(self._on_command, side, topic), raw=True), SETTLE_SECONDS)
             for side, topic in zip(plant.scene.system.laws, self.topics, strict=True)
         }
+        self._limits = Limits(plant, plant.scene)
         self._unsettled: dict[Topic, float] = {}  # topics whose commands do not count, and since when
         if plant.monitored:
             plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
@@ -143,7 +145,7 @@ class Lockstep:
         elif topic in self._unsettled or not self._sources[topic].settled():  # it is asked for again
             self._unsettled.setdefault(topic, time.monotonic())
             self._plant.refuse("commands while sources change", topic)
-        else:
+        elif self._limits.admit(topic, command[1]):
             self._commands[side] = command[1]
             self.advance()
 

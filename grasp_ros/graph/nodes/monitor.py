@@ -20,6 +20,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.judge import Announcement, Judge
 from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.picture import Picture
@@ -147,6 +148,7 @@ class Monitor(PeerNode):
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
             scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
         )
+        self._limits = Limits(self, scene)
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
@@ -186,7 +188,7 @@ class Monitor(PeerNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)
-        sure = sources is None or (sources.settled() and sources.now < 2)
+        sure = sources is None or (sources.settled() and sources.now < 2 and self._limits.allow(topic, cdr))
         arrival = self._ticks.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()

@@ -16,7 +16,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
-DOUBT_SECONDS = 1.0  # without a new tick, after which a command is taken for what a later state says, or all there is
+DOUBT_SECONDS = 1.0  # without a new tick, after which a command is made from what a later state says
 GIVE_UP_SECONDS = 4.0  # the same for a message that nothing stands for; DDS repeats what it lost after 3 s at most
 MOST_DOUBTFUL = 8  # different commands for one state
 SIDES = {topic: side for side, topic in COMMANDS.items()}
@@ -173,8 +173,9 @@ class Ticks:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
         there = self._doubtful[topic].get(time_ns, [])
         force = self._acted(SIDES[topic], time_ns)
-        if force is None:  # nobody knows, or it will never act
-            return (there[-1] if there and late else None), False
+        if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
+            to_come = len(self._states) <= self._wait < WINDOW
+            return (there[-1] if there and late and not to_come else None), False
         for cdr in there:
             if messages.raw_force(cdr) == force:
                 return cdr, False
