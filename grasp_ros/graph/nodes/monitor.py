@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -15,7 +16,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.bag import Recorder
+from grasp_ros.graph.bag import BagError, Recorder
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.judge import Announcement, Judge
@@ -121,7 +122,8 @@ class Monitor(PeerNode):
 
     def fail(self, reason: str) -> None:
         """End with a sentence that says how far the bag reaches."""
-        ticks = f"; the bag has {self.counters['ticks']} ticks" if self._recorder is not None else ""
+        told = self._recorder is None or str(self._path) in reason  # by the recorder itself
+        ticks = "" if told else f"; the bag has {self.counters['ticks']} ticks"
         super().fail(f"{reason}{ticks}")
 
     def _on_run(self, text: str) -> None:
@@ -255,7 +257,8 @@ class Monitor(PeerNode):
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
-            self._recorder.close(self.counters)
+            with suppress(*[BagError] if self.exit_code else []):  # it has been said
+                self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._output)
 
