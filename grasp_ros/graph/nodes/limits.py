@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 from functools import partial
 from typing import Any
 
@@ -44,7 +43,7 @@ class Limits:
         limit = self._limits.get(topic)
         try:
             return limit is None or abs(messages.raw_force(cdr)) <= limit
-        except struct.error:
+        except messages.UNREADABLE:
             return False
 
     def admit(self, topic: Topic, force: float) -> bool:

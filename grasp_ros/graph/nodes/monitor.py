@@ -184,7 +184,7 @@ class Monitor(PeerNode):
             message = deserialize_message(cdr, JointState)
             numbers = dict(zip(message.name, message.position, strict=True))
             self._judge.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
-        except (Refused, RuntimeError, ValueError) as error:  # the last two: what is no such message
+        except messages.UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", CHANGES[side])
             self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
 
