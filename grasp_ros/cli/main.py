@@ -12,9 +12,11 @@ import io
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
 
 from grasp_ros.cli.arguments import Command
+from grasp_ros.graph.disk import FULL
 from grasp_ros.graph.stopping import raise_on_signals
 from grasp_ros.physics.errors import Refused
 
@@ -28,11 +30,16 @@ SUBJECTS = {  # files of this room, and their commands: what is not asked for is
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `grasp`; returns the exit status."""
     try:
-        return _status(arguments)
+        status = _status(arguments)
+        sys.stdout.flush()  # here, where it can still be said that it failed
+        return status
     except OSError as error:
         enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
-        if not enough and error.errno != errno.EIO:  # EIO: the terminal is gone
+        if not enough and error.errno not in (*FULL, errno.EIO):  # EIO: the terminal is gone
             raise
+        if error.errno in FULL:
+            with suppress(OSError):
+                print(f"grasp: the output cannot be written: {error.strerror}", file=sys.stderr)
         nothing = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):
             os.dup2(nothing, stream.fileno())

@@ -147,6 +147,7 @@ class Graph:
         }
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
+        shared_memory.remove_left()
         self._segments = shared_memory.segments()
         end, self._lifeline = os.pipe()
         try:

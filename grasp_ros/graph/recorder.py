@@ -208,12 +208,20 @@ class Recorder:
                         self._flush()
                     if self._closed:
                         return
-                    if not os.fstat(self._sink.file).st_nlink:
-                        raise BagError(f"{self._path}: was deleted during the recording")
+                    self._see_whether_there()
                     os.fdatasync(self._sink.file)
             except BagError as error:  # for whoever writes or closes next
                 self._error, self._closed = str(error), True
                 return
+
+    def _see_whether_there(self) -> None:
+        """Nobody has taken the file away: its end would be written where it is not."""
+        file = os.fstat(self._sink.file)
+        if not file.st_nlink:
+            raise BagError(f"{self._path}: was deleted during the recording")
+        there = self._path / f"{self._path.name}.mcap"
+        if not there.exists() or not os.path.samestat(file, there.stat()):
+            raise BagError(f"{self._path}: was moved during the recording, which ends there; `grasp recover` closes it")
 
     def close(self, counters: Mapping[str, object] | None = None) -> None:
         """Finish the bag; only now it has its metadata. Does nothing the second time.

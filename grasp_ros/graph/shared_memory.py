@@ -7,10 +7,12 @@ small segments of ports are left alone: the next process on that port takes them
 from __future__ import annotations
 
 import fcntl
+import time
 from contextlib import suppress
 from pathlib import Path
 
 DIRECTORY = Path("/dev/shm")  # of Linux; elsewhere there is nothing to find
+YOUNG_SECONDS = 2.0  # a process may be about to lock what it has just made
 LOCK, PREFIX, PORT = "_el", "fastrtps_", "fastrtps_port"
 
 
@@ -32,3 +34,14 @@ def remove_unused(names: set[str]) -> list[str]:
                 (DIRECTORY / left).unlink(missing_ok=True)
             removed.append(name)
     return removed
+
+
+def remove_left() -> list[str]:
+    """Remove what processes that were killed have left in the past; returns the names of the segments."""
+    return remove_unused({name for name in segments() if _age(name) > YOUNG_SECONDS})
+
+
+def _age(name: str) -> float:
+    with suppress(OSError):
+        return time.time() - (DIRECTORY / (name + LOCK)).stat().st_mtime
+    return 0.0

@@ -118,7 +118,18 @@ def _gap(recording: Recording) -> str:
     missing = np.flatnonzero(np.diff(recording.tick) != 1)
     if len(missing):
         return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
-    return ""
+    lost = {name: np.flatnonzero(np.isnan(values)) for name, values in _numbers(recording)}
+    words = [f"{name} of {len(rows)} ticks, the first {recording.tick[rows[0]]}" for name, rows in lost.items()
+             if len(rows)]
+    return f"the bag lacks {' and '.join(words)}" if words else ""
+
+
+def _numbers(recording: Recording) -> Iterator[tuple[str, Array]]:
+    """What comes with every tick, by topic; NaN where it did not."""
+    yield from recording.outputs.items()
+    yield LYAPUNOV.name, recording.lyapunov[:, LYAPUNOV_NAMES.index("V_plant")]
+    for name, topic in recording.scene.controllers.items() if recording.running.lockstep else ():
+        yield topic.name, recording.command[:, SIDES[name.removesuffix("_controller")]]
 
 
 def _episodes(recording: Recording) -> Iterator[np.ndarray]:
@@ -185,9 +196,10 @@ def _effort(recording: Recording, rows: np.ndarray) -> Iterator[_Column]:
 
 
 def _first(recording: Recording, rows: np.ndarray, column: _Column) -> Difference | None:
-    """The first number whose bits differ; NaN, which the bag has in place of what is lost, is left out."""
+    """The first number whose bits differ; NaN, in place of what the bag has lost, is left out, and named by `_gap`."""
     recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (column.recorded, column.computed))
-    differ = (recorded.view(np.int64) != computed.view(np.int64)) & ~np.isnan(recorded)
+    lost = np.isnan(recorded) | np.isnan(computed)
+    differ = (recorded.view(np.int64) != computed.view(np.int64)) & ~lost
     if not differ.any():
         return None
     place = int(np.argmax(differ))

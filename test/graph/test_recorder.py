@@ -233,6 +233,16 @@ def test_a_bag_that_was_deleted_meanwhile_is_refused(tmp_path: Path, run: Trajec
         recorder.close()
 
 
+def test_a_bag_that_was_moved_meanwhile_ends_and_opens(tmp_path: Path, run: Trajectory) -> None:
+    recorder, ticks = Recorder(tmp_path / "bag", run.scene, {}), study.ticks_of(run)
+    recorder.write_tick(*next(ticks))
+    (tmp_path / "bag").rename(tmp_path / "other")
+    wait_for(lambda: bool(recorder._error), "the recorder to see it")
+    with pytest.raises(bag.BagError, match="was moved during the recording"):
+        recorder.close()
+    assert bag.read(tmp_path / "other").tick.tolist() == [0]
+
+
 def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
     ticks = list(study.ticks_of(run))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.peers import Gone, Need
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
@@ -71,7 +72,8 @@ class FreeRunning:
             side: max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
             for side, seconds in running.timeouts.items()
         }
-        plant.counters.update({"stale commands": 0, "refused commands": 0, "refused records": 0, "timeouts": 0})
+        plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
+                               "refused records": 0, "timeouts": 0})
         self._recorded = -1  # last tick that the monitor has complete
         if plant.monitored:
             plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
@@ -82,6 +84,7 @@ class FreeRunning:
         self._quality = plant.publisher(TIMING)
         for topic, side in zip(commands, self._sides, strict=True):
             plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
+        self._limits = Limits(plant, plant.scene)
         self._anchor = math.nan  # wall time of tick 0
 
     def missing(self) -> list[str]:
@@ -112,7 +115,7 @@ class FreeRunning:
             plant.refuse("refused commands", topic)
         elif tick < held.answers:
             plant.count("stale commands")
-        else:
+        elif self._limits.admit(topic, force):
             held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
 
     def _on_lyapunov(self, cdr: bytes) -> None:

@@ -1,6 +1,7 @@
 """Lockstep: publish state k, wait for the commands stamped k, advance exactly one period with them.
 
-The result does not depend on the load of the machine, nor on who answers first: a command topic has one source.
+The result does not depend on the load of the machine, nor on who answers first: a command topic has one source. While
+another one comes or goes no command counts; then the state is published again, and its answers do.
 """
 
 from __future__ import annotations
@@ -14,14 +15,17 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import UNKNOWN
 from grasp_ros.graph.nodes.peers import Gone, Need
+from grasp_ros.graph.nodes.sources import Sources
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
 REPEAT_SECONDS = 1.0
+SETTLE_SECONDS = 0.3  # after a source has come or gone; its messages are here by then
 NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
@@ -50,19 +54,23 @@ class Lockstep:
         self._timer: Any = None
         self._going = True  # the timer
         plant.counters.update({
-            "stale commands": 0, "repeated commands": 0, "refused commands": 0, "repeated states": 0,
-            "refused records": 0,
+            "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
+            "commands while sources change": 0, "repeated states": 0, "refused records": 0,
         })
         self.topics = list(plant.scene.controllers.values())
-        self._inputs = {
-            topic: plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
+        self._sources = {
+            topic: Sources(plant.subscribe(topic, partial(self._on_command, side, topic), raw=True), SETTLE_SECONDS)
             for side, topic in zip(plant.scene.system.laws, self.topics, strict=True)
         }
+        self._limits = Limits(plant, plant.scene)
+        self._unsettled: dict[Topic, float] = {}  # topics whose commands do not count, and since when
         if plant.monitored:
             plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
 
     def missing(self) -> list[str]:
         """Command topics that do not have exactly one source, with the names of several."""
+        for sources in self._sources.values():
+            sources.begin()
         found = {topic.name: self._plant.living(topic) for topic in self.topics}
         return [f"{name} from one source alone, not {' and '.join(nodes)}" if nodes else name
                 for name, nodes in found.items() if len(nodes) != 1]
@@ -80,7 +88,7 @@ class Lockstep:
         plant = self._plant
         what = f"answer to tick {plant.tick}"
         for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
-            due = math.inf if side in self._commands else plant.asked
+            due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
             yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self._answered)
         if plant.monitored:
             due = max(plant.asked, self._heard) if self._complete and self._ahead else math.inf
@@ -89,12 +97,30 @@ class Lockstep:
     def ask_again(self, now: float) -> None:
         """Publish the current state again if nothing has come of it for a second: it, or an answer, was lost."""
         since = max(self._plant.asked, self._asked, self._heard if self._complete else 0.0)
-        if (self._ahead or not self._complete) and now - since > REPEAT_SECONDS:
-            self._asked = now
-            self._plant.count("repeated states")
-            self._plant.repeat()
-        elif self._complete:  # the dead process of a controller that was replaced has been forgotten, say
-            self.advance()
+        if self._unsettled:
+            self._settle(now)
+        elif (self._ahead or not self._complete) and now - since > REPEAT_SECONDS:
+            self._repeat(now)
+
+    def _repeat(self, now: float) -> None:
+        self._asked = now
+        self._plant.count("repeated states")
+        self._plant.repeat()
+
+    def _settle(self, now: float) -> None:
+        """Ask again once the sources of the commands are the same for a while, and one of each is alive."""
+        for topic, since in tuple(self._unsettled.items()):
+            if self._sources[topic].settled() and self._alone(topic):
+                del self._unsettled[topic]
+            elif now - since > self._plant.patience and not self._refused:
+                self._refuse_sources()
+        if not self._unsettled:
+            self._repeat(now)
+
+    def _alone(self, topic: Topic) -> bool:
+        """Whether one source is left, or what DDS still lists beside it is known to be dead."""
+        number = self._sources[topic].now
+        return number < 2 or (len(self._plant.sources(topic)) >= number and len(self._plant.living(topic)) < 2)
 
     @property
     def _complete(self) -> bool:
@@ -111,11 +137,14 @@ class Lockstep:
         command = messages.raw_command(cdr)
         if command is None:
             self._plant.refuse("refused commands", topic)
-        elif command[0] != self._plant.tick * self._plant.scene.period_ns:
+        elif not self._plant.begun or command[0] != self._plant.tick * self._plant.scene.period_ns:
             self._plant.refuse("stale commands", topic)
         elif side in self._commands:
             self._plant.refuse("repeated commands", topic)
-        else:
+        elif topic in self._unsettled or not self._sources[topic].settled():  # it is asked for again
+            self._unsettled.setdefault(topic, time.monotonic())
+            self._plant.refuse("commands while sources change", topic)
+        elif self._limits.admit(topic, command[1]):
             self._commands[side] = command[1]
             self.advance()
 
@@ -134,10 +163,6 @@ class Lockstep:
         resetting, ahead = self._steering.reset_due, self._ahead
         self._let_go_on(not ahead and (resetting or not self._steering.stands))
         if self._refused or not plant.begun or plant.finished or ahead or not self._complete:
-            return
-        several = [topic for topic, source in self._inputs.items() if source.get_publisher_count() > 1]
-        if any(len(plant.living(topic)) > 1 for topic in several):
-            self._refuse_sources()
             return
         self._answered = True
         if resetting:

@@ -15,6 +15,7 @@ from enum import Enum
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
+from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
@@ -24,6 +25,7 @@ from visualization_msgs.msg import MarkerArray
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import DEPTH, LYAPUNOV_NAMES, Topic
 
 TYPES = {
@@ -163,3 +165,14 @@ def diagnostics(stamp: Time, name: str, summary: str, level: Level, values: Mapp
     message = DiagnosticArray(status=[status])
     message.header.stamp = stamp
     return message
+
+
+def descriptor(parameter: Parameter) -> ParameterDescriptor:
+    """What `ros2 param describe` shows of a number of the scene."""
+    descriptor = ParameterDescriptor(
+        description=f"{parameter.text}, in {parameter.unit}", additional_constraints=f"allowed: {parameter.allowed}",
+        read_only=not parameter.live, dynamic_typing=True,
+    )
+    if not parameter.whole and not parameter.several:
+        descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
+    return descriptor

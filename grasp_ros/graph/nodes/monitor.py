@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -14,15 +16,17 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.bag import Recorder
+from grasp_ros.graph.bag import BagError, Recorder
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.judge import Announcement, Judge
 from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.nodes.ticks import Arrival, Tick, Ticks
+from grasp_ros.graph.nodes.sources import Sources
+from grasp_ros.graph.nodes.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
@@ -46,7 +50,6 @@ from grasp_ros.scene.topics import (
 from grasp_ros.scene.versions import versions
 
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**20  # of what does not come with every state: of one; in a second
-GIVE_UP_REPORTS = 3  # reports without a new tick after which a message is lost
 
 
 class Monitor(PeerNode):
@@ -76,12 +79,12 @@ class Monitor(PeerNode):
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._leaving = False  # after a signal
         self._plant = ""  # identity of the one that is recorded
-        self._seen: object = -1  # ticks at the last report
-        self._stuck = 0  # reports in a row without a new tick
+        self._advanced = 0.0  # wall time of the last tick
+        self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "alarms": 0,
-            "ticks without V": 0, "messages not recorded": 0,
+            "ticks without V": 0, "messages not recorded": 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
         self._output = self.publisher(LYAPUNOV)
@@ -105,11 +108,13 @@ class Monitor(PeerNode):
         return self.counters["ticks"]
 
     def look(self) -> None:
-        """See to it that everybody is there, unless it is about to end itself."""
+        """See to it that everybody is there, unless it is about to end itself; go on without what does not come."""
         if not self._leaving:
             if self.progress() != self._before:  # it is behind: a plant that has ended is missed when all is recorded
                 self._gone.pop(JOINT_STATES, None)
             super().look()
+        if self._recorder is not None:
+            self._drain(time.monotonic() - max(self._advanced, self._excused))
 
     def heard(self) -> None:
         """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end."""
@@ -119,7 +124,8 @@ class Monitor(PeerNode):
 
     def fail(self, reason: str) -> None:
         """End with a sentence that says how far the bag reaches."""
-        ticks = f"; the bag has {self.counters['ticks']} ticks" if self._recorder is not None else ""
+        told = self._recorder is None or str(self._path) in reason  # by the recorder itself
+        ticks = "" if told else f"; the bag has {self.counters['ticks']} ticks"
         super().fail(f"{reason}{ticks}")
 
     def _on_run(self, text: str) -> None:
@@ -144,8 +150,9 @@ class Monitor(PeerNode):
         self._judge, self._picture = Judge(scene), Picture(self, scene)
         self._ticks = Ticks(
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
-            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES),
+            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
         )
+        self._limits = Limits(self, scene)
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
@@ -156,7 +163,9 @@ class Monitor(PeerNode):
             if command in scene.topics:
                 self.subscribe(CHANGES[side], partial(self._on_announcement, side), raw=True)
         for topic in per_tick:
-            self.subscribe(topic, partial(self._on_message, topic), raw=True)
+            subscription = self.subscribe(topic, partial(self._on_message, topic), raw=True)
+            if topic in COMMANDS.values():
+                self._sources[topic] = Sources(subscription, DOUBT_SECONDS)
         for topic in (*beside, DIAGNOSTICS):
             self.subscribe(topic, partial(self._record, topic), raw=True)
 
@@ -182,7 +191,9 @@ class Monitor(PeerNode):
             self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        arrival = self._ticks.put(topic, cdr)
+        sources = self._sources.get(topic)
+        sure = sources is None or (sources.settled() and sources.now < 2 and self._limits.allow(topic, cdr))
+        arrival = self._ticks.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
         elif arrival is Arrival.AGAIN:  # what was published has been lost
@@ -193,19 +204,14 @@ class Monitor(PeerNode):
         else:
             self.refuse(arrival.value, topic)
 
-    def _drain(self, patient: bool = True) -> None:
-        while (tick := self._ticks.take(patient)) is not None:
+    def _drain(self, waited: float = 0.0) -> None:
+        while (tick := self._ticks.take(waited)) is not None:
             self._complete(tick)
 
     def report(self) -> None:
-        """Publish the counters; go on without a message that does not come although the plant has gone on."""
+        """Publish the counters."""
         super().report()
         self._beside.clear()
-        now = self.counters["ticks"]
-        self._stuck = self._stuck + 1 if now == self._seen else 0
-        self._seen = now
-        if self._recorder is not None and self._stuck >= GIVE_UP_REPORTS:
-            self._drain(patient=False)
 
     def _complete(self, tick: Tick) -> None:
         assert self._scene is not None
@@ -214,8 +220,9 @@ class Monitor(PeerNode):
             self._offset_ns = self._bag_ns + self._scene.period_ns - tick.time_ns
             self._judge.restart()
             self.count("resets")
-        self._bag_ns = tick.time_ns + self._offset_ns
+        self._bag_ns, self._advanced = tick.time_ns + self._offset_ns, time.monotonic()
         self.count("ticks")
+        self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
         begun = [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)]
@@ -252,7 +259,8 @@ class Monitor(PeerNode):
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
-            self._recorder.close(self.counters)
+            with suppress(*[BagError] if self.exit_code else []):  # it has been said
+                self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._output)
 

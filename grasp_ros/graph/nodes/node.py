@@ -6,9 +6,10 @@ import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.exceptions import ParameterException
@@ -23,7 +24,6 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.messages import Level
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
-from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
 
 RCLError = rclpy_implementation.RCLError
@@ -50,7 +50,7 @@ class GraspNode(Node):
     finished : bool
         Whether there is nothing left to do; `run` and `spin` end then.
     exit_code : int
-        0, or 1 after a failure.
+        0, or 1 after a failure, 2 after a refusal.
     state : str
         What it does or waits for, in words; the message of its /diagnostics.
     counters : dict of str to number or text
@@ -109,7 +109,7 @@ class GraspNode(Node):
                 if parameter.key not in scene.values[effect.section]:
                     continue
                 name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
-                found = self._declare(name, list(value) if parameter.several else value, _descriptor(parameter))
+                found = self._declare(name, list(value) if parameter.several else value, messages.descriptor(parameter))
                 if not parameter.accepts(found):
                     raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
                 if (found := parameter.read(found)) != value:
@@ -159,8 +159,16 @@ class GraspNode(Node):
                 return
             callback(message)
 
-        qos = messages.reader_qos(topic)
-        return self.create_subscription(kind, topic.name, callback if raw else decode, qos, raw=True)
+        qos, take = messages.reader_qos(topic), partial(self.guarded, callback if raw else decode)
+        return self.create_subscription(kind, topic.name, take, qos, raw=True)
+
+    def guarded(self, action: Callable[..., None], *words: Any) -> None:
+        """Do something; end with a sentence if it is refused. The executor would print a traceback."""
+        try:
+            action(*words)
+        except Refused as error:
+            self.fail(str(error))
+            self.exit_code = 2
 
     def sources(self, topic: Topic) -> list[str]:
         """Full names of the nodes that publish on a topic, as far as discovery has them."""
@@ -171,7 +179,7 @@ class GraspNode(Node):
 
     def wall_timer(self, seconds: float, callback: Callable[[], None]) -> Any:
         """Timer on wall time: simulated time waits for the nodes, so no node may wait for it."""
-        return self.create_timer(seconds, callback, clock=self._steady)
+        return self.create_timer(seconds, partial(self.guarded, callback), clock=self._steady)
 
     def when(self, ready: Callable[[], bool], action: Callable[[], None]) -> None:
         """Do something once, as soon as a condition holds."""
@@ -285,14 +293,3 @@ def _refusing() -> Iterator[None]:
         yield
     except (ParameterException, RCLError) as error:
         raise Refused(" ".join(str(error).split())) from None
-
-
-def _descriptor(parameter: Parameter) -> ParameterDescriptor:
-    """What `ros2 param describe` shows of a number of the scene."""
-    descriptor = ParameterDescriptor(
-        description=f"{parameter.text}, in {parameter.unit}", additional_constraints=f"allowed: {parameter.allowed}",
-        read_only=not parameter.live, dynamic_typing=True,
-    )
-    if not parameter.whole and not parameter.several:
-        descriptor.floating_point_range = [FloatingPointRange(from_value=parameter.low, to_value=parameter.high)]
-    return descriptor

@@ -22,6 +22,7 @@ from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
 
 LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this process itself stood still
+SWEEPS = 4  # looks without progress that sweep, each of them at first and then one of as many
 GONE_SECONDS = 0.8  # without a source: its last messages are on the way
 START_SECONDS = 60.0
 SLOW = 4  # times longer who shows that it lives may take
@@ -99,6 +100,7 @@ class PeerNode(GraspNode):
         self.beats = Beats(self, self.heard, self._on_beat)
         self._created = self._looked = self._excused = time.monotonic()
         self._before: object = None
+        self._still = 0  # looks in a row without progress
         self._beats = 0  # since the last look
         self.wall_timer(LOOK_SECONDS, self.look)
 
@@ -139,7 +141,8 @@ class PeerNode(GraspNode):
         if self.finished:
             return
         progress = self.progress()
-        if progress == self._before:
+        self._still = self._still + 1 if progress == self._before else 0
+        if 0 < self._still <= SWEEPS or (self._still and self._still % SWEEPS == 0):
             self.sweep()
         self._before = progress
         if not self.begun:
@@ -182,7 +185,7 @@ class PeerNode(GraspNode):
         if self._excused < now - patience and (quiet := self.beats.quiet(names, now - patience)):
             if any(sign.runs for sign in self.beats.of(quiet)):  # on this machine, and busy or without its turn
                 patience *= SLOW
-                quiet = self.beats.quiet(names, now - patience)
+                quiet = self.beats.quiet(names, now - patience) if self._excused < now - patience else []
             if quiet:
                 words = f"{need.topic.name}: no sign of life of {' and '.join(quiet)} for {patience:g} s"
                 return Trouble(words, True)

@@ -12,6 +12,7 @@ import sys
 from importlib import import_module
 
 from grasp_ros.graph.host import this_host
+from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
 
 
@@ -24,6 +25,8 @@ def main(name: str, child: bool = False) -> int:
     note_signals(received)
     if child:
         end_with_parent(received, name)
+    else:
+        remove_left()
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
     os.environ.update(this_host(os.environ))  # before rclpy looks
     if name == "plant":

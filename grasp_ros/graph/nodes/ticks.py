@@ -8,13 +8,17 @@ from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from typing import Any, NamedTuple
 
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from grasp_ros.graph.nodes import messages
-from grasp_ros.scene.topics import FORCE, JOINT_STATES, WINDOW, Topic
+from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
+DOUBT_SECONDS = 1.0  # without a new tick, after which a command is made from what a later state says
+GIVE_UP_SECONDS = 4.0  # the same for a message that nothing stands for; DDS repeats what it lost after 3 s at most
+MOST_DOUBTFUL = 8  # different commands for one state
+SIDES = {topic: side for side, topic in COMMANDS.items()}
 
 
 class Arrival(Enum):
@@ -37,6 +41,7 @@ class Tick(NamedTuple):
     found: dict[Topic, bytes]  # serialized messages; what is lost is not there
     lost: int  # how many are not
     dropped: int  # messages that belong to no state
+    restored: int = 0  # commands that were made from the force that acted
 
 
 class _State(NamedTuple):
@@ -52,6 +57,10 @@ class Ticks:
     A topic has one source that sends in the order of the ticks, so the first message with the stamp of a state belongs
     to it and what came before belongs to none. What is kept is bounded, whoever sends.
 
+    A command acts over the period that follows its state, or later with a delay, and a later state has it as its
+    effort. That decides where a command came when its topic may have had another source, and stands for one that did
+    not come at all.
+
     Parameters
     ----------
     topics : sequence of Topic
@@ -62,27 +71,32 @@ class Ticks:
         Every stamp is a multiple of the first, and not above the second.
     turn : callable
         How often the plant was reset, as it says itself: the first state may come again for that reason or another.
+    delay : int, optional
+        Control periods from a command's arrival to its action.
     """
 
     def __init__(
-        self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, turn: Callable[[], int]
+        self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, turn: Callable[[], int],
+        delay: int = 0,
     ) -> None:
         self._names, self._period_ns, self._end_ns, self._turn = names, period_ns, end_ns, turn
         self._ahead_ns = PATIENCE_TICKS * period_ns
         self._states: deque[_State] = deque()
         self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
+        self._doubtful: dict[Topic, dict[int, list[bytes]]] = {topic: {} for topic in topics}
+        self._wait = delay + 1  # ticks until the effort has a command
         self._newest, self._newest_turn = -1, 0
         self._before = -1  # last state taken
 
-    def put(self, topic: Topic, cdr: bytes) -> Arrival:
-        """Add a serialized message, if it can be true."""
+    def put(self, topic: Topic, cdr: bytes, sure: bool = True) -> Arrival:
+        """Add a serialized message, if it can be true; a command may not be sure to be of the right source."""
         if len(cdr) > messages.MOST_BYTES:
             return Arrival.REFUSED
         try:
             stamp = messages.raw_stamp_ns(cdr)
             if stamp % self._period_ns or not 0 <= stamp <= self._end_ns:
                 return Arrival.STAMP
-            return self._put_state(stamp, cdr) if topic == JOINT_STATES else self._put_other(topic, stamp, cdr)
+            return self._put_state(stamp, cdr) if topic == JOINT_STATES else self._put_other(topic, stamp, cdr, sure)
         except messages.UNREADABLE:
             return Arrival.REFUSED
 
@@ -101,7 +115,7 @@ class Ticks:
         self._states.append(_State(stamp, restarted, message, cdr))
         return Arrival.TAKEN
 
-    def _put_other(self, topic: Topic, stamp: int, cdr: bytes) -> Arrival:
+    def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:
         if stamp > max(self._newest, 0) + self._ahead_ns:
             return Arrival.STAMP
         if topic.type == FORCE and not math.isfinite(messages.raw_force(cdr)):
@@ -111,34 +125,81 @@ class Ticks:
         if stamp != self._before and (known := queue.get(stamp)) is not None:
             same = topic.type != FORCE or messages.raw_force(known) == messages.raw_force(cdr)
             return Arrival.REPEATED if same else Arrival.CONTRADICTS
+        if not sure:
+            return self._put_doubtful(topic, stamp, cdr)
         queue.pop(stamp, None)
         queue[stamp] = cdr
         if len(queue) > 2 * PATIENCE_TICKS:
             del queue[next(iter(queue))]
         return Arrival.TAKEN
 
-    def take(self, patient: bool = True) -> Tick | None:
+    def _put_doubtful(self, topic: Topic, stamp: int, cdr: bytes) -> Arrival:
+        queue = self._doubtful[topic]
+        others = [known for known in queue.get(stamp, ()) if messages.raw_force(known) != messages.raw_force(cdr)]
+        queue[stamp] = [*others, cdr][-MOST_DOUBTFUL:]
+        if len(queue) > 2 * PATIENCE_TICKS:
+            del queue[next(iter(queue))]
+        return Arrival.CONTRADICTS if others else Arrival.TAKEN
+
+    def take(self, waited: float = 0.0) -> Tick | None:
         """The next tick that is complete, or that will not be completed any more; None if that is still open.
 
-        Without patience a tick is given up as soon as there is a later state, which the plant has made of the answers
-        to it.
+        Parameters
+        ----------
+        waited : float, s
+            How long it has been waited for.
         """
         if not self._states:
             return None
         time_ns, restarted, message, cdr = self._states[0]
-        given_up = len(self._states) > (PATIENCE_TICKS if patient else 1)
-        if not given_up and any(time_ns not in queue for queue in self._others.values()):
-            return None
-        found, dropped = {JOINT_STATES: cdr}, 0
+        given_up = len(self._states) > PATIENCE_TICKS or (waited > GIVE_UP_SECONDS and len(self._states) > 1)
+        found, restored = {JOINT_STATES: cdr}, 0
         for topic, queue in self._others.items():
-            if time_ns in queue:
-                while (first := next(iter(queue))) != time_ns:
-                    del queue[first]
-                    dropped += 1
-                found[topic] = queue.pop(time_ns)
+            other = queue.get(time_ns)
+            if other is None and topic in SIDES:
+                other, made = self._decide(topic, time_ns, given_up or waited > DOUBT_SECONDS)
+                restored += made
+            if other is not None:
+                found[topic] = other
+            elif not given_up:
+                return None
         self._states.popleft()
         self._before = time_ns
-        return Tick(time_ns, restarted, message, found, 1 + len(self._others) - len(found), dropped)
+        dropped = sum(self._forget(topic, time_ns) for topic in self._others if topic in found)
+        return Tick(time_ns, restarted, message, found, 1 + len(self._others) - len(found), dropped, restored)
+
+    def _decide(self, topic: Topic, time_ns: int, late: bool) -> tuple[bytes | None, bool]:
+        """The command that acted, and whether it was made from the effort, as nobody sent it here."""
+        there = self._doubtful[topic].get(time_ns, [])
+        force = self._acted(SIDES[topic], time_ns)
+        if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
+            to_come = len(self._states) <= self._wait < WINDOW
+            return (there[-1] if there and late and not to_come else None), False
+        for cdr in there:
+            if messages.raw_force(cdr) == force:
+                return cdr, False
+        return (serialize_message(messages.wrench(time_ns, force)), True) if late else (None, False)
+
+    def _acted(self, side: str, time_ns: int) -> float | None:
+        """The force in N of the command that answers the first state, as a later one has it."""
+        if len(self._states) <= self._wait:
+            return None
+        later = self._states[self._wait]
+        known = later.time_ns == time_ns + self._wait * self._period_ns and side in later.message.name
+        return float(later.message.effort[later.message.name.index(side)]) if known else None
+
+    def _forget(self, topic: Topic, time_ns: int) -> int:
+        """Let go of what belongs to a tick; returns how many messages came before it and belong to none."""
+        queue, dropped = self._others[topic], 0
+        if time_ns in queue:
+            while (first := next(iter(queue))) != time_ns:
+                del queue[first]
+                dropped += 1
+            del queue[time_ns]
+        if doubtful := self._doubtful[topic]:
+            for stamp in [stamp for stamp in doubtful if stamp <= time_ns]:
+                del doubtful[stamp]
+        return dropped
 
 
 def is_state(message: JointState, names: Collection[str]) -> bool:

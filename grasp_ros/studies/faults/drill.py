@@ -191,7 +191,11 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
 def _seconds_from(stage: Stage, tick: int, accident: float) -> float:
     """Wall time from a tick to the accident, or to the last tick that was published before it."""
     seen = [when for when in stage.times[tick : stage.published + 1].tolist() if when]  # the onlooker may miss one
-    return max(0.0, min(accident, seen[-1]) - seen[0]) if seen else 0.0
+    if not seen:
+        return 0.0
+    begin, end = seen[0], min(accident, seen[-1])
+    asleep = max(0.0, min(end, stage.asleep[1]) - max(begin, stage.asleep[0]))
+    return float(max(0.0, end - begin - asleep))
 
 
 def _first_gap(recording: bag.Recording) -> int:

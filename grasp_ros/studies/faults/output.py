@@ -18,6 +18,7 @@ NO_NEWS = re.compile(r"^\[(DEBUG|INFO)\]")
 RAISED = re.compile(r"^[\w.]+(Error|Exception|Interrupt|Exit)\b")
 SELECT_SECONDS = 0.02
 TRACEBACK = "Traceback (most recent call last)"
+TRACEBACKS = (TRACEBACK, "Error occurred at:")  # the second: of an executor of rclpy
 
 
 class Line(NamedTuple):
@@ -83,7 +84,7 @@ class Output:
     def traceback(self) -> str:
         """The last line of a traceback; empty without one."""
         texts = [line.text for line in self.lines]
-        begin = next((number for number, text in enumerate(texts) if TRACEBACK in text), None)
+        begin = next((number for number, text in enumerate(texts) if any(mark in text for mark in TRACEBACKS)), None)
         if begin is None:
             return ""
         return next((text for text in texts[begin + 1:] if RAISED.match(text)), TRACEBACK)

@@ -86,6 +86,7 @@ def suspend(stage: Stage) -> None:
         os.kill(pid, signal.SIGSTOP)
     time.sleep(FROZEN_SECONDS)
     stage.happens()
+    stage.asleep = stage.accident - FROZEN_SECONDS, stage.accident
     for pid in there:
         os.kill(pid, signal.SIGCONT)
 
@@ -109,6 +110,8 @@ def _at_other_moments() -> list[Drill]:
               _free_running, partial(send, name="left_controller", number=signal.SIGKILL)),
         Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
               partial(send, name="together", number=signal.SIGKILL), seen=LYAPUNOV),
+        Drill("freeze-one-process", group, f"SIGSTOP of the one process of `--one-process`, SIGCONT after"
+              f" {FROZEN_SECONDS:g} s", _one_process, partial(freeze, name="together"), seen=LYAPUNOV),
         Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
               partial(send, name="grasp run", number=signal.SIGKILL)),
         Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,

@@ -59,6 +59,7 @@ class Stage:
         self._reached = -1
         self.terminal = -1  # or a pipe: the end that is read
         self.accident = math.nan  # when it happened, monotonic
+        self.asleep = 0.0, 0.0  # from when to when nobody could do anything
         self.started: dict[str, subprocess.Popen[bytes]] = {}
         self.times: Array = np.lib.format.open_memmap(place / "times.npy", "w+", float, (scene.ticks + 1,))
         self._others = companion

@@ -1,0 +1,198 @@
+"""Which command acts, and which one the bag has, when there is more than one: the same, and never who came first."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import DEADLINE, START, wait_for
+from rclpy.serialization import serialize_message
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.ticks import DOUBT_SECONDS, GIVE_UP_SECONDS, Arrival, Ticks
+from grasp_ros.graph.verify import verify
+from grasp_ros.physics.layout import LEFT
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT
+
+PERIOD, END = 1_000_000, 10**10
+RUN = [sys.executable, "-m", "grasp_ros.cli", "run"]
+
+
+def state(tick: int, effort: float = 0.0) -> bytes:
+    return serialize_message(messages.joint_state(tick * PERIOD, [LEFT], np.zeros(6), np.full(3, effort)))
+
+
+def command(tick: int, force: float) -> bytes:
+    return serialize_message(messages.wrench(tick * PERIOD, force))
+
+
+@pytest.mark.parametrize("delay", [0, 2])
+def test_where_two_may_have_sent_the_effort_of_a_later_state_decides(delay: int) -> None:
+    ticks = Ticks([LEFT_COMMAND], ["left"], PERIOD, END, lambda: 0, delay)
+    ticks.put(JOINT_STATES, state(0))
+    assert ticks.put(LEFT_COMMAND, command(0, 1e6), sure=False) is Arrival.TAKEN
+    assert ticks.put(LEFT_COMMAND, command(0, 2.0), sure=False) is Arrival.CONTRADICTS
+    assert ticks.put(LEFT_COMMAND, command(0, 3.0), sure=False) is Arrival.CONTRADICTS
+    for tick in range(1, delay + 1):
+        ticks.put(JOINT_STATES, state(tick))
+        assert ticks.take() is None
+    ticks.put(JOINT_STATES, state(delay + 1, effort=2.0))
+    found = ticks.take()
+    assert found is not None
+    assert (messages.raw_force(found.found[LEFT_COMMAND]), found.lost, found.restored) == (2.0, 0, 0)
+
+
+def test_a_command_that_did_not_come_is_what_acted() -> None:
+    turn = [0]
+    ticks = Ticks([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
+    ticks.put(JOINT_STATES, state(0))
+    ticks.put(JOINT_STATES, state(1, effort=-0.0))
+    assert ticks.take(DOUBT_SECONDS) is None
+    found = ticks.take(DOUBT_SECONDS + 0.1)
+    assert found is not None
+    assert found.found[LEFT_COMMAND] == command(0, -0.0)
+    assert (found.lost, found.restored) == (0, 1)
+    assert ticks.take(2 * GIVE_UP_SECONDS) is None  # nobody knows yet
+    ticks.put(LEFT_COMMAND, command(1, 5.0), sure=False)
+    ticks.put(LEFT_COMMAND, command(1, 6.0), sure=False)
+    assert ticks.take(2 * GIVE_UP_SECONDS) is None
+    turn[0] = 1
+    ticks.put(JOINT_STATES, state(0, effort=7.0))  # the plant was reset: neither of them acts
+    last = ticks.take(DOUBT_SECONDS + 0.1)
+    assert last is not None
+    assert messages.raw_force(last.found[LEFT_COMMAND]) == 6.0
+
+
+def test_what_nothing_stands_for_is_given_up_later() -> None:
+    ticks = Ticks([LEFT_CONTACT], ["left"], PERIOD, END, lambda: 0)
+    ticks.put(JOINT_STATES, state(0))
+    ticks.put(JOINT_STATES, state(1))
+    assert ticks.take(GIVE_UP_SECONDS) is None
+    found = ticks.take(GIVE_UP_SECONDS + 0.1)
+    assert found is not None
+    assert found.lost == 1
+
+
+STRAY = """
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node("stray")
+latest = []
+node.create_subscription(JointState, "joint_states", lambda state: latest.append(state.header), 1000)
+for number in range(8):
+    latest.clear()  # they go on
+    while not latest:
+        rclpy.spin_once(node, timeout_sec=0.01)
+    commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
+    while commands.get_subscription_count() < 2:
+        rclpy.spin_once(node, timeout_sec=0.001)
+    command = WrenchStamped(header=latest[-1])
+    command.wrench.force.x = 1e6
+    for ahead in range(20):  # one of them is the current one
+        commands.publish(command)
+        command.header.stamp.nanosec = (command.header.stamp.nanosec + 1_000_000) % 1_000_000_000
+    node.destroy_publisher(commands)
+print("done", flush=True)
+"""
+
+
+@pytest.mark.slow  # real processes
+def test_a_stray_with_the_stamp_of_the_state_neither_acts_nor_is_recorded(launch: Any, tmp_path: Path) -> None:
+    words = ["case_01", "--set", "time.duration_s=1000", "-o", "run"]
+    run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    file = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
+    assert launch(sys.executable, "-c", STRAY, stdout=subprocess.PIPE).communicate(timeout=DEADLINE)[0] == "done\n"
+    size = file.stat().st_size
+    wait_for(lambda: file.stat().st_size > size + 20_000, "more ticks")
+    run.send_signal(signal.SIGINT)
+    _, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    assert "left/effort_command: commands while sources change: " in err
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert not any(recording.missing.values())
+    assert verify(recording).holds
+    assert np.abs(recording.command).max() < 100.0
+    assert recording.closed
+    assert int(recording.lost["lost messages"]) == 0
+    command = recording.command.copy()
+    command[300, LEFT] = np.nan
+    found = verify(replace(recording, command=command))
+    assert not found.holds
+    assert found.words.endswith("; the bag lacks left/effort_command of 1 ticks, the first 300")
+
+
+HARD = """
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+rclpy.init()
+node = rclpy.create_node("hard")
+commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
+asked = []
+def answer(state):
+    command = WrenchStamped(header=state.header)
+    command.wrench.force.x = 0.25 if state.header.stamp.nanosec in asked else -1e3
+    asked.append(state.header.stamp.nanosec)
+    if len(asked) > 3:
+        command.wrench.force.x = 0.25
+    commands.publish(command)
+while commands.get_subscription_count() < 2:
+    rclpy.spin_once(node, timeout_sec=0.01)
+node.create_subscription(JointState, "joint_states", answer, 1000)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.slow  # real processes
+@pytest.mark.parametrize("kind", [[], ["--free-running"]], ids=["lockstep", "free-running"])
+def test_a_command_beyond_the_actuator_is_named_and_does_not_act(launch: Any, tmp_path: Path, kind: list[str]) -> None:
+    words = ["saturation", "--set", "time.duration_s=0.3", "-o", "run", "--without", "left_controller", *kind]
+    run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    launch(sys.executable, "-c", HARD, stderr=subprocess.DEVNULL)
+    _, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    assert "left/effort_command: commands beyond a limit: 1; sources: " in err
+    assert "left/effort_command: -1000 N; allowed by the actuator of the scene: " in err
+    recording = bag.read(tmp_path / "run" / "bag")
+    assert verify(recording).holds
+    assert set(recording.effort[:, LEFT]) <= {0.0, 0.25}
+
+
+@pytest.mark.slow  # real processes
+def test_a_graph_that_slept_as_a_whole_goes_on(launch: Any, tmp_path: Path) -> None:
+    """Nobody takes his own pause for the silence of others, although all end for silence."""
+    options = ["--ros-args", "-p", "peer_timeout_s:=0.6", "-p", "on_silence:=end"]
+    own = {"plant": ["-p", "scene:=case_01"], "monitor": ["-p", f"bag:={tmp_path / 'bag'}"]}
+    graph = {}
+    for name in ("monitor", "left_controller", "right_controller", "plant"):
+        words = own.get(name, []) + ([] if name == "monitor" else ["-p", "wait_for_monitor:=true"])
+        with (tmp_path / name).open("w") as log:
+            graph[name] = launch(*START, name, *options, *words, stderr=log)
+    file = tmp_path / "bag" / "bag.mcap"
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
+    for process in graph.values():
+        process.send_signal(signal.SIGSTOP)
+    with pytest.raises(subprocess.TimeoutExpired):  # longer than a slow one may take
+        graph["plant"].wait(3.0)
+    for process in graph.values():
+        process.send_signal(signal.SIGCONT)
+    size = file.stat().st_size
+    wait_for(lambda: file.stat().st_size > size + 20_000 or graph["plant"].poll() is not None, "more ticks")
+    said = "".join((tmp_path / name).read_text() for name in graph)
+    assert "this process was stopped, or busy, for" in said
+    for process in graph.values():
+        process.send_signal(signal.SIGINT)
+    assert [process.wait(DEADLINE) for process in graph.values()] == [0, 0, 0, 0], said
+    recording = bag.read(tmp_path / "bag")
+    assert not any(recording.missing.values())
+    assert verify(recording).holds
