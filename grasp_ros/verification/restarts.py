@@ -12,7 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, Work
+from grasp_ros.physics.layout import (
+    DAMPING,
+    DISSIPATION,
+    EPS,
+    EVENT_KIND,
+    EVENT_TIME,
+    FORCE,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    Transition,
+    Work,
+)
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import PAPER
@@ -69,6 +82,7 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     reached[:, ::2] = np.maximum.accumulate(reached[:, ::2].max(axis=1))[:, None]  # in a contact x follows x_o
     pairs = impacts(detail, scale)
     moving = _rows(np.abs(detail.v[pieces]), accelerations(detail, pairs)[pieces])
+    moving[:, ::2] = np.maximum(moving[:, ::2], _put_at_touch(detail, pieces))
     unit = grown + EPS * (reached + size) + _late(times, whole, moving) + TINY
     unit += _noise(detail, pairs, pieces, times - start)
     unit[:, 1::2] += EPS * reached[:, ::2] * rates(detail.bodies[first])[[LEFT, OBJECT, RIGHT]]
@@ -82,6 +96,15 @@ def _beside_event(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
     near = BESIDE * t
     begins, ends = (kind & FIRST > 0) & (t - t[:, :1] <= near), (kind & LAST > 0) & (t[:, -1:] - t <= near)
     return np.asarray(begins | ends)
+
+
+def _put_at_touch(detail: Detail, pieces: slice) -> Array:
+    """Speeds (n, 1) with which a rounding of the time of a touch moves an arm, which is put where the object is."""
+    fastest = np.maximum.accumulate(np.abs(detail.v[pieces]).max(axis=2).ravel())
+    events = detail.run.event_table
+    touches = events[events[:, EVENT_KIND] == Transition.TOUCH, EVENT_TIME]
+    first = min(touches[touches > detail.pieces.begin[pieces.start]], default=np.inf)
+    return np.where(detail.t[pieces].ravel() >= first, fastest, 0.0)[:, None]
 
 
 def _rows(x: Array, v: Array) -> Array:

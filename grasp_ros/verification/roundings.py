@@ -20,7 +20,7 @@ DIED_OUT = 1e-150  # m or m/s: nothing is said about the digits of such motions
 class Sizes(NamedTuple):
     """What roundings are relative to, (k, 1, 3) by body."""
 
-    x: Array  # m, in the segment; in a contact also x_o, because x_o and u are carried and x of the arms follows
+    x: Array  # m, in the segment; in a contact also that of x_o, because x_o and u are carried, and x of arms follows
     v: Array  # m/s, in the piece
 
 
@@ -37,6 +37,7 @@ class Impacts(NamedTuple):
     noise: Array  # of u by rounding of the positions, m
     noise_d: Array  # of u', m/s
     bounce: Array  # (k, 1): mu times the speed of an impact of the segment's energy, kg m/s
+    sudden: Array  # (k,): of that, what the pair exchanges within a rounding of the time after a touch
 
 
 def walk(run: Trajectory, parts: int) -> float:
@@ -79,7 +80,7 @@ def sizes(detail: Detail) -> Sizes:
     for side in detail.run.scene.system.contacts:
         u = (1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])
         touching |= (u >= 0.0).any(axis=1)
-    near = np.where(touching, np.abs(detail.x[..., OBJECT]).max(axis=1), 0.0)[:, None, None]
+    near = np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None]
     v = np.abs(detail.v).max(axis=1, keepdims=True)
     v = v + np.minimum(swing, gained) + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
     return Sizes(np.maximum(own, near) + DIED_OUT / EPS, v + DIED_OUT / EPS)
@@ -170,4 +171,7 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     bounce = mu[:, None] * np.sqrt(largest_in_segment(detail, speed2))[:, None]
     after = (detail.pieces.kind[1:] & FIRST > 0)[:, None]  # the state at an event has the roundings of the way to it
     bounce[1:] = np.where(after, np.maximum(bounce[1:], bounce[:-1]), bounce[1:])
-    return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce)
+    late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)
+    reached = np.minimum(bounce[:, 0], late * impact_force(contact, late * fastest, fastest))
+    sudden = np.where(detail.pieces.kind & FIRST > 0, reached, 0.0)
+    return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce, sudden)
