@@ -16,9 +16,8 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Product
 from grasp_ros.verification.relations import SWAPPED, mirrored, scaled
-from grasp_ros.verification.roundings import TINY, largest
+from grasp_ros.verification.roundings import TINY, UNDERFLOW, largest
 
-UNDERFLOW = 1e-100  # motions below lose digits in squares and powers 5/2, in other units others
 UNITS = 4.0, 2.0, 0.5  # of length, time and mass
 PERIODS = 16, 64, 256  # control periods in runs that tend to continuous feedback
 LONGEST = 1e4  # s, of such runs: a control period has its limit

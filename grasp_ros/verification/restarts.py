@@ -36,6 +36,7 @@ from grasp_ros.verification.deadline import Deadline, deadline
 from grasp_ros.verification.relations import FLIP
 from grasp_ros.verification.roundings import (
     TINY,
+    UNDERFLOW,
     Impacts,
     accelerations,
     impact_speed,
@@ -75,7 +76,8 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     there = [COLUMN[body] + k for body in detail.run.scene.system.present for k in (0, 1)]
     scale = sizes(detail)
     whole, size = _rows(detail.x[pieces], detail.v[pieces]), _rows(scale.x[first], scale.v[first])[0]
-    again, *nudged = (_restart(detail, first, whole[0] + nudge * size * pattern, times - start, product)
+    moves = np.where(NUDGE * size > UNDERFLOW, size, 0.0)  # what rests stays at rest
+    again, *nudged = (_restart(detail, first, whole[0] + nudge * moves * pattern, times - start, product)
                       for nudge, pattern in ((0.0, PATTERN), (NUDGE, PATTERN), (-NUDGE, PATTERN), (NUDGE, OTHER)))
     grown = np.max([np.abs(other - again) for other in nudged], axis=0) * (EPS / NUDGE)
     reached = np.abs(whole)
