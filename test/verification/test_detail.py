@@ -266,5 +266,5 @@ def test_an_exception_is_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         raise OverflowError("too large")
 
     monkeypatch.setattr(fuzz, "examine", fail)
-    assert fuzz.run(0, tmp_path, draws=2) == 2
+    assert fuzz.run(0, tmp_path, draws=2).broken == 2
     assert len(list(tmp_path.glob("traceback_OverflowError*.yaml"))) == 2
