@@ -55,6 +55,12 @@ _STATUS = {
 }
 
 
+def check_accuracy(accuracy: float) -> None:
+    """Raise `Refused` if the first neglected term of a contact, relative, is outside its range."""
+    if not FINEST <= accuracy <= COARSEST:
+        raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+
+
 class Integrator:
     """Integrates one system from its initial state, over intervals of any length.
 
@@ -81,8 +87,7 @@ class Integrator:
         self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = MAX_EVENTS,
         max_work: int = MAX_WORK,
     ) -> None:
-        if not FINEST <= accuracy <= COARSEST:
-            raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+        check_accuracy(accuracy)
         state = system.state
         if state.shape != (6,) or not np.isfinite(state).all():
             raise Refused(f"state: {state!r} is not an array of six finite numbers")

@@ -44,8 +44,8 @@ MAX_PASSES = 100
 
 
 @kernel
-def own_factors(f: Array, c: Array, n: int, k: int, side: Body, a: int, loss: float) -> None:
-    """Coefficients k of W, U W, 1 + p u' and their product."""
+def own_factors(f: Array, c: Array, n: int, k: int, side: Body, a: int, loss: float, stride: int) -> None:
+    """Coefficients k of W, U W, 1 + p u' and their product; only every `stride`-th coefficient is not 0."""
     root, cube, damped = rows_of(n, side)
     front, back = rate_lanes(side)
     forces = damped + n + 1
@@ -55,15 +55,15 @@ def own_factors(f: Array, c: Array, n: int, k: int, side: Body, a: int, loss: fl
     if k == 0:
         f[root] = math.sqrt(total)
     else:
-        for j in range(1, k):
+        for j in range(stride, k, stride):
             total -= f[root + j] * f[root + k - j]
         f[root + k] = total / (2.0 * f[root]) if f[root] > 0.0 else 0.0  # what has underflowed pushes nothing
     cubed = 0.0
-    for j in range(k + 1):
+    for j in range(0, k + 1, stride):
         cubed += c[LANES * (j + a) + lane] * f[root + k - j]
     f[cube + k] = cubed
     force = 0.0
-    for j in range(k + 1):
+    for j in range(0, k + 1, stride):
         force += f[cube + j] * f[damped + k - j]
     f[forces + k] = force
 
@@ -91,17 +91,19 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
     of what pushes the object, N.
     """
     c, f, pairs = start.c, start.f, plant.pairs
-    for i in range(LANES * (n + 1)):
-        c[i] = 0.0
+    c[:] = 0.0
+    f[:] = 0.0
     for lane in range(LANES):
         c[lane] = y[lane]
     begin_l, begin_r = abs(left), abs(right)  # what stands before the first power is rounding
-    for k in range(n + 1 - POWERS):
+    # With whole powers of t in u all forces are powers of its square root: s^(3a/2), a = 4, 8 ...
+    stride = 2 if max(left, 0) % POWERS == 0 and max(right, 0) % POWERS == 0 else 1
+    for k in range(0, n + 1 - POWERS, stride):
         for side in (LEFT, RIGHT):
             a = left if side == LEFT else right
             own = k - 3 * a // 2
             if a >= 0 and own >= 0:
-                own_factors(f, c, n, own, side, a, pairs[side, DISSIPATION])
+                own_factors(f, c, n, own, side, a, pairs[side, DISSIPATION], stride)
         force_l = pairs[LEFT, HERTZIAN] * force_of(f, n, k, LEFT, left)
         force_r = pairs[RIGHT, HERTZIAN] * force_of(f, n, k, RIGHT, right)
         share = POWERS * scale / (k + POWERS)

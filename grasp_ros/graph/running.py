@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from grasp_ros.exact.integrator import ACCURACY, COARSEST, FINEST
+from grasp_ros.exact.integrator import ACCURACY, check_accuracy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
 
@@ -42,8 +42,7 @@ class Running:
     reactions: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if not FINEST <= self.accuracy <= COARSEST:
-            raise Refused(f"accuracy: {self.accuracy!r} is outside [{FINEST}, {COARSEST}]")
+        check_accuracy(self.accuracy)
         for name, value in {f"{side}_timeout_s": seconds for side, seconds in self.timeouts.items()}.items():
             if not 0.0 < value < math.inf:
                 raise Refused(f"{name}: {value!r} is not allowed; allowed: a number > 0")

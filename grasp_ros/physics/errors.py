@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from traceback import extract_tb
+
 LONGEST = 4000  # characters of a sentence
 
 
 def printable(text: str) -> str:
     """A text that does nothing to a terminal: control characters as their escapes, lines as they are."""
     return "".join(sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1] for sign in text)
+
+
+def place_of(error: BaseException) -> str:
+    """Where an exception was raised: "file, line n"."""
+    place = extract_tb(error.__traceback__)[-1]
+    return f"{place.filename}, line {place.lineno}"
 
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package

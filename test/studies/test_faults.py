@@ -13,7 +13,7 @@ from grasp_ros.studies.faults import run
 from grasp_ros.studies.faults.output import Output, plain
 from grasp_ros.studies.faults.verdict import Evidence, Verdict
 
-GOOD = Evidence(said="it is gone", noticed=0.5, ended=1.0, exits={"grasp run": 1}, kept=99, published=100)
+GOOD = Evidence(said="it is gone", noticed=0.5, exits={"grasp run": 1})
 
 
 @pytest.mark.slow

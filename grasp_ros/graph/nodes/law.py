@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from traceback import extract_tb
-
 from grasp_ros.physics.control import ControlLaw, limited, measured
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, place_of
 from grasp_ros.scene.own_law import begin, find_law
 
 
@@ -45,7 +43,6 @@ class OwnLaw:
         try:
             force = float(self._law(tick, time, x, v))
         except Exception as error:  # whatever a user's code may raise
-            place = extract_tb(error.__traceback__)[-1]
-            where = f"{place.filename}, line {place.lineno}"
-            raise Refused(f"law: {self.words}: {type(error).__name__}: {error}, at tick {tick}, {where}") from error
+            words = f"{type(error).__name__}: {error}, at tick {tick}, {place_of(error)}"
+            raise Refused(f"law: {self.words}: {words}") from error
         return float(limited(row, force))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
@@ -13,7 +12,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.graph.nodes.node import GraspNode
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, place_of
 
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
 POLL_SECONDS = 0.2  # a spin without a time limit burns a core and can hang
@@ -37,8 +36,7 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
             print(error, file=sys.stderr)
         return 2
     except Exception as error:  # a fault of this package: in one line, and where
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        words = f"{type(error).__name__}: {error}, in {place.filename}, line {place.lineno}"
+        words = f"{type(error).__name__}: {error}, in {place_of(error)}"
         with suppress(OSError):
             print(f"{', '.join(node.get_name() for node in nodes)}: a fault of this package: {words}", file=sys.stderr)
         return 1

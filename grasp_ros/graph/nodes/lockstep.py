@@ -22,7 +22,6 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
 REPEAT_SECONDS = 1.0
-HEAD = 12  # bytes of a message up to its stamp
 NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
 
@@ -121,7 +120,8 @@ class Lockstep:
             self.advance()
 
     def _on_lyapunov(self, cdr: bytes) -> None:
-        tick, rest = divmod(messages.raw_stamp_ns(cdr), self._plant.scene.period_ns) if len(cdr) > HEAD else (0, 1)
+        stamp = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
+        tick, rest = divmod(stamp, self._plant.scene.period_ns)
         if rest or not self._recorded <= tick <= self._plant.tick:
             self._plant.refuse("refused records", LYAPUNOV)
             return
@@ -133,7 +133,7 @@ class Lockstep:
         plant = self._plant
         resetting, ahead = self._steering.reset_due, self._ahead
         self._let_go_on(not ahead and (resetting or not self._steering.stands))
-        if self._refused or not plant.started or plant.finished or ahead or not self._complete:
+        if self._refused or not plant.begun or plant.finished or ahead or not self._complete:
             return
         several = [topic for topic, source in self._inputs.items() if source.get_publisher_count() > 1]
         if any(len(plant.living(topic)) > 1 for topic in several):

@@ -39,6 +39,7 @@ _LENGTH, _NUMBER = struct.Struct("<I"), struct.Struct("<d")
 _CDR_HEADER = 4
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
+UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
 FRAME = "line"  # in which the forces are given: x along the line on which all moves
 
 

@@ -175,7 +175,7 @@ class Monitor(PeerNode):
             message = deserialize_message(cdr, JointState)
             numbers = dict(zip(message.name, message.position, strict=True))
             self._judge.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
-        except (Refused, RuntimeError, ValueError) as error:  # the last two: what is no such message
+        except messages.UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", CHANGES[side])
             self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
 
@@ -202,9 +202,7 @@ class Monitor(PeerNode):
         now = self.counters["ticks"]
         self._stuck = self._stuck + 1 if now == self._seen else 0
         self._seen = now
-        if self._recorder is None:
-            return
-        if self._stuck >= GIVE_UP_REPORTS:
+        if self._recorder is not None and self._stuck >= GIVE_UP_REPORTS:
             self._drain(patient=False)
 
     def _complete(self, tick: Tick) -> None:

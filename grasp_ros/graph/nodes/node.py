@@ -154,7 +154,7 @@ class GraspNode(Node):
         def decode(cdr: bytes) -> None:
             try:
                 message = deserialize_message(cdr, kind)
-            except (RuntimeError, ValueError):  # ValueError: a text that is no UTF-8
+            except messages.UNREADABLE:
                 self.refuse("malformed messages", topic)
                 return
             callback(message)

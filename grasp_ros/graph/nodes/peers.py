@@ -167,15 +167,15 @@ class PeerNode(GraspNode):
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""
         names = self._names(need.topic, now)
-        if not names and need.topic not in self._last:  # it has not come yet
-            return None
         if not names:
+            if need.topic not in self._last:  # it has not come yet
+                return None
             if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
                 return None
-            last = self._last.get(need.topic, [])
+            last = self._last[need.topic]
             said = [sign.ended for sign in self.beats.of(last) if sign.ended]
-            words = f"{need.topic.name}: {' and '.join(last) or 'its source'} has ended"
-            return Trouble(words + "".join(f": {last}" for last in said[-1:] if last != ENDED), True, bool(said))
+            words = f"{need.topic.name}: {' and '.join(last)} has ended"
+            return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True, bool(said))
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
         patience = self.patience

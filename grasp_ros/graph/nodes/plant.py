@@ -77,7 +77,7 @@ class Plant(SteppedNode):
         compile_kernels()
         self._plant = self._new_plant()
         self.resets, self.asked = 0, math.inf
-        self._begin = math.nan
+        self._begin = math.nan  # wall time of the first state
         self.counters.update(tick=0, resets=0)
         self._bar = tqdm(
             total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=not progress, file=_Terminal()
@@ -118,11 +118,6 @@ class Plant(SteppedNode):
     def tick(self) -> int:
         """Control periods done since the start or the last reset."""
         return self._plant.tick
-
-    @property
-    def started(self) -> bool:
-        """Whether the first state has been published."""
-        return not math.isnan(self._begin)
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant."""

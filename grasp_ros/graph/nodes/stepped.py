@@ -33,11 +33,6 @@ class SteppedNode(PeerNode):
     def tick(self) -> int:
         """Control periods done since the start or the last reset."""
 
-    @property
-    @abstractmethod
-    def started(self) -> bool:
-        """Whether the first state has been published."""
-
     @abstractmethod
     def repeat(self) -> None:
         """Publish the current state again: something on the way to or from those who answer it was lost."""

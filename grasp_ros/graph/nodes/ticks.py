@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from enum import Enum
@@ -84,7 +83,7 @@ class Ticks:
             if stamp % self._period_ns or not 0 <= stamp <= self._end_ns:
                 return Arrival.STAMP
             return self._put_state(stamp, cdr) if topic == JOINT_STATES else self._put_other(topic, stamp, cdr)
-        except (struct.error, ValueError, RuntimeError):  # the last of what rmw cannot decode
+        except messages.UNREADABLE:
             return Arrival.REFUSED
 
     def _put_state(self, stamp: int, cdr: bytes) -> Arrival:

@@ -96,19 +96,19 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     over = _over(stage)
     went_on = not over and _goes_on(stage, struck, reached)
     hung = not over and not went_on
-    ended = math.nan if went_on or hung else time.monotonic()
     asked = time.monotonic()
-    left = _close(stage, wait=math.isfinite(ended))
+    left = _close(stage, wait=not (went_on or hung))
     evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, asked=drill.asked,
-                        ended=ended - begin, nothing_to_keep=drill.nothing_to_keep)
+                        nothing_to_keep=drill.nothing_to_keep)
     _read_words(evidence, stage, called, asked if went_on or hung else math.inf)
     evidence.noticed = max(evidence.noticed - (begin - called), 0.0)
     evidence.exits = {name: process.returncode for name, process in stage.started.items()
                       if name.split()[-1] in TERMINALS and process.returncode is not None}
     evidence.shared = sum(Path(name).exists() for name in shared - stage.shared_memory())
     if drill.by_itself:  # counts from when it was noticed, and what had been recorded by then
-        evidence.noticed *= 0.0
         begin = -math.inf
+        if math.isfinite(evidence.noticed):
+            evidence.noticed = 0.0
     _read_bag(evidence, stage, struck if went_on else begin)
     return evidence
 
@@ -171,7 +171,6 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
 
 def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
     """What was kept: of all ticks that the plant had published before the accident."""
-    evidence.published = stage.published
     if evidence.nothing_to_keep:
         return
     try:
@@ -182,12 +181,11 @@ def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
         else:
             evidence.wrong, evidence.lost = plain(str(error), [stage.place]), math.inf
         return
-    evidence.kept = int(recording.tick[-1])
     gone = {name: number for name, number in recording.missing.items() if number}
     found = verify(recording)
     if found.difference is not None or (found.problem and not gone):
         evidence.wrong = found.words
-    evidence.lost = _seconds_from(stage, _first_gap(recording) if gone else evidence.kept + 1, accident)
+    evidence.lost = _seconds_from(stage, _first_gap(recording) if gone else int(recording.tick[-1]) + 1, accident)
 
 
 def _seconds_from(stage: Stage, tick: int, accident: float) -> float:

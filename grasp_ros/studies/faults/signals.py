@@ -106,7 +106,7 @@ def _at_other_moments() -> list[Drill]:
         Drill("kill-run-while-starting", group, "SIGKILL of `grasp run` while its nodes start", Stage.run,
               _run_while_starting, settle=False, nothing_to_keep=True),
         Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
-              partial(Stage.run), partial(send, name="left_controller", number=signal.SIGKILL)),
+              _free_running, partial(send, name="left_controller", number=signal.SIGKILL)),
         Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
               partial(send, name="together", number=signal.SIGKILL), seen=LYAPUNOV),
         Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,

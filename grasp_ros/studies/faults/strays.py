@@ -6,7 +6,6 @@ import os
 import signal
 import time
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from grasp_ros.scene.topics import FORCE, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, NAMED_LIST, RUN, SCENE, Topic
@@ -144,7 +143,3 @@ def _other_scene(stage: Stage) -> None:
     stage.node("plant", scene="arm_alone")
     stage.wait(lambda: stage.ended("plant"), 20.0)
 
-
-def owned(stage: Stage) -> bool:
-    """Whether a text has been taken for code."""
-    return Path(stage.place / "owned").exists()

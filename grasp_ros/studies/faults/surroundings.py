@@ -189,8 +189,7 @@ def _power_cut(stage: Stage) -> Evidence:
         if count < kept or recording.state.tobytes() != run.state[:count].tobytes():
             wrong = f"wrong at byte {size}"
         kept = count
-    return Evidence(said="each opens with all ticks of its whole chunks", went_on=True, kept=kept, published=kept,
-                    wrong=wrong)
+    return Evidence(said="each opens with all ticks of its whole chunks", went_on=True, wrong=wrong)
 
 
 def _damaged(stage: Stage) -> Evidence:

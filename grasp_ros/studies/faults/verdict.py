@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-NOTICE_SECONDS = 2.0  # the promise: this, or the patience that was set
+NOTICE_SECONDS = 2.0  # the promise
 SLACK_SECONDS = 1.0  # for a machine on which two drills run at a time
 LOST_SECONDS = 0.2  # of recording
 
@@ -38,12 +38,10 @@ class Evidence:
     ----------
     said : str
         The last sentence that a user sees; empty: none.
-    noticed, ended : float, s
-        From the accident to the first sentence or report, and to the end of the run; NaN: never.
+    noticed : float, s
+        From the accident to the first sentence or report; NaN: never.
     exits : dict of str to int
         Exit statuses by process.
-    kept, published : int
-        The last tick in the bag, and the last that had been published; -1: none.
     lost : float, s
         Wall time before the accident from which nothing is in the bag.
     went_on, hung : bool
@@ -59,15 +57,11 @@ class Evidence:
         Whether a user has ended the run: that takes as long as it takes to close it.
     nothing_to_keep : bool
         Whether the bag itself was taken away, or there was none.
-    patience : float, s
     """
 
     said: str = ""
     noticed: float = float("nan")
-    ended: float = float("nan")
     exits: dict[str, int] = field(default_factory=dict)
-    kept: int = -1
-    published: int = -1
     lost: float = 0.0
     went_on: bool = False
     hung: bool = False
@@ -79,7 +73,6 @@ class Evidence:
     asked: bool = False
     nothing_to_keep: bool = False
     skipped: str = ""
-    patience: float = NOTICE_SECONDS
 
     @property
     def verdict(self) -> Verdict:
@@ -90,6 +83,6 @@ class Evidence:
             Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
             Verdict.LOST: not self.nothing_to_keep and self.lost > LOST_SECONDS,
             Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent,
-            Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= self.patience + SLACK_SECONDS,
+            Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= NOTICE_SECONDS + SLACK_SECONDS,
         }
         return next((verdict for verdict, holds in found.items() if holds), Verdict.SENTENCE)
