@@ -132,8 +132,11 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
 
 @kernel
 def glides(plant: Plant, state: State, side: Body) -> bool:
-    """Whether nothing moves a pair off u' = -1/p: its own motion never differs, and the other pair does not push."""
-    if state.mode[other(side)] == Pair.CONTACT:
+    """Whether nothing moves a pair off u' = -1/p: its own motion never differs, and the other pair will not push.
+
+    One that is clamped may, and in a symmetric grasp both must be treated alike at one instant.
+    """
+    if state.mode[other(side)] in (Pair.CONTACT, Pair.CLAMPED):
         return False
     return first_difference(plant, state.y, side, 0.0, 0.0, HIGHEST).order == NEVER
 

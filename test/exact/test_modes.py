@@ -69,7 +69,7 @@ def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float
 
 
 @SIDES
-@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.CLAMPED])
+@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT])
 def test_a_pair_that_glides_on_the_surface_leaves_without_an_event(side: Body, beside_mode: Pair) -> None:
     b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode)
     make_transition(b.plant, b.state, side, Transition.CLAMP, b.out)
