@@ -12,10 +12,9 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 demo: install
 	$(BIN)/grasp run case_01
 
-# All tests, some minutes, those with processes of their own one after the other; `pytest -m "not slow"` runs those that take seconds.
+# All tests, some minutes; `pytest -m "not slow"` runs those that take seconds.
 test: lint
-	$(BIN)/pytest -n 2 --dist loadfile --ignore=test/graph
-	$(BIN)/pytest test/graph
+	$(BIN)/pytest -n 2 --dist loadfile
 
 lint: install
 	$(BIN)/ruff check .

@@ -92,11 +92,14 @@ def add_fuzz(commands: Any) -> Parser:
     sub.add_argument("--first", type=int, default=0, help="number of the first draw (default 0)")
     sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
     sub.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    sub.add_argument("--page", type=Path, metavar="FILE.md", help="write the counts as a page, too; what is known from"
+                                                                  " an earlier run into DIRECTORY is not drawn again")
     add_output(sub, "DIRECTORY", "where scenes that fail are written (default fuzz)", Path("fuzz"))
     return sub
 
 
 def _fuzz(options: argparse.Namespace) -> int:
+    from grasp_ros.studies import random_scenes
     from grasp_ros.verification import fuzz
 
     seconds = _seconds(options.seconds, options.draws)
@@ -105,9 +108,12 @@ def _fuzz(options: argparse.Namespace) -> int:
         if value is not None and value < least:
             raise Refused(f"--{name} {value} is not allowed; allowed: a whole number >= {least}")
     prepare()
-    broken = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
-                      jobs=options.jobs)
-    return 1 if broken else 0
+    memory = None if options.page is None else random_scenes.Kept(options.output, options.seed)
+    book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
+                    jobs=options.jobs, memory=memory)
+    if options.page is not None:
+        random_scenes.write_page(options.page, options.seed, options.first, book)
+    return 1 if book.broken else 0
 
 
 def _seconds(seconds: float | None, count: int | None) -> float | None:

@@ -165,6 +165,24 @@ def place_free(flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: flo
 
 
 @inlined
+def gap_shows(row: Array, t: float, x_before: float, x: float, x_o: float) -> bool:
+    """Whether places tell u of an arm better than a series that its damper has made coarse in t s.
+
+    They do where it is far from the object, or has come far.
+    """
+    return row[DAMPING] * t > row[MASS] and 2.0 * max(abs(x - x_o), abs(x - x_before)) >= max(abs(x), abs(x_o))
+
+
+@inlined
+def part_free(plant: Plant, flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: float, y: Array) -> None:
+    """Let u of damped arms that have flown for t s follow their places, or roundings of the series add up in it."""
+    if flies_l and gap_shows(plant.bodies[LEFT], t, free[0].x, y[X_L], y[X_O]):
+        y[U_L] = y[X_L] - y[X_O]
+    if flies_r and gap_shows(plant.bodies[RIGHT], t, free[1].x, y[X_R], y[X_O]):
+        y[U_R] = y[X_O] - y[X_R]
+
+
+@inlined
 def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, bool], free: tuple[Flight, Flight],
             state: State, out: Output) -> None:
     """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
@@ -207,6 +225,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
     write_state(at, y[U_L], y[U_R], y)
     place_free(flies[0], flies[1], free, t, y)
+    part_free(plant, flies[0], flies[1], free, t, y)
     keep_resting(state)
     deliver(tables, step, s, t, flies, free, state, out)
     tick(state.clock, t)

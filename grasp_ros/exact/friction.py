@@ -65,7 +65,7 @@ def push_on_object(plant: Plant, state: State) -> Push:
     This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
     by more than the rounding. Of 1 + p u', which may have cancelled, the terms count.
     """
-    total, size = 0.0, abs(plant.given[OBJECT, FORCE]) + plant.coulomb
+    total, size = 0.0, 0.0  # of both sides first, for mirror images
     for side in (LEFT, RIGHT):
         if state.mode[side] == Pair.CONTACT:
             loss = plant.pairs[side, DISSIPATION]
@@ -74,7 +74,8 @@ def push_on_object(plant: Plant, state: State) -> Push:
             force = elastic * damping_factor(loss, approach(state.y, side))
             size += elastic * (1.0 + loss * (abs(state.y[front]) + abs(state.y[back])))
             total += force if side == LEFT else -force
-    return Push(total + plant.given[OBJECT, FORCE], ROUNDINGS * size)
+    given = plant.given[OBJECT, FORCE]
+    return Push(total + given, ROUNDINGS * (size + (abs(given) + plant.coulomb)))
 
 
 @inlined

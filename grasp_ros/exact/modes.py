@@ -15,12 +15,12 @@ The object, by dry friction:
       RIGHTWARD, LEFTWARD --STICK v to 0, push within F--> STUCK --SLIP push beyond F--> RIGHTWARD, LEFTWARD
 
 A mode is frozen within a segment, which calls `make_transitions` at its end. An event counts in (0, t] of a segment,
-once, and never again from an exact zero. At an event, u = 0 and v_o = 0 are set exactly.
-Where a pair is on the edge of a mode, at u = 0 or u' = -1/p, one rule decides: the first derivative that differs from
-zero by more than its rounding (`mode_of`). At u = u' = 0 that is one of the orders 2 to 6 of u, with the force of the
-other pair (`rest.leaning`): pressed together it is CONTACT, which `start.start_segment` begins without leaving anything
-out; parted it is OPEN; where none differs it is RESTING, and arm and object move together. An object at rest sticks if
-friction can balance what pushes it; stuck it is a wall. The rule is the same
+once, and never again from an exact zero. At an event, u = 0 and v_o = 0 are set exactly. Where a pair is on the edge of
+a mode, at u = 0 or u' = -1/p, one rule decides: the first derivative that differs from zero by more than its rounding
+(`mode_of`). At u = u' = 0 that is one of the orders 2 to 6 of u, with the force of the other pair (`rest.leaning`):
+pressed together it is CONTACT, which `start.start_segment` begins without leaving anything out; parted it is OPEN;
+where none differs it is RESTING, and arm and object move together. An object at rest sticks if friction can balance
+what pushes it but for the rounding of its terms (`push_on_object`); stuck it is a wall. This holds
 
 * at the start: for pairs, object, and pairs again, as friction lets them; no events (`initial_modes`, `initial_slide`);
 * at events and between segments: for pairs at rest without force, which an event beside may press (`settle_resting`),
@@ -28,7 +28,8 @@ friction can balance what pushes it; stuck it is a wall. The rule is the same
 * at ticks: for the object, and pairs that are LEAVING or about to begin from rest (`begin_interval`).
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
-one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse.
+one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse; and so does a
+pair whose force dies out at u' = -1/p, where nothing else moves it off that surface.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, rate_lanes, relative_motion, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, impact_beside, is_negligible, leaning
+from grasp_ros.exact.rest import NEVER, glides, impact_beside, is_negligible, leaning, turn_back
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EPS,
@@ -148,13 +149,14 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
 
 @kernel
 def settle(state: State, side: Body, following: Pair, out: Output) -> None:
-    """Give a pair its mode anew, and record a touch or a release if it was not, or is no longer, in contact."""
+    """Give a pair its mode anew, and record it if that opens or closes it, or if one that was leaving is clamped."""
     mode, y = state.mode, state.y
-    before = is_closed(mode[side])
+    before, left = is_closed(mode[side]), mode[side] == Pair.LEAVING
     mode[side] = following
     if is_closed(following) != before:
-        kind = Transition.RELEASE if before else Transition.TOUCH
-        record(state, side, kind, y[U_L + side], approach(y, side), out)
+        record(state, side, Transition.RELEASE if before else Transition.TOUCH, y[U_L + side], approach(y, side), out)
+    elif left and following == Pair.CLAMPED:
+        record(state, side, Transition.CLAMP, y[U_L + side], approach(y, side), out)
 
 
 @inlined
@@ -199,18 +201,19 @@ def make_transitions(plant: Plant, state: State, left: Candidate, right: Candida
                      out: Output) -> None:
     """Make all transitions within a few roundings of the end of a segment."""
     if left.when <= end * TOGETHER:
-        make_transition(state, LEFT, left.what, out)
+        make_transition(plant, state, LEFT, left.what, out)
     if right.when <= end * TOGETHER:
-        make_transition(state, RIGHT, right.what, out)
+        make_transition(plant, state, RIGHT, right.what, out)
     if slide.when <= end * TOGETHER:
         make_slide_transition(plant, state, slide.what, out)
 
 
 @kernel
-def make_transition(state: State, side: Body, kind: Transition, out: Output) -> None:
+def make_transition(plant: Plant, state: State, side: Body, kind: Transition, out: Output) -> None:
     """The reset map of a pair: its next mode, u = 0 at a touch and a release, and the record of the event.
 
-    A touch whose u' has been lost to rounding finds a pair at rest: it is `settle_resting` that decides.
+    A touch whose u' has been lost to rounding finds a pair at rest: it is `settle_resting` that decides. What looks
+    like a CLAMP of a pair that glides at u' = -1/p, which it never passes, is rounding: it is LEAVING.
     """
     y, mode, d = state.y, state.mode, approach(state.y, side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
@@ -219,6 +222,11 @@ def make_transition(state: State, side: Body, kind: Transition, out: Output) -> 
     if kind == Transition.TOUCH and d <= 0.0:
         y[velocity_lane(side)] = y[V_O]
         return
+    if kind == Transition.CLAMP and glides(plant, state, side):
+        mode[side] = Pair.LEAVING
+        return
+    if kind == Transition.TOUCH:
+        turn_back(state, side)
     if kind == Transition.RELEASE:
         mode[side] = Pair.OPEN
     else:

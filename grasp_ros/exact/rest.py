@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.impact import damping_factor, elastic_force
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, bound, derivatives, other, reduced_mass, relative_motion
 from grasp_ros.exact.records import Array, Leaning, Plant, State
 from grasp_ros.physics.layout import (
@@ -128,6 +128,25 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
     if plant.bodies[OBJECT, MASS] == math.inf and force > DOUBT * plant.coulomb:
         return False
     return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
+
+
+@kernel
+def glides(plant: Plant, state: State, side: Body) -> bool:
+    """Whether nothing moves a pair off u' = -1/p: its own motion never differs, and the other pair will not push.
+
+    One that is clamped may, and in a symmetric grasp both must be treated alike at one instant.
+    """
+    if state.mode[other(side)] in (Pair.CONTACT, Pair.CLAMPED):
+        return False
+    return first_difference(plant, state.y, side, 0.0, 0.0, HIGHEST).order == NEVER
+
+
+@inlined
+def turn_back(state: State, side: Body) -> None:
+    """A pair that is leaving is in contact again where the other one, `side`, touches: its force may turn it back."""
+    beside = other(side)
+    if state.mode[beside] == Pair.LEAVING:
+        state.mode[beside] = Pair.CONTACT
 
 
 @kernel

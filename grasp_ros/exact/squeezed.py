@@ -12,7 +12,7 @@ import math
 
 from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, motion_of
-from grasp_ros.exact.contact import free_flight, place_free, write_state
+from grasp_ros.exact.contact import free_flight, part_free, place_free, write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.friction import slide_in_contact, slip_candidate
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
@@ -146,6 +146,7 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     y[U_L], y[U_R] = at[U_L], at[U_R]
     write_state(at, y[U_L], y[U_R], y)
     place_free(flies[0], flies[1], free, t, y)
+    part_free(plant, flies[0], flies[1], free, t, y)
     keep_resting(state)
     tick(state.clock, t)
     leave_step(tables, s, h)

@@ -9,11 +9,11 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from tqdm import tqdm
@@ -49,11 +49,15 @@ class Tally:
 
     def add(self, check: Check, number: int) -> None:
         """Count a check."""
-        self.checked += 1
-        self.skipped += check.skipped
-        self.failures += not check.holds
-        if not check.error <= self.worst:
-            self.worst, self.where = check.error, number
+        self.merge(Tally(1, check.skipped, int(not check.holds), check.error, number))
+
+    def merge(self, other: Tally) -> None:
+        """Count those of later draws, too."""
+        self.checked += other.checked
+        self.skipped += other.skipped
+        self.failures += other.failures
+        if not other.worst <= self.worst:
+            self.worst, self.where = other.worst, other.where
 
 
 @dataclass
@@ -64,7 +68,12 @@ class Book:
     tallies: dict[str, Tally] = field(default_factory=dict)
     habits: Counter[str] = field(default_factory=Counter)
     broken_habits: Counter[str] = field(default_factory=Counter)
-    broken: int = 0
+    scenes: dict[int, str] = field(default_factory=dict)  # those that fail, YAML by number
+
+    @property
+    def broken(self) -> int:
+        """Number of scenes that fail."""
+        return len(self.scenes)
 
     def add(self, drawn: Drawn) -> None:
         """Count a draw."""
@@ -74,15 +83,28 @@ class Book:
         for check in drawn.found.checks:
             self.tallies.setdefault(check.name, Tally()).add(check, drawn.number)
         if drawn.found.broken:
-            self.broken += 1
+            self.scenes[drawn.number] = drawn.yaml
             self.broken_habits.update(names)
+
+    def merge(self, other: Book) -> None:
+        """Count later draws, too."""
+        self.ends.update(other.ends)
+        self.habits.update(other.habits)
+        self.broken_habits.update(other.broken_habits)
+        self.scenes.update(other.scenes)
+        for name, tally in other.tallies.items():
+            self.tallies.setdefault(name, Tally()).merge(tally)
+
+    def by_failures(self) -> list[tuple[str, Tally]]:
+        """All properties, those that fail most often first."""
+        return sorted(self.tallies.items(), key=lambda item: (-item[1].failures, item[0]))
 
     def show(self) -> None:
         """Print all tables."""
         for text, number in self.ends.most_common():
             print(f"  {number:8}  {text}")
         print(f"  {'checked':>8}  {'skipped':>8}  {'failures':>8}  {'worst':>8}  {'draw':>8}  property")
-        for name, tally in sorted(self.tallies.items(), key=lambda item: -item[1].failures):
+        for name, tally in self.by_failures():
             counts = f"{tally.checked:8}  {tally.skipped:8}  {tally.failures:8}"
             print(f"  {counts}  {tally.worst:8.2g}  {tally.where:8}  {name}")
         print(f"  {'drawn':>8}  {'failures':>8}  habit")
@@ -96,9 +118,22 @@ def draw(seed: int, number: int) -> Scene:
     return draw_scene(np.random.default_rng((seed, number)).random(NUMBERS).tolist())
 
 
-def check_draws(seed: int, numbers: Iterable[int]) -> list[Drawn]:
+class Memory(Protocol):
+    """What keeps the books of chunks of draws, so that a search goes on where it ended."""
+
+    def get(self, numbers: range) -> Book | None:
+        """What became of these draws, if that is known."""
+
+    def put(self, numbers: range, book: Book) -> None:
+        """Keep what became of these draws."""
+
+
+def check_draws(seed: int, numbers: Iterable[int]) -> Book:
     """Draw scenes and check them; an exception is a failure."""
-    return [_check(number, draw(seed, number)) for number in numbers]
+    book = Book()
+    for number in numbers:
+        book.add(_check(number, draw(seed, number)))
+    return book
 
 
 def _check(number: int, scene: Scene) -> Drawn:
@@ -107,13 +142,13 @@ def _check(number: int, scene: Scene) -> Drawn:
     except Exception:
         reason = traceback.format_exc().strip().splitlines()
         found = Examination("traceback", [Check(f"traceback: {reason[-1][:60]}", 1.0, 0.0)])
-    names = ", ".join(f"{check.name} {check.error:.2g}" for check in found.broken)
+    names = "; ".join(f"{check.name} {check.error:.2g}" for check in sorted(found.broken, key=lambda one: -one.error))
     yaml = f"# {number}: {names}\n{scene.to_yaml()}" if found.broken else ""
     return Drawn(number, scene.title, found, yaml)
 
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
-        jobs: int = 1) -> int:
+        jobs: int = 1, memory: Memory | None = None) -> Book:
     """Draw scenes until the time is over or enough are drawn; print what became of them, write those that fail.
 
     Parameters
@@ -127,11 +162,12 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
         Number of the first draw.
     jobs : int
         Processes.
+    memory : Memory, optional
+        What it knows is not drawn again.
 
     Returns
     -------
-    int
-        Number of scenes that fail.
+    Book
 
     Raises
     ------
@@ -140,40 +176,51 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
     """
     begin, book = time.monotonic(), Book()
     with tqdm(total=draws, unit=" draws", desc="fuzz", file=sys.stderr) as bar:
-        for chunk in _chunks(seed, draws, first, jobs):
-            for drawn in chunk:
-                book.add(drawn)
-                if drawn.yaml:
-                    _write(directory, seed, drawn, bar)
-            bar.update(len(chunk))
+        for chunk in _chunks(seed, draws, first, jobs, memory):
+            book.merge(chunk)
+            for number, yaml in chunk.scenes.items():
+                _write(directory, seed, number, yaml, bar)
+            bar.update(chunk.ends.total())
             if seconds is not None and time.monotonic() - begin > seconds:
                 break
     print(f"{book.ends.total()} scenes in {time.monotonic() - begin:.0f} s, seed {seed}")
     book.show()
-    return book.broken
+    return book
 
 
-def _chunks(seed: int, draws: int | None, first: int, jobs: int) -> Iterator[list[Drawn]]:
+def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Memory | None) -> Iterator[Book]:
+    """The books of all chunks in their order; what is new is kept in `memory`."""
     starts = count(first, CHUNK) if draws is None else range(first, first + draws, CHUNK)
     end = None if draws is None else first + draws
-    chunks = (range(start, start + CHUNK if end is None else min(start + CHUNK, end)) for start in starts)
-    if jobs == 1:
-        yield from map(partial(check_draws, seed), chunks)
-        return
-    with multiprocessing.get_context("spawn").Pool(jobs) as pool:
-        waiting = []
-        for chunk in chunks:
-            waiting.append(pool.apply_async(check_draws, (seed, chunk)))
-            if len(waiting) > 2 * jobs:
-                yield waiting.pop(0).get()
-        yield from (result.get() for result in waiting)
+    waiting: list[tuple[range, Any]] = []  # not more than the processes need
+
+    def take() -> Book:
+        asked, answer = waiting.pop(0)
+        if isinstance(answer, Book):
+            return answer
+        book: Book = check_draws(seed, asked) if answer is None else answer.get()
+        if memory is not None:
+            memory.put(asked, book)
+        return book
+
+    with multiprocessing.get_context("spawn").Pool(jobs) if jobs > 1 else nullcontext() as pool:
+        for start in starts:
+            numbers = range(start, start + CHUNK if end is None else min(start + CHUNK, end))
+            found: Any = None if memory is None else memory.get(numbers)
+            if found is None and pool is not None:
+                found = pool.apply_async(check_draws, (seed, numbers))
+            waiting.append((numbers, found))
+            if pool is None or len(waiting) > 2 * jobs:
+                yield take()
+        while waiting:
+            yield take()
 
 
-def _write(directory: Path, seed: int, drawn: Drawn, bar: Any) -> None:
-    worst = max(drawn.found.broken, key=lambda check: check.error)
-    name = re.sub(r"[^0-9A-Za-z]+", "_", worst.name).strip("_")
-    path = directory / f"{name}_{seed}_{drawn.number}.yaml"
+def _write(directory: Path, seed: int, number: int, yaml: str, bar: Any) -> None:
+    worst = yaml.splitlines()[0].split(": ", 1)[1].split("; ")[0].rsplit(" ", 1)[0]
+    name = re.sub(r"[^0-9A-Za-z]+", "_", worst).strip("_")
+    path = directory / f"{name}_{seed}_{number}.yaml"
     with writing(path):
         directory.mkdir(parents=True, exist_ok=True)
-        path.write_text(drawn.yaml, encoding="utf-8")
-    bar.write(f"{drawn.yaml.splitlines()[0]}; scene in {path}", file=sys.stderr)
+        path.write_text(yaml, encoding="utf-8")
+    bar.write(f"{yaml.splitlines()[0]}; scene in {path}", file=sys.stderr)

@@ -145,7 +145,7 @@ def _bodies(detail: Detail, pairs: list[Impacts], momentum: Array, unit: Array, 
         impulse, doubt = detail.integral(pair.force[:, 1:-1])
         noise = _total(detail, pair.by_u) * pair.noise[:, 0] + _total(detail, pair.by_d) * pair.noise_d[:, 0]
         noise = noise + doubt + EPS * (impulse + pair.bounce[:, 0]) + _wander(detail, pair.force)
-        noise = noise + EPS * detail.pieces.end * pair.force[:, [0, -1]].max(axis=1)
+        noise = noise + EPS * detail.pieces.end * pair.force[:, [0, -1]].max(axis=1) + pair.sudden
         sign = 1.0 if pair.side == LEFT else -1.0
         for body, direction in ((pair.side, sign), (OBJECT, -sign)):
             change[:, body] += direction * impulse

@@ -28,7 +28,7 @@ from grasp_ros.verification.segments import Detail, Pieces, cut, detail, grid_of
 MOST_EVENTS = 2000
 MOST_WORK = 10_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
-OUTPUTS = 201  # of a run that stalls
+OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
 SPLIT, SHORT = 4, 50  # every how many scenes a run is started anew, and compared with short control periods
 FALLS = 0.5  # part of the distance that may be left at a sixteenth of the period
@@ -88,12 +88,22 @@ def _end(run: Trajectory, product: Product) -> Check:
     """Whether a run may end like this: out of budget, or stalled where a motion has died out."""
     error = float(run.status in (Status.STALLED, Status.ENERGY_RISES))
     if run.status is Status.STALLED:
-        with suppress(Unfinished):
-            product.run(run.scene, np.linspace(0.0, run.scene.duration, OUTPUTS), run.sampled)
-        error = float(_smallest(product.runs[-1]) > DIED_OUT)
+        error = float(_smallest_at_stall(run, product) > DIED_OUT)
     if run.status is Status.NOT_FINITE and not run.sampled:
         error = 1.0
     return Check(f"ends {run.status.name}", error, 0.0)
+
+
+def _smallest_at_stall(run: Trajectory, product: Product) -> float:
+    """The smallest number before a run stalls, which outputs come closer to from round to round."""
+    begin, end = 0.0, run.scene.duration
+    for _ in range(ROUNDS):
+        grid = np.linspace(begin, end, OUTPUTS)
+        with suppress(Unfinished):
+            product.run(run.scene, grid, run.sampled)
+        reached = max(len(product.runs[-1].t), 1)
+        begin, end = grid[reached - 1], grid[min(reached, OUTPUTS - 1)]
+    return _smallest(product.runs[-1])
 
 
 def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:

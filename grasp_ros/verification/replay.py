@@ -126,9 +126,14 @@ def _at_events(detail: Detail, times: Array) -> tuple[NDArray[np.int64], NDArray
 
 
 def _pair_events(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding]:
-    """u = 0 at touch and release, u' = -1/p at the others, from the state at the recorded time."""
+    """u = 0 at touch and release, u' = -1/p at the others, from the state at the recorded time.
+
+    Of several events of the pair at the same time, less than a rounding apart, it is the state at the first.
+    """
     times, kinds = _recorded(detail, pair.side)
     piece, hit = _at_events(detail, times)
+    alone = np.diff(times, prepend=-np.inf)[hit] > 0.0
+    piece, hit = piece[alone], hit[alone]
     before = np.maximum(piece - 1, 0)  # what rounding explains comes from the way to the event
     seen = (detail.pieces.end[before] == detail.pieces.begin[piece]) | (detail.pieces.begin[piece] == 0.0)
     piece, hit, before = piece[seen], hit[seen], before[seen]

@@ -12,7 +12,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, Work
+from grasp_ros.physics.layout import (
+    DAMPING,
+    DISSIPATION,
+    EPS,
+    EVENT_KIND,
+    EVENT_TIME,
+    FORCE,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    Transition,
+    Work,
+)
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import PAPER
@@ -23,6 +36,7 @@ from grasp_ros.verification.deadline import Deadline, deadline
 from grasp_ros.verification.relations import FLIP
 from grasp_ros.verification.roundings import (
     TINY,
+    UNDERFLOW,
     Impacts,
     accelerations,
     impact_speed,
@@ -62,13 +76,15 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     there = [COLUMN[body] + k for body in detail.run.scene.system.present for k in (0, 1)]
     scale = sizes(detail)
     whole, size = _rows(detail.x[pieces], detail.v[pieces]), _rows(scale.x[first], scale.v[first])[0]
-    again, *nudged = (_restart(detail, first, whole[0] + nudge * size * pattern, times - start, product)
+    moves = np.where(NUDGE * size > UNDERFLOW, size, 0.0)  # what rests stays at rest
+    again, *nudged = (_restart(detail, first, whole[0] + nudge * moves * pattern, times - start, product)
                       for nudge, pattern in ((0.0, PATTERN), (NUDGE, PATTERN), (-NUDGE, PATTERN), (NUDGE, OTHER)))
     grown = np.max([np.abs(other - again) for other in nudged], axis=0) * (EPS / NUDGE)
     reached = np.abs(whole)
     reached[:, ::2] = np.maximum.accumulate(reached[:, ::2].max(axis=1))[:, None]  # in a contact x follows x_o
     pairs = impacts(detail, scale)
     moving = _rows(np.abs(detail.v[pieces]), accelerations(detail, pairs)[pieces])
+    moving[:, ::2] = np.maximum(moving[:, ::2], _put_at_touch(detail, pieces))
     unit = grown + EPS * (reached + size) + _late(times, whole, moving) + TINY
     unit += _noise(detail, pairs, pieces, times - start)
     unit[:, 1::2] += EPS * reached[:, ::2] * rates(detail.bodies[first])[[LEFT, OBJECT, RIGHT]]
@@ -82,6 +98,15 @@ def _beside_event(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
     near = BESIDE * t
     begins, ends = (kind & FIRST > 0) & (t - t[:, :1] <= near), (kind & LAST > 0) & (t[:, -1:] - t <= near)
     return np.asarray(begins | ends)
+
+
+def _put_at_touch(detail: Detail, pieces: slice) -> Array:
+    """Speeds (n, 1) with which a rounding of the time of a touch moves an arm, which is put where the object is."""
+    fastest = np.maximum.accumulate(np.abs(detail.v[pieces]).max(axis=2).ravel())
+    events = detail.run.event_table
+    touches = events[events[:, EVENT_KIND] == Transition.TOUCH, EVENT_TIME]
+    first = min(touches[touches > detail.pieces.begin[pieces.start]], default=np.inf)
+    return np.where(detail.t[pieces].ravel() >= first, fastest, 0.0)[:, None]
 
 
 def _rows(x: Array, v: Array) -> Array:

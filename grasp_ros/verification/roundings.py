@@ -6,22 +6,25 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, STIFFNESS, Work
+from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.segments import FIRST, Detail
 
+STEP = 5.0  # time constants of a damper within a step in contact
 TINY = 1e-280  # against 0 / 0, and for what underflows
+UNDERFLOW = 1e-100  # m or m/s: motions below lose digits in squares and powers 5/2, in other units others
 DIED_OUT = 1e-150  # m or m/s: nothing is said about the digits of such motions
 
 
 class Sizes(NamedTuple):
     """What roundings are relative to, (k, 1, 3) by body."""
 
-    x: Array  # m, in the segment; in a contact also x_o, because x_o and u are carried and x of the arms follows
-    v: Array  # m/s, in the piece
+    x: Array  # m, in the segment; in a contact also that of x_o, because x_o and u are carried, and x of arms follows
+    v: Array  # m/s, in the piece; of damped bodies in a contact also in a step before it
 
 
 class Impacts(NamedTuple):
@@ -37,6 +40,7 @@ class Impacts(NamedTuple):
     noise: Array  # of u by rounding of the positions, m
     noise_d: Array  # of u', m/s
     bounce: Array  # (k, 1): mu times the speed of an impact of the segment's energy, kg m/s
+    sudden: Array  # (k,): of that, what the pair exchanges within a rounding of the time after a touch
 
 
 def walk(run: Trajectory, parts: int) -> float:
@@ -79,10 +83,26 @@ def sizes(detail: Detail) -> Sizes:
     for side in detail.run.scene.system.contacts:
         u = (1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])
         touching |= (u >= 0.0).any(axis=1)
-    near = np.where(touching, np.abs(detail.x[..., OBJECT]).max(axis=1), 0.0)[:, None, None]
-    v = np.abs(detail.v).max(axis=1, keepdims=True)
+    near = np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None]
+    v = _before_decay(detail, np.abs(detail.v).max(axis=1), touching)[:, None]
     v = v + np.minimum(swing, gained) + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
     return Sizes(np.maximum(own, near) + DIED_OUT / EPS, v + DIED_OUT / EPS)
+
+
+def _before_decay(detail: Detail, v: Array, touching: NDArray[np.bool_]) -> Array:
+    """Speeds (k, 3), those of damped bodies in a contact no less than some time constants ago, in the same segment.
+
+    A series in time goes so far in one step, with the roundings of its begin.
+    """
+    pieces, found = detail.pieces, v.copy()
+    passed = elapsed(detail)[:, 0, 0]
+    for body in (LEFT, RIGHT, OBJECT):
+        damping, mass = detail.bodies[:, body, DAMPING], detail.bodies[:, body, MASS]
+        for k in np.flatnonzero(touching & (damping * passed > mass)).tolist():
+            since = pieces.begin[k] - STEP * mass[k] / damping[k]
+            earlier = slice(np.searchsorted(pieces.end, since), k + 1)
+            found[k, body] = (v[earlier, body] * (pieces.segment[earlier] == pieces.segment[k])).max()
+    return found
 
 
 def _with_way(detail: Detail, own: Array) -> Array:
@@ -170,4 +190,7 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     bounce = mu[:, None] * np.sqrt(largest_in_segment(detail, speed2))[:, None]
     after = (detail.pieces.kind[1:] & FIRST > 0)[:, None]  # the state at an event has the roundings of the way to it
     bounce[1:] = np.where(after, np.maximum(bounce[1:], bounce[:-1]), bounce[1:])
-    return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce)
+    late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)
+    reached = np.minimum(bounce[:, 0], late * impact_force(contact, late * fastest, fastest))
+    sudden = np.where(detail.pieces.kind & FIRST > 0, reached, 0.0)
+    return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce, sudden)

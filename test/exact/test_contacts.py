@@ -72,6 +72,13 @@ def test_simultaneous_impacts_of_any_speed(speed: float) -> None:
     assert result.integrator.events[-1].time == pytest.approx(1 + duration, rel=1e-12)
 
 
+@pytest.mark.parametrize("p", [40.0, 1e3, 1e6])
+def test_a_free_impact_is_never_clamped(p: float) -> None:
+    """It ends at p u' = -1 + exp(-(1 + p v)) or so, O2, however little of that doubles can tell."""
+    grasp = make_grasp(FREE, hertzian=1e5, p=p, object_mass=1.0)
+    assert kinds(run(grasp, [0.0, 1.0, 0.0, 0.0, 1e6, 0.0], 100.0)) == [("RELEASE", LEFT)]
+
+
 def test_the_last_impact_of_a_damped_chain_comes_late() -> None:
     """O10."""
     result = run(make_grasp(FREE, 1e4, 0.3, 1.0), [-1.0, 1.0, 0.0, 0.0, 1.0, 0.0], 100.0)

@@ -57,7 +57,7 @@ def toward(side: Body, slide: Slide) -> Slide:
 )
 def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float, d: float, u_after: float) -> None:
     b = bench(side, u, d, before, beside=(0.2, 0.1), beside_mode=Pair.CONTACT)
-    make_transition(b.state, side, kind, b.out)
+    make_transition(b.plant, b.state, side, kind, b.out)
     assert b.mode(side) is after
     assert bits(b.state.y[U_L + side]) == bits(u_after)
     assert b.events == [(side, kind)]
@@ -69,10 +69,38 @@ def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float
 
 
 @SIDES
+@pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT])
+def test_a_pair_that_glides_on_the_surface_leaves_without_an_event(side: Body, beside_mode: Pair) -> None:
+    b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode)
+    make_transition(b.plant, b.state, side, Transition.CLAMP, b.out)
+    assert (b.mode(side), b.events) == (Pair.LEAVING, [])
+
+
+@SIDES
+@pytest.mark.parametrize("options", [{"push": -1.0}, {"push": 1e-9}, {"stiffness": 1e-3}, {"object_push": 1.0}])
+def test_a_pair_that_something_moves_clamps(side: Body, options: dict[str, float]) -> None:
+    b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)  # type: ignore[arg-type]
+    make_transition(b.plant, b.state, side, Transition.CLAMP, b.out)
+    assert (b.mode(side), b.events) == (Pair.CLAMPED, [(side, Transition.CLAMP)])
+
+
+@SIDES
+@pytest.mark.parametrize(
+    ("kind", "beside_mode", "after"),
+    [(Transition.TOUCH, Pair.LEAVING, Pair.CONTACT), (Transition.TOUCH, Pair.CLAMPED, Pair.CLAMPED),
+     (Transition.RELEASE, Pair.LEAVING, Pair.LEAVING)],
+)
+def test_a_touch_turns_back_a_pair_that_leaves(side: Body, kind: Transition, beside_mode: Pair, after: Pair) -> None:
+    b = bench(side, 0.0, 0.3, beside=(0.01, -2.0), beside_mode=beside_mode)
+    make_transition(b.plant, b.state, side, kind, b.out)
+    assert (b.mode(other(side)), b.events) == (after, [(side, kind)])
+
+
+@SIDES
 @pytest.mark.parametrize("d", [0.0, -1e-9])
 def test_a_touch_whose_speed_is_lost_to_rounding_makes_a_pair_at_rest(side: Body, d: float) -> None:
     b = bench(side, 1e-17, d, object_speed=0.3, push=1.0)
-    make_transition(b.state, side, Transition.TOUCH, b.out)
+    make_transition(b.plant, b.state, side, Transition.TOUCH, b.out)
     assert b.mode(side) is Pair.OPEN
     assert is_resting(b.state.y, side)
     assert abs(b.state.y[V_O]) == 0.3
@@ -417,7 +445,8 @@ def test_pairs_that_approach_do_not_leave(side: Body) -> None:
 @SIDES
 def test_pairs_that_leave_are_in_contact_again_when_inputs_may_change(side: Body) -> None:
     b = begin(bench(side, 1e-9, -0.3, Pair.LEAVING, beside=(1e-9, -9.0), beside_mode=Pair.LEAVING))
-    assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.CONTACT, Pair.CLAMPED, [])
+    assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CLAMPED)
+    assert b.events == [(other(side), Transition.CLAMP)]
 
 
 @SIDES

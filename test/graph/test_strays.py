@@ -156,7 +156,7 @@ rclpy.spin(node)
 @pytest.mark.slow  # real processes
 @pytest.mark.parametrize("kind", [[], ["--free-running"]], ids=["lockstep", "free-running"])
 def test_a_command_beyond_the_actuator_is_named_and_does_not_act(launch: Any, tmp_path: Path, kind: list[str]) -> None:
-    words = ["saturation", "--set", "time.duration_s=0.3", "-o", "run", "--without", "left_controller", *kind]
+    words = ["saturation", "--set", "time.duration_s=3.0", "-o", "run", "--without", "left_controller", *kind]
     run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     launch(sys.executable, "-c", HARD, stderr=subprocess.DEVNULL)
     _, err = run.communicate(timeout=DEADLINE)

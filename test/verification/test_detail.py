@@ -12,7 +12,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
-from grasp_ros.verification import fuzz, restarts
+from grasp_ros.verification import fuzz, properties, restarts
 from grasp_ros.verification.cases.case import Product
 from grasp_ros.verification.companions import mirror, short_periods, units
 from grasp_ros.verification.motion import ledgers
@@ -33,6 +33,11 @@ def run(name: str, *settings: str) -> Trajectory:
 def close(first: Trajectory) -> Detail:
     """Its states at the nodes."""
     return look(first, pieces_of(first), Product())
+
+
+def fuzzed(name: str) -> Scene:
+    """A scene that the fuzzing found."""
+    return scenes.load(str(Path(__file__).parent / "fuzzed" / f"{name}.yaml"))
 
 
 def errors(detail: Detail) -> dict[str, float]:
@@ -191,6 +196,23 @@ def test_a_restarted_run_follows_the_first(good: Detail) -> None:
     assert only(splitting(shifted(good, OBJECT, 1e-10), 0.3, Product())) > LIMIT
 
 
+@pytest.mark.parametrize(("name", "part"), [("wall_put_at_a_touch", 0.4), ("arm_waits_at_zero", 0.75)])
+def test_roundings_of_the_way_to_a_touch_are_no_errors_behind_it(name: str, part: float) -> None:
+    """There the arm is put where the object is."""
+    first = Product().run(fuzzed(name), [0.0, fuzzed(name).duration])
+    assert all(error <= LIMIT for _, error in splitting(close(first), part, Product()))
+
+
+def test_distances_that_cancel_at_one_period_say_nothing() -> None:
+    first = Product().run(fuzzed("early_impact_cancels_late_one"))
+    assert [error <= properties.FALLS for _, error in short_periods(first, Product())] == [True]
+
+
+def test_a_motion_that_died_out_before_the_first_output_may_stall() -> None:
+    scene = fuzzed("dies_out_between_outputs")
+    assert [(check.name, check.holds) for check in examine(scene).checks] == [("ends STALLED", True)]
+
+
 def test_short_periods_tend_to_continuous_feedback(first: Trajectory) -> None:
     assert only(short_periods(first, Product())) == pytest.approx(1.0 / 16.0, rel=0.2)
 
@@ -245,5 +267,5 @@ def test_an_exception_is_a_failure(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         raise OverflowError("too large")
 
     monkeypatch.setattr(fuzz, "examine", fail)
-    assert fuzz.run(0, tmp_path, draws=2) == 2
+    assert fuzz.run(0, tmp_path, draws=2).broken == 2
     assert len(list(tmp_path.glob("traceback_OverflowError*.yaml"))) == 2

@@ -138,9 +138,9 @@ def test_fuzzing_counts_failures_and_writes_their_scenes(
     """The same scene over and over, first as it is, then at the coarsest accuracy."""
     scene = scenes.load("case_03", ["time.duration_s=5", "time.control_period_s=5"])
     monkeypatch.setattr(fuzz, "draw_scene", lambda numbers: scene)
-    assert fuzz.run(0, tmp_path, draws=3) == 0
+    assert fuzz.run(0, tmp_path, draws=3).broken == 0
     monkeypatch.setattr(properties, "Product", partial(Product, accuracy=1e-3))
-    failures = fuzz.run(0, tmp_path, draws=3)
+    failures = fuzz.run(0, tmp_path, draws=3).broken
     assert failures == 3
     assert capsys.readouterr().out.endswith(f"failures: {failures}\n")
     files = list(tmp_path.glob("*.yaml"))
