@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import grasp_ros
-from grasp_ros.exact.jit import sources_digest
+from grasp_ros.exact.disk import sources_digest
 from grasp_ros.simulation.versions import versions
 from grasp_ros.studies.document import prose, table, write
 from grasp_ros.studies.records import Journal, digest
