@@ -48,7 +48,7 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     system : System
     state : array (..., 6), m and m/s
         x_l, v_l, x_o, v_o, x_r, v_r; columns of bodies that are not there are not read.
-    external : array (3,), N, optional
+    external : array (3,) or (..., 3), N, optional
         External forces by body; only V' depends on them.
     feedback : bool
         False: of the plant alone, without the terms of the controllers.
@@ -180,8 +180,8 @@ def _power(system: System, bodies: Array, state: Array, external: Array | None) 
         loss = loss + bodies[body, DAMPING] * v * v
         if body == OBJECT and system.coulomb > 0.0:
             loss = loss + system.coulomb * np.abs(v)
-        if external is not None and external[body] != 0.0:
-            loss = loss - external[body] * v
+        if external is not None and np.any(push := _column(external, body)):
+            loss = loss - push * v
     return -2.0 * loss
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import grasp_ros
 from grasp_ros.exact.disk import sources_digest
-from grasp_ros.simulation.versions import versions
+from grasp_ros.scene.versions import versions
 from grasp_ros.studies.document import prose, table, write
 from grasp_ros.studies.records import Journal, digest
 from grasp_ros.verification.fuzz import Book, Tally

@@ -83,12 +83,12 @@ def test_a_bag_is_published_again_with_its_clock(
 ) -> None:
     peer, slow = node
     slow.remove_node(peer)
-    executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
-    executor.add_node(peer)
     seen: dict[str, list[int]] = {"states": [], "clock": []}
     for kind, name, rows in ((JointState, "joint_states", seen["states"]), (Clock, "/clock", seen["clock"])):
         note = partial(lambda rows, cdr: rows.append(messages.raw_stamp_ns(cdr)), rows)
         peer.create_subscription(kind, name, note, messages.qos(JOINT_STATES), raw=True)
+    executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
+    executor.add_node(peer)  # which has all its readers: a new one may be missed
     player = launch(sys.executable, "-m", "grasp_ros.cli", "replay", str(two_runs[0] / "bag"), "--rate", "3")
     begin = time.monotonic()
     while player.poll() is None:

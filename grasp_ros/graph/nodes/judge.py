@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,25 @@ class Announcement(NamedTuple):
     time_ns: int
     numbers: Mapping[str, float]
     cdr: bytes  # as it came
+
+
+class Seen(NamedTuple):
+    """What there is to judge of a tick.
+
+    Attributes
+    ----------
+    time_ns : int
+    state : array (6,), m and m/s
+    inputs : array (3,), N by body
+        Forces of the controllers over the last period.
+    commands : mapping of str to float, N
+        Answers to this state, by side.
+    """
+
+    time_ns: int
+    state: Array
+    inputs: Array
+    commands: Mapping[str, float]
 
 
 class Judge:
@@ -73,6 +92,14 @@ class Judge:
         self._known.clear()
         self._acting = dict.fromkeys(self._acting, -1)
 
+    def _is_due(self, side: str, time_ns: int) -> bool:
+        waiting = self._waiting[side]
+        return bool(waiting) and self._acting[side] < waiting[0].time_ns <= time_ns
+
+    def changes(self, time_ns: int) -> bool:
+        """Whether a law begins to act at a time."""
+        return any(self._is_due(side, time_ns) for side in self._waiting)
+
     def begin(self, time_ns: int) -> list[tuple[str, bytes]]:
         """Let the laws act that were announced up to a time.
 
@@ -81,7 +108,7 @@ class Judge:
         """
         begun = []
         for side, waiting in self._waiting.items():
-            while waiting and self._acting[side] < waiting[0].time_ns <= time_ns:
+            while self._is_due(side, time_ns):
                 announcement = waiting.popleft()
                 self._acting[side] = announcement.time_ns
                 self._known.add(side)
@@ -90,38 +117,43 @@ class Judge:
                 begun.append((side, announcement.cdr))
         return begun
 
-    def judge(self, time_ns: int, state: Array, inputs: Array, commands: Mapping[str, float]) -> list[float]:
-        """What `lyapunov` publishes at a tick, see `topics.LYAPUNOV_NAMES`.
+    def judge(self, seen: Sequence[Seen]) -> list[list[float]]:
+        """What `lyapunov` publishes at some ticks in a row, see `topics.LYAPUNOV_NAMES`.
 
-        Parameters
-        ----------
-        time_ns : int
-        state : array (6,), m and m/s
-        inputs : array (3,), N by body
-            Forces of the controllers over the last period.
-        commands : mapping of str to float, N
-            Answers to this state, by side.
+        The laws are the same for all of them. Many at once cost little more than one.
         """
-        system = self._scene.system
-        tick = time_ns // self._scene.period_ns
-        external = system.external_at(tick)
-        work = residual = alarm = 0.0
-        if self._before is not None and self._before[0] + self._scene.period_ns == time_ns:
-            balance = energy_balance(system, self._before[1], state, inputs + self._before[2])
-            work, residual, alarm = float(balance.work), float(balance.residual), float(balance.alarm)
-        self._before = time_ns, state, external
-        alone = energy(system, state, external, feedback=False)
-        closed = not self.unknown and self._explains(tick, state, commands)
-        level = energy(system, state, external) if closed else None
-        V = [float(value) for value in level[:3]] if level else [np.nan] * 3
-        return [*V, float(alone.mode), residual, alarm, float(alone.V_c), work, float(closed)]
+        system, period = self._scene.system, self._scene.period_ns
+        ticks = [row.time_ns // period for row in seen]
+        states, external = np.array([row.state for row in seen]), np.array([*map(system.external_at, ticks)])
+        work, residual, alarm = self._balance(seen, states, external)
+        alone = energy(system, states, external, feedback=False)
+        known = not self.unknown
+        closed = np.array([known and self._explains(tick, row) for tick, row in zip(ticks, seen, strict=True)])
+        V = np.full((3, len(seen)), np.nan)
+        if closed.any():
+            V[:, closed] = [part[closed] for part in energy(system, states, external)[:3]]
+        rows: list[list[float]] = np.column_stack(
+            [*V, alone.mode, residual, alarm, alone.V_c, work, closed]
+        ).tolist()
+        return rows
 
-    def _explains(self, tick: int, state: Array, commands: Mapping[str, float]) -> bool:
+    def _balance(self, seen: Sequence[Seen], states: Array, external: Array) -> tuple[Array, Array, Array]:
+        """Work, residual and alarm of the periods before some ticks; 0 where the tick before is not known."""
+        times = np.array([row.time_ns for row in seen])
+        time_ns, state, pushed = self._before or (-self._scene.period_ns - 1, states[0], external[0])
+        self._before = int(times[-1]), states[-1], external[-1]
+        follows = np.diff(times, prepend=time_ns) == self._scene.period_ns
+        held = np.array([row.inputs for row in seen]) + np.vstack([pushed, external[:-1]])
+        balance = energy_balance(self._scene.system, np.vstack([state, states[:-1]]), states, held)
+        return (np.where(follows, balance.work, 0.0), np.where(follows, balance.residual, 0.0),
+                np.where(follows, balance.alarm, 0.0))
+
+    def _explains(self, tick: int, seen: Seen) -> bool:
         """Whether the commands are those of the laws that were announced, but for rounding."""
-        for side, force in commands.items():
+        for side, force in seen.commands.items():
             body = SIDES[side]
             law = self._scene.system.laws[body]
-            x, v = state[COLUMN[body]], state[COLUMN[body] + 1]
+            x, v = seen.state[COLUMN[body]], seen.state[COLUMN[body] + 1]
             expected = law.command(tick, x, v)
             if force != expected:
                 size = abs(law.position_gain) * (abs(x) + abs(law.set_point)) + abs(law.velocity_gain * v)

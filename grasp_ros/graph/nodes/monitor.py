@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
 from functools import partial
@@ -19,7 +19,7 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError, Recorder
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.beats import digest
-from grasp_ros.graph.nodes.judge import Announcement, Judge
+from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS
@@ -49,6 +49,7 @@ from grasp_ros.scene.topics import (
 )
 from grasp_ros.scene.versions import versions
 
+MOST_TICKS, MOST_SECONDS = 32, 0.01  # that are judged at once, and of wall time that a tick waits for others
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**20  # of what does not come with every state: of one; in a second
 
 
@@ -75,6 +76,7 @@ class Monitor(PeerNode):
         self._running: Running | None = None
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
+        self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._values: list[float] = []  # of the last tick
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._leaving = False  # after a signal
@@ -156,6 +158,8 @@ class Monitor(PeerNode):
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
         names = {topic: self.resolve_topic_name(topic.name) for topic in topics}
         self._recorder = Recorder(self._path, scene, versions(), names, running)
+        self._soon = self.wall_timer(MOST_SECONDS, self._complete)
+        self._soon.cancel()
         self.begun, self.concern = True, ""
         self.state = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
         self.get_logger().info(self.state)
@@ -172,10 +176,12 @@ class Monitor(PeerNode):
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
         self._beside[topic] += len(cdr)
-        if self._recorder is None or not self.counters["ticks"]:
+        if self._recorder is None or not (self._due or self.counters["ticks"]):
             return
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
             self.refuse("messages not recorded", topic)
+        elif self._due:
+            self._due[-1][2].append((topic, cdr))
         else:
             self._recorder.write(topic, cdr)
 
@@ -198,6 +204,7 @@ class Monitor(PeerNode):
             self._drain()
         elif arrival is Arrival.AGAIN:  # what was published has been lost
             self.count(arrival.value)
+            self._complete()
             self._output.publish(messages.lyapunov(messages.raw_stamp_ns(cdr), self._values))
         elif arrival is Arrival.REPEATED:
             self.count(arrival.value)
@@ -206,63 +213,83 @@ class Monitor(PeerNode):
 
     def _drain(self, waited: float = 0.0) -> None:
         while (tick := self._ticks.take(waited)) is not None:
-            self._complete(tick)
+            self._take(tick)
 
     def report(self) -> None:
         """Publish the counters."""
         super().report()
         self._beside.clear()
 
-    def _complete(self, tick: Tick) -> None:
+    def _take(self, tick: Tick) -> None:
+        """Put a tick in its place in the bag's time; judge what waits once there is enough, or something changes."""
         assert self._scene is not None
-        assert self._recorder is not None
+        if tick.restarted or self._judge.changes(tick.time_ns):
+            self._complete()
         if tick.restarted:
             self._offset_ns = self._bag_ns + self._scene.period_ns - tick.time_ns
             self._judge.restart()
             self.count("resets")
         self._bag_ns, self._advanced = tick.time_ns + self._offset_ns, time.monotonic()
-        self.count("ticks")
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
-        begun = [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)]
-        values = self._evaluate(tick)
-        self._recorder.write_tick(self._bag_ns, [*begun, *tick.found.items()], values, tick.time_ns)
-        self._values = values
-        self._output.publish(messages.lyapunov(tick.time_ns, values))
-        self.finished = bool(self.exit_code) or tick.time_ns == self._scene.ticks * self._scene.period_ns
+        self._due.append(
+            (self._bag_ns, tick, [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)])
+        )
+        if len(self._due) >= MOST_TICKS or tick.time_ns == self._scene.ticks * self._scene.period_ns:
+            self._complete()
+        elif len(self._due) == 1:
+            self._soon.reset()
 
-    def _evaluate(self, tick: Tick) -> list[float]:
-        """What `lyapunov` publishes, see `topics.LYAPUNOV_NAMES`."""
-        state, inputs = state_of(tick.state)
-        commands = {
-            side: messages.raw_force(tick.found[topic])
-            for side, topic in COMMANDS.items() if topic in tick.found
-        }
-        self._picture.show(tick.time_ns, state)
-        values = self._judge.judge(tick.time_ns, state, inputs, commands)
-        named = dict(zip(LYAPUNOV_NAMES, values, strict=True))
-        if not named["closed"]:
+    def _complete(self) -> None:
+        """Judge, record and publish the ticks that wait; none after an alarm."""
+        due, self._due = self._due, []
+        if not due:
+            return
+        assert self._scene is not None
+        assert self._recorder is not None
+        self._soon.cancel()
+        seen = [_seen(tick) for _, tick, _ in due]
+        for (bag_ns, tick, beside), row, values in zip(due, seen, self._judge.judge(seen), strict=True):
+            self.count("ticks")
+            self._picture.show(tick.time_ns, row.state)
+            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items()], values, tick.time_ns)
+            self._values = values
+            self._output.publish(messages.lyapunov(tick.time_ns, values))
+            self._heed(row, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
+            self.finished = bool(self.exit_code) or tick.time_ns == self._scene.ticks * self._scene.period_ns
+            if self.finished:
+                return
+
+    def _heed(self, row: Seen, values: Mapping[str, float]) -> None:
+        """Say why V is not there; end where energy comes from nowhere."""
+        if not values["closed"]:
             self.count("ticks without V")
             unknown = self._judge.unknown
             self.concern = (f"no law announced by {' and '.join(unknown)}: energy of the plant alone" if unknown else
                             "commands are not those of the announced law: energy of the plant alone")
-        if named["alarm"]:
+        if values["alarm"]:
             self.count("alarms")
             # `grasp run` and a plant that waits for this monitor end; the bag keeps this tick
             self.fail(
-                f"V_c rose by {named['unexplained']!r} J more than the work of the held forces,"
-                f" t = {tick.time_ns / NANOSECONDS} s, mode {int(named['mode'])}, state {state.tolist()}"
+                f"V_c rose by {values['unexplained']!r} J more than the work of the held forces,"
+                f" t = {row.time_ns / NANOSECONDS} s, mode {int(values['mode'])}, state {row.state.tolist()}"
             )
-        return values
 
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
+                self._complete()
                 self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._output)
+
+
+def _seen(tick: Tick) -> Seen:
+    """State, inputs and commands of a tick from its messages."""
+    forces = {side: messages.raw_force(tick.found[topic]) for side, topic in COMMANDS.items() if topic in tick.found}
+    return Seen(tick.time_ns, *state_of(tick.state), forces)
 
 
 def main(_: str, received: Sequence[int]) -> int:
