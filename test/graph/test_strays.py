@@ -107,7 +107,7 @@ print("done", flush=True)
 
 @pytest.mark.slow  # real processes
 def test_a_stray_with_the_stamp_of_the_state_neither_acts_nor_is_recorded(launch: Any, tmp_path: Path) -> None:
-    words = ["case_01", "--set", "time.duration_s=1000", "-o", "run"]
+    words = ["case_01", "--set", "time.duration_s=1000", "-o", "run", "--peer-timeout", "20"]
     run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     file = tmp_path / "run" / "bag" / "bag.mcap"
     wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
