@@ -183,9 +183,9 @@ class Plant(SteppedNode):
         tick, state = self._plant.tick, self._plant.state
         time_ns = tick * self.scene.period_ns
         self._simulated.publish(messages.clock(time_ns))
-        for publisher, value in self._forces:
-            publisher.publish(messages.wrench(time_ns, value(self.scene.system, tick, state)))
         self._states.publish(messages.joint_state(time_ns, self.scene.system.present, state, self._plant.effort))
+        for publisher, value in self._forces:  # while the controllers answer the state
+            publisher.publish(messages.wrench(time_ns, value(self.scene.system, tick, state)))
 
     def advance(self) -> None:
         """Do what its loop finds due."""
