@@ -15,7 +15,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
-import numpy as np
 from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph import rosbag2
@@ -26,7 +25,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import writing
 from grasp_ros.scene.strict_yaml import dump
-from grasp_ros.scene.topics import CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, Topic
+from grasp_ros.scene.topics import CLOCK, LYAPUNOV, RUN, SCENE, Topic
 
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
@@ -88,6 +87,7 @@ class Recorder:
         topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
         self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
         self._names = rosbag2.names_of(scene, self._custom)
+        self._lyapunov, self._clock = rosbag2.lyapunov_template(), rosbag2.clock_template()
         with writing(path, BagError):
             path.mkdir(parents=True)
             self._reserve = Reserve(path / ".reserve")
@@ -149,8 +149,7 @@ class Recorder:
             If the bag could not be written up to here, or ends with this tick.
         """
         stamp_ns = time_ns if stamp_ns is None else stamp_ns
-        own = rosbag2.list_message(stamp_ns, LYAPUNOV_NAMES, np.array(lyapunov, dtype=float))
-        clock = rosbag2.clock_message(stamp_ns)
+        own, clock = self._lyapunov.fill(stamp_ns, lyapunov), self._clock.fill(stamp_ns, ())
         with self._lock, writing(self._path, BagError):
             if self._closed:
                 raise BagError(self._error or f"{self._path}: is closed")

@@ -9,11 +9,24 @@ from typing import Any
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
+from grasp_ros.graph.template import Template
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import CHANGES, CLOCK, DIAGNOSTICS, FORCE, NAMED_LIST, RUN, SCENE, TIMING, Topic
+from grasp_ros.scene.topics import (
+    CHANGES,
+    CLOCK,
+    DIAGNOSTICS,
+    FORCE,
+    FRAME,
+    LYAPUNOV_NAMES,
+    NAMED_LIST,
+    RUN,
+    SCENE,
+    TIMING,
+    Topic,
+)
 
 VERSION = 9  # of the metadata
 PROFILE, ENCODING, SCHEMA_ENCODING = "ros2", "cdr", "ros2msg"
@@ -111,23 +124,42 @@ def list_message(
     ), NAMED_LIST))
 
 
+def lyapunov_template() -> Template:
+    """Of what the monitor computes at a tick, see `topics.LYAPUNOV_NAMES`."""
+    return Template(lambda numbers: list_message(0, LYAPUNOV_NAMES, np.array(numbers)), len(LYAPUNOV_NAMES))
+
+
+def clock_template() -> Template:
+    """Of simulated times."""
+    clock = _TYPES.types[CLOCK.type](clock=_header(0).stamp)
+    return Template(lambda _: bytes(_TYPES.serialize_cdr(clock, CLOCK.type)), 0)
+
+
+def state_template(names: Sequence[str]) -> Template:
+    """Of the states of some bodies: all positions, all velocities, all input forces."""
+    def serialize(numbers: list[float]) -> bytes:
+        return list_message(0, names, *np.array(numbers).reshape(3, -1))
+
+    return Template(serialize, 3 * len(names))
+
+
+def force_template() -> Template:
+    """Of forces along the line, in N."""
+    return Template(lambda numbers: force_message(0, *numbers), 1)
+
+
 def force_message(time_ns: int, force: float) -> bytes:
     """A stamped force along the line in N, serialized."""
     kind = _TYPES.types
     vector = partial(kind["geometry_msgs/msg/Vector3"], y=0.0, z=0.0)
     wrench = kind["geometry_msgs/msg/Wrench"](force=vector(x=float(force)), torque=vector(x=0.0))
-    return bytes(_TYPES.serialize_cdr(kind[FORCE](header=_header(time_ns), wrench=wrench), FORCE))
+    return bytes(_TYPES.serialize_cdr(kind[FORCE](header=_header(time_ns, FRAME), wrench=wrench), FORCE))
 
 
-def clock_message(time_ns: int) -> bytes:
-    """Simulated time, serialized."""
-    return bytes(_TYPES.serialize_cdr(_TYPES.types[CLOCK.type](clock=_header(time_ns).stamp), CLOCK.type))
-
-
-def _header(time_ns: int) -> Any:
+def _header(time_ns: int, frame: str = "") -> Any:
     seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
     stamp = _TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
-    return _TYPES.types["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+    return _TYPES.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
 
 
 def fields_of(kind: str) -> list[tuple[str, Any]]:

@@ -9,6 +9,7 @@ import numpy as np
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 
+FRAME = "line"  # in which the forces are given: x along the line on which all moves
 DEPTH = 1000  # samples that a publisher keeps for a reader that is behind
 WINDOW = 500  # ticks that the plant may be ahead of a monitor it waits for; below DEPTH, so that nothing is lost
 

@@ -25,7 +25,7 @@ from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
-from grasp_ros.scene.topics import LYAPUNOV_NAMES, ROBOT_DESCRIPTION
+from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
 
 pytestmark = pytest.mark.slow  # real processes
 CONFIG = Path(__file__).parents[2] / "config"
@@ -68,7 +68,7 @@ def test_markers_show_the_states_and_only_where_somebody_looks(
     joints = ElementTree.fromstring(texts[0]).findall("joint")
     assert {joint.get("name") for joint in joints} == {"left", "object", "right"}
     assert {joint.get("type") for joint in joints} == {"prismatic"}
-    assert {joint.find("parent").get("link") for joint in joints} == {messages.FRAME}  # type: ignore[union-attr]
+    assert {joint.find("parent").get("link") for joint in joints} == {FRAME}  # type: ignore[union-attr]
 
 
 def test_layouts_name_topics_and_values_that_are_there() -> None:

@@ -17,6 +17,7 @@ from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.ticks import is_state
+from grasp_ros.graph.rosbag2 import force_template
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -53,7 +54,7 @@ class Controller(PeerNode):
         self._monitored = self.read_only("wait_for_monitor", False, "answer only once a monitor listens")
         law = self.read_only("law", "", "a law of your own in place of the scene's, module:object")
         self._own = OwnLaw(law) if law else None
-        self._commands = self.publisher(COMMANDS[self._side])
+        self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
         self._announcements = self.publisher(CHANGES[self._side])
         self._scene: Scene | None = None
         self._law: ControlLaw | None = None
@@ -170,7 +171,7 @@ class Controller(PeerNode):
         time_ns = messages.to_ns(message.header.stamp)
         if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
             self.count("repeated states")  # it, or what answered it, was lost on the way
-            self._commands.publish(messages.wrench(time_ns, self._force))
+            self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
             return
         if self._staged or time_ns <= self._answered or self._answered < 0:
             self._begin(time_ns)
@@ -190,7 +191,7 @@ class Controller(PeerNode):
             self.fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
             return
         self._force = force
-        self._commands.publish(messages.wrench(time_ns, force))
+        self._commands.publish(self._force_template.fill(time_ns, (force,)))
         self.count("answered states")
 
 

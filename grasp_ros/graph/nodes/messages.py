@@ -26,7 +26,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.topics import DEPTH, LYAPUNOV_NAMES, Topic
+from grasp_ros.scene.topics import DEPTH, FRAME, LYAPUNOV_NAMES, Topic
 
 TYPES = {
     "sensor_msgs/msg/JointState": JointState,
@@ -42,7 +42,6 @@ _CDR_HEADER = 4
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
-FRAME = "line"  # in which the forces are given: x along the line on which all moves
 
 
 class Level(Enum):

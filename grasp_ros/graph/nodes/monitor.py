@@ -27,6 +27,7 @@ from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.nodes.sources import Sources
 from grasp_ros.graph.nodes.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
+from grasp_ros.graph.rosbag2 import lyapunov_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
@@ -89,7 +90,7 @@ class Monitor(PeerNode):
             "ticks without V": 0, "messages not recorded": 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
-        self._output = self.publisher(LYAPUNOV)
+        self._output, self._template = self.publisher(LYAPUNOV), lyapunov_template()
         self.on_text(RUN, self._on_run)
         self.on_text(SCENE, self._on_scene)
 
@@ -205,7 +206,7 @@ class Monitor(PeerNode):
         elif arrival is Arrival.AGAIN:  # what was published has been lost
             self.count(arrival.value)
             self._complete()
-            self._output.publish(messages.lyapunov(messages.raw_stamp_ns(cdr), self._values))
+            self._output.publish(self._template.fill(messages.raw_stamp_ns(cdr), self._values))
         elif arrival is Arrival.REPEATED:
             self.count(arrival.value)
         else:
@@ -255,7 +256,7 @@ class Monitor(PeerNode):
             self._picture.show(tick.time_ns, row.state)
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items()], values, tick.time_ns)
             self._values = values
-            self._output.publish(messages.lyapunov(tick.time_ns, values))
+            self._output.publish(self._template.fill(tick.time_ns, values))
             self._heed(row, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
             self.finished = bool(self.exit_code) or tick.time_ns == self._scene.ticks * self._scene.period_ns
             if self.finished:

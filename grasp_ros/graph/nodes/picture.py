@@ -17,7 +17,7 @@ from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import MARKERS, ROBOT_DESCRIPTION
+from grasp_ros.scene.topics import FRAME, MARKERS, ROBOT_DESCRIPTION
 
 FRAME_SECONDS = 1 / 30  # wall time between two pictures
 SIZE, ROD = 0.06, 0.008  # m: edge of a mass, width of a spring and of an arrow
@@ -30,13 +30,13 @@ TOUCHING = (0.80, 0.47, 0.65)  # a mass in contact
 def robot_description(scene: Scene) -> str:
     """URDF with a prismatic joint for each name of `joint_states`: `robot_state_publisher` makes tf of it."""
     reach = 10.0 * max(1.0, float(np.abs(scene.initial_state[0::2]).max()))
-    parts = [f'<link name="{messages.FRAME}"/>']
+    parts = [f'<link name="{FRAME}"/>']
     for body in scene.system.present:
         name, color = NAMES[body], " ".join(str(part) for part in COLORS[NAMES[body]])
         parts.append(
             f'<link name="{name}_mass"><visual><geometry><box size="{SIZE} {SIZE} {SIZE}"/></geometry>'
             f'<material name="{name}"><color rgba="{color} 1"/></material></visual></link>'
-            f'<joint name="{name}" type="prismatic"><parent link="{messages.FRAME}"/><child link="{name}_mass"/>'
+            f'<joint name="{name}" type="prismatic"><parent link="{FRAME}"/><child link="{name}_mass"/>'
             f'<origin xyz="{ASIDE[name]} 0 0"/><axis xyz="1 0 0"/>'
             f'<limit lower="{-reach}" upper="{reach}" effort="1e6" velocity="1e6"/></joint>'
         )
@@ -68,7 +68,7 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
 
 def _marker(number: int, group: str, kind: int, time_ns: int, color: Iterable[float]) -> Marker:
     marker = Marker(ns=group, id=number, type=kind, action=Marker.ADD)
-    marker.header.frame_id = messages.FRAME
+    marker.header.frame_id = FRAME
     marker.header.stamp = messages.to_time(time_ns)
     red, green, blue = color
     marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)

@@ -26,10 +26,12 @@ from grasp_ros.graph.nodes.lockstep import Lockstep
 from grasp_ros.graph.nodes.peers import Need
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
@@ -74,6 +76,8 @@ class Plant(SteppedNode):
         for warning in self.scene.warnings:
             self.get_logger().warning(warning)
         self._plant = self._new_plant()
+        self._state_template = state_template([NAMES[body] for body in self.scene.system.present])
+        self._clock_template, self._force_template = clock_template(), force_template()
         self.resets, self.asked = 0, math.inf
         self._begin = math.nan  # wall time of the first state
         self.counters.update(tick=0, resets=0)
@@ -182,10 +186,12 @@ class Plant(SteppedNode):
         """Publish the current state again: something on the way to or from those who answer it was lost."""
         tick, state = self._plant.tick, self._plant.state
         time_ns = tick * self.scene.period_ns
-        self._simulated.publish(messages.clock(time_ns))
-        self._states.publish(messages.joint_state(time_ns, self.scene.system.present, state, self._plant.effort))
+        present, numbers, effort = self.scene.system.present, state.tolist(), self._plant.effort.tolist()
+        x, v = ([numbers[COLUMN[body] + place] for body in present] for place in (0, 1))
+        self._simulated.publish(self._clock_template.fill(time_ns, ()))
+        self._states.publish(self._state_template.fill(time_ns, [*x, *v, *(effort[body] for body in present)]))
         for publisher, value in self._forces:  # while the controllers answer the state
-            publisher.publish(messages.wrench(time_ns, value(self.scene.system, tick, state)))
+            publisher.publish(self._force_template.fill(time_ns, (value(self.scene.system, tick, state),)))
 
     def advance(self) -> None:
         """Do what its loop finds due."""
