@@ -18,7 +18,7 @@ from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding
-from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
+from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, Topic
 
 
 class Recovery(NamedTuple):
@@ -60,11 +60,10 @@ def recover(path: Path, new: Path) -> Recovery:
     recorder, written = Recorder(new, scene, versions, names_of(scene, custom), running), 0
     try:
         for time_ns, tick, beside in chain([begin], ticks):
-            own = decode(LYAPUNOV, tick.pop(LYAPUNOV))
-            stamp_ns = own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec
+            stamp_ns, own = _lyapunov(path, tick.pop(LYAPUNOV))
             if stamp_ns > scene.ticks * scene.period_ns:
                 continue
-            recorder.write_tick(time_ns, tick.items(), own.position.tolist(), stamp_ns)
+            recorder.write_tick(time_ns, tick.items(), own, stamp_ns)
             for topic, cdr in beside:
                 recorder.write(topic, cdr)
             written += 1
@@ -72,6 +71,16 @@ def recover(path: Path, new: Path) -> Recovery:
         places = "; ".join(f"{size} at {offset}: {why}" for offset, size, why in storage.left_out)
         recorder.close({"recovered from": str(path), "bytes that were left out": places or "none"})
     return Recovery(written, storage.left_out)
+
+
+def _lyapunov(path: Path, cdr: bytes) -> tuple[int, list[float]]:
+    """Time in ns and numbers of what the monitor had computed."""
+    with decoding(path, bag.KIND, BagError, (SerdeError, AttributeError)):
+        own = decode(LYAPUNOV, cdr)
+        values = own.position.tolist()
+    if len(values) != len(LYAPUNOV_NAMES):
+        raise BagError(f"{path}: {LYAPUNOV.name}: {len(values)} numbers; allowed: {len(LYAPUNOV_NAMES)}")
+    return own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec, values
 
 
 def _ticks(storage: Storage, first: Stored, following: Iterator[Stored], scene: scenes.Scene

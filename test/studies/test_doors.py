@@ -33,6 +33,13 @@ def test_damaged_files_break_no_door(all_doors: list[doors.Door], place: Path, t
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("number", [6398, 37822, 87690, 95138])
+def test_a_bag_whose_last_list_is_none_is_not_recovered_as_one(
+    all_doors: list[doors.Door], place: Path, tmp_path: Path, number: int
+) -> None:
+    assert doors.attempt(all_doors, place, 77, number, tmp_path)[:2] == ("bag", "refused")
+
+
 def test_a_door_that_breaks_is_seen(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def hang(*_: Any) -> None:
         while True:
