@@ -12,9 +12,10 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 demo: install
 	$(BIN)/grasp run case_01
 
-# All tests, some minutes; `pytest -m "not slow"` runs those that take seconds.
+# All tests, some minutes, those that judge by wall time alone; `pytest -m "not slow"` runs those that take seconds.
 test: lint
-	$(BIN)/pytest -n 2 --dist loadfile
+	$(BIN)/pytest -n 2 --dist loadfile -m "not alone"
+	$(BIN)/pytest -m alone
 
 lint: install
 	$(BIN)/ruff check .

@@ -24,7 +24,7 @@ from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import RUN as RUNNING
 
-pytestmark = pytest.mark.slow  # real processes
+pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
 
 NODES = ("monitor", "left_controller", "right_controller", "plant")
 

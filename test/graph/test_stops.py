@@ -25,7 +25,7 @@ from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 
-pytestmark = pytest.mark.slow  # real processes
+pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
 
 
 @pytest.mark.parametrize(
