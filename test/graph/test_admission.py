@@ -156,7 +156,8 @@ def test_a_rogue_at_full_speed_on_every_other_topic_costs_no_tick(launch: Any, t
         sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=4", "-o", "run",
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
-    wait_for((tmp_path / "run" / "bag" / "bag.mcap").exists, "the bag")
+    file = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a graph at work")
     launch(sys.executable, "-c", ROGUE, str(tmp_path / "other.yaml"), "4")
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err

@@ -17,6 +17,7 @@ GOOD = Evidence(said="it is gone", noticed=0.5, exits={"grasp run": 1})
 
 
 @pytest.mark.slow
+@pytest.mark.alone
 def test_quick_drills_pass_and_are_written(command: Any, tmp_path: Path) -> None:
     result = command("study", "faults", "--quick", "-o", "faults.md")
     assert result.returncode == 0, result.stdout + result.stderr
