@@ -26,7 +26,7 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import LYAPUNOV, TIMING, WINDOW, Topic
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
-BURST_SECONDS = 0.05  # of catching up at a time, so that commands and services get their turn
+BURST_SECONDS = 0.003  # of catching up at a time, so that commands and services get their turn
 PATIENCE_SECONDS = 0.5  # further behind than this the plant gives up wall time, never a state
 
 
