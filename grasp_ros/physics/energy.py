@@ -110,8 +110,8 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
         rounding = rounding + ROUNDING * size
     work: Array = np.zeros(np.shape(before)[:-1])
     for body in system.present:
-        work = work + 2.0 * _column(forces, body) * (_column(after, COLUMN[body]) - _column(before, COLUMN[body]))
-        rounding = rounding + ROUNDING * np.abs(_column(forces, body)) * _place(system, body, after)
+        work = work + 2.0 * forces[..., body] * (after[..., COLUMN[body]] - before[..., COLUMN[body]])
+        rounding = rounding + ROUNDING * np.abs(forces[..., body]) * _place(system, body, after)
     return EnergyBalance(levels[1] - levels[0], work, rounding)
 
 
@@ -121,15 +121,9 @@ def mechanical_level(system: System, body: int, state: Array, feedback: bool = T
     return np.asarray(kinetic + potential)
 
 
-def _column(values: Array, number: int) -> Array:
-    """A column of rows (..., n); of one row a number, with which Python computes faster than with an array."""
-    column: Array = values[number] if values.ndim == 1 else values[..., number]
-    return column
-
-
 def _levels(bodies: Array, body: int, state: Array) -> tuple[Array, Array]:
     """Twice the kinetic energy and the potential of one body."""
-    x, v = _column(state, COLUMN[body]), _column(state, COLUMN[body] + 1)
+    x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
     stiffness, force = bodies[body, STIFFNESS], bodies[body, FORCE]
     potential: Array = np.zeros(np.shape(state)[:-1])
     if stiffness > 0.0:
@@ -154,7 +148,7 @@ def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
     total: Array = np.zeros(np.shape(state)[:-1])
     size: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
-        x, v = _column(state, COLUMN[body]), _column(state, COLUMN[body] + 1)
+        x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
         mass, stiffness, _, force = system.bodies[body]
         own, own_size = body_energy(mass, stiffness, force, x, v, _place(system, body, state))
         total, size = total + own, size + own_size
@@ -168,19 +162,19 @@ def elastic_level(system: System, side: int, u: Array) -> Array:
 
 def _place(system: System, body: int, state: Array) -> Array:
     """What the digits of a body's position are relative to: also the object, from which that of an arm follows."""
-    place: Array = np.abs(_column(state, COLUMN[body]))
-    return place + np.abs(_column(state, COLUMN[OBJECT])) if body != OBJECT and OBJECT in system.present else place
+    place: Array = np.abs(state[..., COLUMN[body]])
+    return place + np.abs(state[..., COLUMN[OBJECT]]) if body != OBJECT and OBJECT in system.present else place
 
 
 def _power(system: System, bodies: Array, state: Array, external: Array | None) -> Array:
     """V' without the contacts."""
     loss: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
-        v = _column(state, COLUMN[body] + 1)
+        v = state[..., COLUMN[body] + 1]
         loss = loss + bodies[body, DAMPING] * v * v
         if body == OBJECT and system.coulomb > 0.0:
             loss = loss + system.coulomb * np.abs(v)
-        if external is not None and np.any(push := _column(external, body)):
+        if external is not None and np.any(push := external[..., body]):
             loss = loss - push * v
     return -2.0 * loss
 

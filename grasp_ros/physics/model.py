@@ -92,8 +92,7 @@ def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
 
 def penetration(state: Array) -> tuple[Array, Array, Array, Array]:
     """u_l, u_l', u_r, u_r' of states (..., 6): (8)."""
-    state = np.asarray(state)
-    x_l, v_l, x_o, v_o, x_r, v_r = state if state.ndim == 1 else np.moveaxis(state, -1, 0)
+    x_l, v_l, x_o, v_o, x_r, v_r = np.moveaxis(np.asarray(state), -1, 0)
     return x_l - x_o, v_l - v_o, x_o - x_r, v_o - v_r
 
 

@@ -142,4 +142,3 @@ def _other_scene(stage: Stage) -> None:
     stage.started.pop("plant")
     stage.node("plant", scene="arm_alone")
     stage.wait(lambda: stage.ended("plant"), 20.0)
-
