@@ -93,7 +93,7 @@ def test_it_goes_on_after_a_kill_and_computes_only_the_rest(
     )
     process = subprocess.Popen([sys.executable, "-c", code, json.dumps(plan.to_document()), str(path)])
     until = time.monotonic() + DEADLINE_S
-    while len(list(path.glob(f"{MARKS}/c/*"))) < 5:
+    while sum(mark.name.isdigit() for mark in path.glob(f"{MARKS}/c/*")) < 5:  # zarr's `4.….partial` is none yet
         assert time.monotonic() < until
         assert process.poll() is None
     os.kill(process.pid, signal.SIGKILL)
