@@ -24,7 +24,9 @@ STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
 PEER_SECONDS = 1.5  # without a sign of life of a node
-NODES_SECONDS = 1.0  # for the nodes to say it themselves, which know more
+# For the nodes to say it themselves, which know more; they cannot while a lock of shared memory is held by the one that
+# was stopped.
+NODES_SECONDS = 0.4
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:

@@ -89,7 +89,7 @@ def test_a_bag_is_published_again_with_its_clock(
         peer.create_subscription(kind, name, note, messages.qos(JOINT_STATES), raw=True)
     executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
     executor.add_node(peer)  # which has all its readers: a new one may be missed
-    player = launch(sys.executable, "-m", "grasp_ros.cli", "replay", str(two_runs[0] / "bag"), "--rate", "3")
+    player = launch(sys.executable, "-m", "grasp_ros.cli", "replay", str(two_runs[0] / "bag"), "--rate", "1.5")
     begin = time.monotonic()
     while player.poll() is None:
         assert time.monotonic() < begin + DEADLINE

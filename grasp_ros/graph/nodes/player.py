@@ -15,7 +15,7 @@ from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 
-DISCOVERY_SECONDS = 1.0  # before the first message, for readers to be found
+DISCOVERY_SECONDS, MATCH_SECONDS = 1.0, 5.0  # for readers to be found, and at most for those to be connected
 LOOK_SECONDS = 1e-3
 
 
@@ -40,8 +40,18 @@ class Player(GraspNode):
         for name, topic in bag.names(path).items():
             self._outputs[name] = self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
         self.counters["messages"] = 0
-        self._begin = time.monotonic() + DISCOVERY_SECONDS
-        self.state = "playing"
+        self._created, self._begin = time.monotonic(), math.nan
+        self.when(self._ready, self._start)
+
+    def _ready(self) -> bool:
+        """Whether those are connected who are there; what others of another quality of service want never is."""
+        matched = all(publisher.get_subscription_count() >= self.count_subscribers(publisher.topic_name)
+                      for publisher in self._outputs.values())
+        waited = time.monotonic() - self._created
+        return waited > DISCOVERY_SECONDS and (matched or waited > MATCH_SECONDS)
+
+    def _start(self) -> None:
+        self.state, self._begin = "playing", time.monotonic()
         self.wall_timer(LOOK_SECONDS, self._play)
 
     def _play(self) -> None:
