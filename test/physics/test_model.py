@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 from oracles import STANDARD, energy, make_grasp
 
 from grasp_ros.physics import layout
@@ -15,6 +17,7 @@ from grasp_ros.physics.model import (
     feedback,
     hertzian_force,
     impact_force,
+    impact_force_of,
     impact_forces,
     in_contact,
     penetration,
@@ -46,6 +49,14 @@ def test_layout_indexes_every_column_once() -> None:
     assert layout.U_R == layout.U_L + layout.RIGHT
     for enum in (layout.Pair, layout.Transition, layout.Outcome, layout.Work):
         assert sorted(enum) == list(range(min(enum), min(enum) + len(enum)))
+
+
+@given(*[st.floats(0.0, 1e15)] * 2, *[st.floats(-1e9, 1e9)] * 2)
+@example(1e4, 1.0, 0.01, -1.0)
+@example(1e4, 1.0, -0.0, -2.0)
+def test_the_force_of_one_state_is_that_of_many(hertzian: float, dissipation: float, u: float, u_rate: float) -> None:
+    many = impact_force(Contact(hertzian, dissipation), np.array([u]), np.array([u_rate]))
+    assert repr(impact_force_of(hertzian, dissipation, u, u_rate)) == repr(float(many[0]))
 
 
 def test_hand_numbers() -> None:

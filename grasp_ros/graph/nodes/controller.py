@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypeGuard
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -16,7 +16,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
-from grasp_ros.graph.nodes.ticks import is_state
+from grasp_ros.graph.nodes.states import State, StateReader
 from grasp_ros.graph.rosbag2 import force_template
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
@@ -63,7 +63,7 @@ class Controller(PeerNode):
         self._turn = 0  # how often the plant had been reset then
         self._force = 0.0  # that answer
         self._ready_to_answer = self._listening = False
-        self._held: Any = None  # the state that came before this node was ready
+        self._held: State | None = None  # the state that came before this node was ready
         self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0})
         self.add_on_set_parameters_callback(self._on_set)
         self.on_text(SCENE, self._on_scene)
@@ -104,6 +104,7 @@ class Controller(PeerNode):
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
         self._scene, self._answered, self.concern = scene, -1, ""
+        self._end_ns = scene.ticks * scene.period_ns
         self._law = scene.system.laws[SIDES[self._side]]
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -127,7 +128,7 @@ class Controller(PeerNode):
         self.begun, self.concern = True, ""
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
-            self.subscribe(JOINT_STATES, self._on_state)
+            self.subscribe(JOINT_STATES, self._on_state, read=StateReader((self._side,)).read)
         self._ready_to_answer = True
         if self._held is not None:
             held, self._held = self._held, None
@@ -152,23 +153,23 @@ class Controller(PeerNode):
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
 
-    def _admits(self, message: Any) -> bool:
-        """Whether a state can be one of this run."""
+    def _admits(self, state: State | None) -> TypeGuard[State]:
+        """Whether a message can be a state of this run."""
         assert self._scene is not None
-        time_ns, period_ns = messages.to_ns(message.header.stamp), self._scene.period_ns
-        true = time_ns % period_ns == 0 and (time_ns == 0 or self._answered <= time_ns <= self._scene.ticks * period_ns)
-        true = true and is_state(message, (self._side,))
+        true = False
+        if state is not None and state.time_ns % self._scene.period_ns == 0:
+            true = state.time_ns == 0 or self._answered <= state.time_ns <= self._end_ns
         if not true:
             self.refuse("refused states", JOINT_STATES)
         return true
 
-    def _on_state(self, message: Any) -> None:
+    def _on_state(self, state: State | None) -> None:
         if not self._ready_to_answer:
-            self._held = message
+            self._held = state
             return
-        if self._scene is None or not self._admits(message):  # the scene of a new plant may still be on its way
+        if self._scene is None or not self._admits(state):  # the scene of a new plant may still be on its way
             return
-        time_ns = messages.to_ns(message.header.stamp)
+        time_ns = state.time_ns
         if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
             self.count("repeated states")  # it, or what answered it, was lost on the way
             self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
@@ -177,8 +178,8 @@ class Controller(PeerNode):
             self._begin(time_ns)
         assert self._law is not None
         self._answered = time_ns
-        row, tick = message.name.index(self._side), time_ns // self._scene.period_ns
-        x, v = message.position[row], message.velocity[row]
+        row, tick = state.name.index(self._side), time_ns // self._scene.period_ns
+        x, v = state.position[row], state.velocity[row]
         try:
             if self._own:
                 force = self._own.command(self._law, tick, self._scene.time_of(tick), x, v)

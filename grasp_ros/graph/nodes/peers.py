@@ -112,10 +112,13 @@ class PeerNode(GraspNode):
     def progress(self) -> object:
         """Something that changes while all is well."""
 
-    def subscribe(self, topic: Topic, callback: Callable[[Any], None], raw: bool = False) -> Subscription:
-        """Subscribe to a topic of the graph; raw hands over the serialized bytes."""
+    def subscribe(
+        self, topic: Topic, callback: Callable[[Any], None], raw: bool = False,
+        read: Callable[[bytes], Any] | None = None,
+    ) -> Subscription:
+        """Subscribe to a topic of the graph, see `GraspNode`."""
         self._inputs.append(topic)
-        return super().subscribe(topic, callback, raw)
+        return super().subscribe(topic, callback, raw, read)
 
     def report(self) -> None:
         """Publish the counters, and who publishes what somebody else does."""

@@ -6,12 +6,12 @@ import math
 from collections import deque
 from collections.abc import Callable, Collection, Sequence
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import JointState
+from rclpy.serialization import serialize_message
 
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.states import State, StateReader
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
@@ -37,7 +37,7 @@ class Tick(NamedTuple):
 
     time_ns: int
     restarted: bool  # whether time went back: the plant was reset
-    state: Any  # message
+    state: State
     found: dict[Topic, bytes]  # serialized messages; what is lost is not there
     lost: int  # how many are not
     dropped: int  # messages that belong to no state
@@ -47,7 +47,7 @@ class Tick(NamedTuple):
 class _State(NamedTuple):
     time_ns: int
     restarted: bool
-    message: Any
+    message: State
     cdr: bytes
 
 
@@ -79,7 +79,7 @@ class Ticks:
         self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, turn: Callable[[], int],
         delay: int = 0,
     ) -> None:
-        self._names, self._period_ns, self._end_ns, self._turn = names, period_ns, end_ns, turn
+        self._reader, self._period_ns, self._end_ns, self._turn = StateReader(names), period_ns, end_ns, turn
         self._ahead_ns = PATIENCE_TICKS * period_ns
         self._states: deque[_State] = deque()
         self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
@@ -105,8 +105,8 @@ class Ticks:
             return Arrival.REPEATED if self._states else Arrival.AGAIN
         if 0 < stamp < self._newest:
             return Arrival.STAMP
-        message = deserialize_message(cdr, JointState)
-        if not is_state(message, self._names):
+        message = self._reader.read(cdr)
+        if message is None:
             return Arrival.REFUSED
         restarted = stamp <= self._newest
         if restarted or self._newest < 0:
@@ -200,14 +200,3 @@ class Ticks:
             for stamp in [stamp for stamp in doubtful if stamp <= time_ns]:
                 del doubtful[stamp]
         return dropped
-
-
-def is_state(message: JointState, names: Collection[str]) -> bool:
-    """Whether a message is the state of some bodies, at least of those with these names."""
-    number = len(message.name)
-    lists = (message.position, message.velocity, message.effort)
-    return (
-        all(len(values) == number for values in lists) and len(set(message.name)) == number
-        and all(name in message.name for name in names)
-        and all(math.isfinite(value) for values in lists for value in values)
-    )

@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from grasp_ros.physics.layout import DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, OBJECT, STIFFNESS
-from grasp_ros.physics.model import Array, Contact, impact_force, penetration
+from grasp_ros.physics.layout import DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.model import Array, impact_force_of, penetration
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -29,9 +29,11 @@ def _build(side: str, sections: Sections, system: System) -> None:
 
 def _force(side: int, system: System, _: int, state: Array) -> float:
     """Impact force fw at a tick."""
-    u_l, d_l, u_r, d_r = penetration(state)
-    u, d = (u_l, d_l) if side == LEFT else (u_r, d_r)
-    return float(impact_force(Contact(*system.pairs[side]), u, d))
+    left, right = (LEFT, OBJECT) if side == LEFT else (OBJECT, RIGHT)
+    numbers = state.tolist()
+    u, u_rate = (numbers[COLUMN[left] + place] - numbers[COLUMN[right] + place] for place in (0, 1))
+    hertzian, dissipation = system.pairs[side].tolist()
+    return impact_force_of(hertzian, dissipation, u, u_rate)
 
 
 def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:

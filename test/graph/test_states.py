@@ -1,0 +1,91 @@
+"""A reader of states says of every message what a reader says that has seen no other, whatever came before."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from typing import Any
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.states import StateReader
+from grasp_ros.graph.rosbag2 import state_template
+
+NAMES = ("left", "object", "right")
+TEMPLATE = state_template(NAMES)
+NUMBERS = st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=9, max_size=9)
+
+
+def verdict(reader: StateReader, cdr: bytes) -> Any:
+    try:
+        return repr(reader.read(cdr))
+    except messages.UNREADABLE as error:
+        return type(error)
+
+
+def taught(names: tuple[str, ...] = NAMES) -> StateReader:
+    reader = StateReader(names)
+    assert reader.read(TEMPLATE.fill(7, range(9))) is not None
+    return reader
+
+
+@given(st.integers(0, 2**31 * 10**9 - 1), NUMBERS)
+def test_the_numbers_are_those_that_were_written(time_ns: int, numbers: list[float]) -> None:
+    state = taught().read(TEMPLATE.fill(time_ns, numbers))
+    assert state is not None
+    assert (state.time_ns, tuple(state.name)) == (time_ns, NAMES)
+    assert repr([*state.position, *state.velocity, *state.effort]) == repr(numbers)
+
+
+@given(st.integers(0, len(TEMPLATE.fill(7, range(9))) - 1), st.integers(0, 255), NUMBERS)
+@example(8 + 4, 1, [0.0] * 9)
+def test_a_damaged_byte_is_judged_as_by_a_new_reader(place: int, byte: int, numbers: list[float]) -> None:
+    cdr = bytearray(TEMPLATE.fill(7, numbers))
+    cdr[place] = byte
+    assert verdict(taught(), bytes(cdr)) == verdict(StateReader(NAMES), bytes(cdr))
+
+
+@given(st.binary(max_size=200), st.integers(0, 190))
+def test_what_is_cut_off_or_no_message_at_all_is_judged_as_by_a_new_reader(noise: bytes, length: int) -> None:
+    for cdr in (noise, TEMPLATE.fill(7, range(9))[:length], TEMPLATE.fill(7, range(9)) + noise):
+        assert verdict(taught(), cdr) == verdict(StateReader(NAMES), cdr)
+
+
+@pytest.mark.parametrize("names", [NAMES, ("object",), ("right", "left", "x" * 30), ()])
+def test_messages_of_rclpy_are_read_too(names: tuple[str, ...]) -> None:
+    message = JointState(name=list(names))
+    message.header.stamp.sec, message.header.frame_id = 3, "world"
+    message.position, message.velocity, message.effort = (array("d", range(k, k + len(names))) for k in (1, 2, 3))
+    reader = StateReader(())
+    for number in (1.5, -0.0, 1e300):
+        if names:
+            message.position[0] = number
+        state = reader.read(serialize_message(message))
+        assert state is not None
+        assert (list(state.position), state.time_ns) == (list(message.position), 3_000_000_000)
+        assert (list(state.velocity), list(state.effort)) == (list(message.velocity), list(message.effort))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("place", range(9))
+def test_what_is_not_finite_is_refused(number: float, place: int) -> None:
+    numbers = [0.0] * 9
+    numbers[place] = number
+    for reader in (taught(), StateReader(NAMES)):
+        assert reader.read(TEMPLATE.fill(7, numbers)) is None
+
+
+def test_another_set_of_bodies_is_learnt_and_a_missing_one_refused() -> None:
+    reader = taught(("left",))
+    other = state_template(("left", "object"))
+    for k in range(3):
+        state = reader.read(other.fill(k, [k + 0.5] * 6))
+        assert state is not None
+        assert (tuple(state.name), state.effort) == (("left", "object"), (k + 0.5,) * 2)
+    assert reader.read(state_template(("object", "right")).fill(1, [1.0] * 6)) is None
+    assert reader.read(state_template(("left", "left")).fill(1, [1.0] * 6)) is None
