@@ -135,5 +135,5 @@ class ControlLaw:
 
     def command(self, tick: int, x: Any, v: Any) -> Any:
         """Command in N that answers the state (x, v) of a tick, in the arithmetic of x and v."""
-        row = self.row.tolist()
-        return limited(row, feedback(row, *self.measured(tick, x, v)))
+        row = self.row.tolist()  # once: this is called at every tick of a graph
+        return limited(row, feedback(row, *measured(row, self.noise(tick).tolist(), x, v)))

@@ -106,12 +106,12 @@ class Scene:
         """Length of the run in s."""
         return float(self.values["time"]["duration_s"])
 
-    @property
+    @cached_property
     def period_ns(self) -> int:
         """Control period in ns."""
         return period_ns(self.values)
 
-    @property
+    @cached_property
     def ticks(self) -> int:
         """Number of control periods in the run."""
         return round(self.duration * NANOSECONDS) // self.period_ns

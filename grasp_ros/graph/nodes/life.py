@@ -64,7 +64,10 @@ def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
         for node in nodes:
             executor.add_node(node)
         waited_for = [node for node in nodes if not node.stays] or list(nodes)
-        while not (received or all(node.finished for node in waited_for) or any(node.exit_code for node in nodes)):
+        while not received:
+            finished = [node for node in nodes if node.finished]  # a list, empty nearly always: this is done per message
+            if finished and (set(waited_for) <= set(finished) or any(node.exit_code for node in finished)):
+                break
             executor.spin_once(timeout_sec=POLL_SECONDS)
         if received and len(nodes) == 1:  # of several, nobody is behind
             _take_what_came(executor, nodes[0])
