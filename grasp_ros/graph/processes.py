@@ -27,6 +27,7 @@ PEER_SECONDS = 1.5  # without a sign of life of a node
 # For the nodes to say it themselves, which know more; they cannot while a lock of shared memory is held by the one that
 # was stopped.
 NODES_SECONDS = 0.4
+MONITOR_NICE = 10
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
@@ -147,6 +148,9 @@ class Graph:
                 **self.plant,
             },
         }
+        if "free_running" in self.plant:
+            for name in settings.keys() - {"monitor"}:
+                settings[name]["real_time_priority"] = "1"
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         shared_memory.remove_left()
@@ -157,6 +161,8 @@ class Graph:
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stdin=end, stderr=self.errors
                 )
+            if "free_running" in self.plant and not self.one_process:  # the monitor may be late, the others may not
+                os.setpriority(os.PRIO_PROCESS, self.processes["monitor"].pid, MONITOR_NICE)
         finally:
             os.close(end)
             signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -94,6 +95,31 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
             assert json.loads(answer.result().message)["tick"] == last
         recorded.publish(messages.lyapunov(next_one * period_ns, [0.0] * len(LYAPUNOV_NAMES)))
     assert ticks == list(range(len(ticks)))
+
+
+def test_a_plant_takes_the_priority_that_it_is_given_or_says_why_not(launch: Any, tmp_path: Path) -> None:
+    errors = tmp_path / "errors"
+    with errors.open("w") as file:
+        plant = launch(
+            *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
+            "real_time_factor:=20", "-p", "real_time_priority:=3", stderr=file,
+        )
+
+    def policies() -> set[tuple[int, int]]:
+        threads = [int(thread.name) for thread in Path(f"/proc/{plant.pid}/task").iterdir()]
+        return {(os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority) for thread in threads}
+
+    try:
+        os.sched_setscheduler(plant.pid, os.SCHED_OTHER, os.sched_param(0))
+        os.sched_setscheduler(plant.pid, os.SCHED_RR, os.sched_param(1))  # until it takes its own
+    except PermissionError:
+        wait_for(lambda: "real_time_priority: 3 is not to be had here" in errors.read_text(), "its reason")
+    else:
+        wait_for(lambda: policies() == {(os.SCHED_RR, 3)}, "its priority")
+    assert plant.wait(DEADLINE) == 0
+    refused = launch(*START, "left_controller", "--ros-args", "-p", "real_time_priority:=100", stderr=subprocess.PIPE)
+    assert "real_time_priority: 100 is not allowed; allowed: 0 to 99" in refused.communicate(timeout=DEADLINE)[1]
+    assert refused.returncode == 2
 
 
 def test_a_free_run_without_time_is_refused(command: Any) -> None:

@@ -16,6 +16,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
+from grasp_ros.graph.nodes.priority import Priority
 from grasp_ros.graph.nodes.states import State, StateReader
 from grasp_ros.graph.rosbag2 import force_template
 from grasp_ros.physics.control import ControlLaw
@@ -29,12 +30,12 @@ ANNOUNCE_SECONDS = 1.0
 
 
 class Controller(PeerNode):
-    """Node `left_controller` or `right_controller`; parameters law, wait_for_monitor, and those of the scene.
+    """Node `left_controller` or `right_controller`; parameters law, wait_for_monitor and others.
 
     It takes its law from the scene that the plant announces and answers every state with a command of the same
     stamp. It announces the numbers of its law before the first command that rests on them: at the beginning, after a
     reset, and when they were set while it runs. With a law of the user's own it announces nothing. When a plant comes
-    with another scene it goes on with that.
+    with another scene it goes on with that. Other parameters are `real_time_priority` and the numbers of the scene.
 
     Parameters
     ----------
@@ -52,6 +53,7 @@ class Controller(PeerNode):
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor", False, "answer only once a monitor listens")
+        self._priority = Priority(self)
         law = self.read_only("law", "", "a law of your own in place of the scene's, module:object")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
@@ -126,6 +128,7 @@ class Controller(PeerNode):
     def _start(self) -> None:
         self.state = f"running with {self._own.words}" if self._own else "running"
         self.begun, self.concern = True, ""
+        self._priority.take()
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
             self.subscribe(JOINT_STATES, self._on_state, read=StateReader((self._side,)).read)

@@ -1,7 +1,8 @@
 """Free-running: the plant follows the wall clock, and the last command of each controller is held.
 
 A period is computed when its wall time has passed, with the commands that are there then. So a controller that answers
-within a period acts as in lockstep; a later one acts later, and its age says by how much.
+within a period acts as in lockstep; a later one acts later, and its age says by how much. A plant that is late itself
+makes up for it as fast as the controllers answer that keep up, so that their commands do not age with it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,9 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import LYAPUNOV, TIMING, WINDOW, Topic
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
+LOOKS = 2  # at the clock in a period
+GRACE = 0.75  # of a period: how long a late plant waits for an answer; the rest makes up for what it is late
+KEEPS_UP = 3  # periods that the last answer of a controller may be old for the next one to be waited for
 BURST_SECONDS = 0.003  # of catching up at a time, so that commands and services get their turn
 PATIENCE_SECONDS = 0.5  # further behind than this the plant gives up wall time, never a state
 
@@ -102,7 +106,7 @@ class FreeRunning:
     def start(self) -> None:
         """Begin at the current tick."""
         self._set_anchor()
-        self._plant.wall_timer(max(self._period, SHORTEST_SECONDS), self.advance)
+        self._plant.wall_timer(max(self._period / LOOKS, SHORTEST_SECONDS), self.advance)
 
     def _set_anchor(self) -> None:
         self._anchor = time.monotonic() - self._plant.tick * self._period
@@ -117,6 +121,7 @@ class FreeRunning:
             plant.count("stale commands")
         elif self._limits.admit(topic, force):
             held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
+            self.advance()
 
     def _on_lyapunov(self, cdr: bytes) -> None:
         time_ns = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
@@ -154,13 +159,20 @@ class FreeRunning:
             self._set_anchor()
         while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
             due = self._anchor + (plant.tick + 1) * self._period
-            if now < due or self._ahead:
+            if now < due or self._ahead or (now - due > self._period and self._waits(now)):
                 return
             if plant.at_end:
                 plant.finish()
                 return
             self._timing.period(now, now - due)
             self._step()
+
+    def _waits(self, now: float) -> bool:
+        """Whether a controller that keeps up is about to answer the current state."""
+        tick = self._plant.tick
+        return now - self._plant.asked < GRACE * self._period and any(
+            0 < tick - held.answers <= KEEPS_UP and not held.late for held in self._held.values()
+        )
 
     def _step(self) -> None:
         forces: Array = np.zeros(3)

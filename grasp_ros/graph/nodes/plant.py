@@ -24,6 +24,7 @@ from grasp_ros.graph.nodes.free_running import FreeRunning
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.lockstep import Lockstep
 from grasp_ros.graph.nodes.peers import Need
+from grasp_ros.graph.nodes.priority import Priority
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
@@ -69,6 +70,7 @@ class Plant(SteppedNode):
         self.monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
         progress = self.read_only("progress", False, "show a progress bar on the terminal")
         free = self.read_only("free_running", False, "follow the wall clock instead of waiting for the commands")
+        self._priority = Priority(self) if free else None
         steering = Steering(self)
         scene = scenes.load(name)
         running = self._read_running(free, list(scene.controllers.values()))
@@ -174,6 +176,8 @@ class Plant(SteppedNode):
         self.begun, self.concern = True, ""
         self.beats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
+        if self._priority is not None:
+            self._priority.take()
         self.publish_state()
         self.loop.start()
 
