@@ -1,17 +1,19 @@
 """Strict reading of .npz files: arrays of numbers and texts, each of a type and shape that is known before.
 
 Nothing in the file is evaluated, not even the headers, which numpy takes for Python literals. Sizes are compared with
-shapes before anything is unpacked, and the checksum of every array is checked.
+shapes before anything is unpacked, and the checksum of every array is checked. A checksum of all arrays together says
+that nobody has changed one.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +23,7 @@ MOST_BYTES = 2**30  # of all arrays of a file together
 HEADER_BYTES = 4096
 ENCRYPTED = 1  # in the flags of a member
 TEXT = "U"
+DIGEST = "digest"  # name of the checksum of all other arrays
 _HEADER = re.compile(
     rb"\x93NUMPY\x01\x00..\{'descr': '([<|]\w+)', 'fortran_order': (True|False), 'shape': \(([\d, ]*)\), \} *\n", re.S
 )
@@ -33,6 +36,22 @@ class Field(NamedTuple):
     shape: tuple[int | str, ...] = ()  # a name stands for a number that all arrays share
 
 
+def signed(arrays: Mapping[str, object]) -> dict[str, Any]:
+    """The arrays of a file, and their checksum, without which `read_npz` refuses it."""
+    content = {name: np.asarray(values) for name, values in arrays.items() if name != DIGEST}
+    return {**content, DIGEST: np.array(_digest(content))}
+
+
+def _digest(arrays: Mapping[str, np.ndarray]) -> str:
+    """SHA-256 of names, types, shapes and numbers; texts have no width of their own."""
+    found = hashlib.sha256()
+    for name, values in sorted(arrays.items()):
+        text = values.dtype.kind == TEXT
+        content = repr(values.tolist()).encode() if text else values.tobytes()
+        found.update(repr((name, TEXT if text else values.dtype.str, values.shape, len(content))).encode() + content)
+    return found.hexdigest()
+
+
 def read_npz(path: Path, fields: Mapping[str, Field]) -> dict[str, np.ndarray]:
     """All arrays of a file.
 
@@ -40,13 +59,14 @@ def read_npz(path: Path, fields: Mapping[str, Field]) -> dict[str, np.ndarray]:
     ----------
     path : Path
     fields : mapping of str to Field
-        Every array by its name; the file must hold these and no others.
+        Every array by its name; the file must hold these, the checksum of `signed`, and no others.
 
     Raises
     ------
     Refused, OSError, zipfile.BadZipFile, or what else `files.DAMAGE` lists
         If the file is damaged, or holds anything else.
     """
+    fields = {**fields, DIGEST: Field(TEXT)}
     with path.open("rb") as file, zipfile.ZipFile(file) as archive:
         members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
         if members.keys() != fields.keys() or len(archive.infolist()) != len(fields):
@@ -55,7 +75,11 @@ def read_npz(path: Path, fields: Mapping[str, Field]) -> dict[str, np.ndarray]:
         if total > MOST_BYTES:
             raise Refused(f"{total} bytes of numbers; allowed: at most {MOST_BYTES}")
         known: dict[str, int] = {}
-        return {name: _read_one(archive, members[name], name, field, known) for name, field in fields.items()}
+        found = {name: _read_one(archive, members[name], name, field, known) for name, field in fields.items()}
+    said = str(found.pop(DIGEST))
+    if said != _digest(found):
+        raise Refused(f"{DIGEST}: {said[:64]!r}; allowed: the checksum of these arrays, which nobody has changed")
+    return found
 
 
 def _read_one(archive: zipfile.ZipFile, info: zipfile.ZipInfo, name: str, field: Field, known: dict[str, int]

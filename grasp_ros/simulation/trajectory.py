@@ -24,7 +24,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.files import decoding, replacing
-from grasp_ros.scene.npz import TEXT, Field, read_npz
+from grasp_ros.scene.npz import TEXT, Field, read_npz, signed
 
 
 def tick_times(scene: Scene) -> Array:
@@ -170,8 +170,8 @@ class Trajectory:
         """
         level, parts = self.energy, self.parts
         with replacing(path) as file:
-            np.savez_compressed(
-                file, t=self.t, state=self.state, command=self.command, inputs=self.inputs,
+            np.savez_compressed(file, **signed(dict(
+                t=self.t, state=self.state, command=self.command, inputs=self.inputs,
                 V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **parts._asdict(),
                 epsilon=self.epsilon,
                 touch_left=self.times(Transition.TOUCH, LEFT), touch_right=self.times(Transition.TOUCH, RIGHT),
@@ -181,7 +181,7 @@ class Trajectory:
                 method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
                 scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
                 controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
-            )
+            )))
 
 
 _ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate")}

@@ -171,15 +171,14 @@ def _make_result(packed: bytes, content: dict[str, np.ndarray], rng: Random) -> 
 
 
 def _read_result(right: Trajectory, place: Path, content: bytes) -> None:
-    """What is accepted is what was damaged, or has numbers that a run may have."""
+    """What is accepted is what was there before the damage."""
     path = place / "result.npz"
     path.write_bytes(content)
     found = simulation.load(path)
-    finite = np.isfinite(found.t).all() and np.isfinite(found.state).all() and np.isfinite(found.event_table).all()
-    if not finite or found.t.dtype != float or found.state.shape != (len(found.t), 6) or (np.diff(found.t) < 0).any():
-        _differs("its numbers are none of a run")
-    if found.scene.values != right.scene.values or len(found.t) != len(right.t):
-        _differs("its scene or length is another")
+    if found.scene != right.scene or any(
+        getattr(found, name).tobytes() != getattr(right, name).tobytes() for name in ("t", "state", "event_table")
+    ):
+        _differs("its scene or numbers are others")
     found.energy, found.inputs, found.events  # noqa: B018 - can be computed
 
 

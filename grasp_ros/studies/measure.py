@@ -14,7 +14,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import decoding, replacing
-from grasp_ros.scene.npz import Field, read_npz
+from grasp_ros.scene.npz import Field, read_npz, signed
 from grasp_ros.studies.peers import Answer, Contender, Solve
 from grasp_ros.studies.records import Journal, Record, scene_key
 from grasp_ros.verification import reference
@@ -80,7 +80,7 @@ def truth(scene: Scene, journal: Journal) -> Truth:
     exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid.tolist(), digits=DIGITS)
     result = Truth(grid, exact.as_array(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
     with replacing(path) as file:
-        np.savez_compressed(file, **result._asdict())
+        np.savez_compressed(file, **signed(result._asdict()))
     return result
 
 

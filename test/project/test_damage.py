@@ -13,6 +13,7 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.graph import bag
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.npz import signed
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import recorder
 
@@ -77,6 +78,6 @@ def test_a_simulation_of_another_shape_is_refused(tmp_path: Path, name: str, val
     path = tmp_path / "a.npz"
     simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
     with np.load(path) as data:
-        np.savez(path, **{**data, name: value})
+        np.savez(path, **signed({**data, name: value}))
     with pytest.raises(Refused, match=r"a\.npz: "):
         simulation.load(path)

@@ -19,6 +19,7 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.scene import npz
+from grasp_ros.scene.npz import signed
 from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
 from grasp_ros.studies.records import Journal, Record, digest
@@ -151,7 +152,7 @@ def test_arrays_that_numpy_does_not_write_are_refused(
 def test_numbers_that_no_run_has_are_refused(
     tmp_path: Path, arrays: dict[str, np.ndarray], name: str, value: np.ndarray
 ) -> None:
-    np.savez(tmp_path / "a.npz", **{**arrays, name: value})
+    np.savez(tmp_path / "a.npz", **signed({**arrays, name: value}))
     with pytest.raises(Refused, match=r"a\.npz: "):
         simulation.load(tmp_path / "a.npz")
 

@@ -24,6 +24,7 @@ from grasp_ros.graph.recover import recover
 from grasp_ros.graph.running import Running
 from grasp_ros.maps import store
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.npz import signed
 from grasp_ros.scene.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import recorder
@@ -62,7 +63,7 @@ def test_a_pickle_in_a_result_is_not_loaded(tmp_path: Path, name: str) -> None:
     simulate(scenes.load("arm_alone")).save(path)
     with np.load(path) as data:
         arrays = dict(data)
-    np.savez(path, allow_pickle=True, **{**arrays, name: np.array([Owner()], dtype=object)})
+    np.savez(path, allow_pickle=True, **signed({**arrays, name: np.array([Owner()], dtype=object)}))
     with pytest.raises(Refused, match=r"a\.npz: "):
         simulation.load(path)
 

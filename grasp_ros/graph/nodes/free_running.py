@@ -18,13 +18,14 @@ import numpy as np
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.peers import Gone, Need
+from grasp_ros.graph.nodes.recorded import Recorded
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.nodes.timing import Timing
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import LYAPUNOV, TIMING, WINDOW, Topic
+from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
 LOOKS = 2  # at the clock in a period
@@ -77,10 +78,8 @@ class FreeRunning:
             for side, seconds in running.timeouts.items()
         }
         plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
-                               "refused records": 0, "timeouts": 0})
-        self._recorded = -1  # last tick that the monitor has complete
-        if plant.monitored:
-            plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
+                               "timeouts": 0})
+        self._recorded = Recorded(plant, self.advance)
         commands = plant.scene.controllers.values()
         self._sides = [topic.name.split("/")[0] for topic in commands]
         self._held = {side: Held() for side in self._sides}
@@ -123,25 +122,14 @@ class FreeRunning:
             held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
             self.advance()
 
-    def _on_lyapunov(self, cdr: bytes) -> None:
-        time_ns = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
-        if 0 <= time_ns <= self._plant.tick * self._plant.scene.period_ns:
-            self._recorded = time_ns // self._plant.scene.period_ns
-        else:
-            self._plant.refuse("refused records", LYAPUNOV)
-
-    @property
-    def _ahead(self) -> bool:
-        """Whether the plant has to wait for its monitor, which would lose states."""
-        return self._plant.monitored and self._plant.tick - self._recorded > WINDOW
-
     def advance(self) -> None:
         """Compute the periods that are over."""
         plant = self._plant
         if plant.finished or math.isnan(self._anchor):
             return
         if self._steering.reset_due:
-            self._held, self._recorded = {side: Held() for side in self._sides}, -1
+            self._held = {side: Held() for side in self._sides}
+            self._recorded.forget()
             self._steering.reset_done()
             self._set_anchor()
         if self._steering.steps:  # asked for: not with the clock
@@ -159,7 +147,7 @@ class FreeRunning:
             self._set_anchor()
         while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
             due = self._anchor + (plant.tick + 1) * self._period
-            if now < due or self._ahead or (now - due > self._period and self._waits(now)):
+            if now < due or self._recorded.outrun() or (now - due > self._period and self._waits(now)):
                 return
             if plant.at_end:
                 plant.finish()

@@ -18,6 +18,7 @@ from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import UNKNOWN
 from grasp_ros.graph.nodes.peers import Gone, Need
+from grasp_ros.graph.nodes.recorded import Recorded
 from grasp_ros.graph.nodes.sources import Sources
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
@@ -47,15 +48,15 @@ class Lockstep:
     def __init__(self, plant: SteppedNode, steering: Steering) -> None:
         self._plant, self._steering = plant, steering
         self._commands: dict[int, float] = {}
-        self._recorded = -1  # last tick that the monitor has complete
+        self._recorded = Recorded(plant, self.advance)
         self._refused = False  # a second source has come
         self._answered = False  # whether a state of this run was
-        self._asked = self._heard = 0.0  # wall time of the last repetition, and of the last message of the monitor
+        self._asked = 0.0  # wall time of the last repetition
         self._timer: Any = None
         self._going = True  # the timer
         plant.counters.update({
             "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
-            "commands while sources change": 0, "repeated states": 0, "refused records": 0,
+            "commands while sources change": 0, "repeated states": 0,
         })
         self.topics = list(plant.scene.controllers.values())
         self._sources = {
@@ -64,8 +65,6 @@ class Lockstep:
         }
         self._limits = Limits(plant, plant.scene)
         self._unsettled: dict[Topic, float] = {}  # topics whose commands do not count, and since when
-        if plant.monitored:
-            plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
 
     def missing(self) -> list[str]:
         """Command topics that do not have exactly one source, with the names of several."""
@@ -91,12 +90,12 @@ class Lockstep:
             due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
             yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self._answered)
         if plant.monitored:
-            due = max(plant.asked, self._heard) if self._complete and self._ahead else math.inf
+            due = max(plant.asked, self._recorded.heard) if self._complete and self._ahead else math.inf
             yield Need(LYAPUNOV, Gone.ENDS, what=what, due=due)
 
     def ask_again(self, now: float) -> None:
         """Publish the current state again if nothing has come of it for a second: it, or an answer, was lost."""
-        since = max(self._plant.asked, self._asked, self._heard if self._complete else 0.0)
+        since = max(self._plant.asked, self._asked, self._recorded.heard if self._complete else 0.0)
         if self._unsettled:
             self._settle(now)
         elif (self._ahead or not self._complete) and now - since > REPEAT_SECONDS:
@@ -130,8 +129,7 @@ class Lockstep:
     @property
     def _ahead(self) -> bool:
         """Whether the plant has to wait for its monitor."""
-        lead = 0 if self._steering.reset_due or self._plant.at_end else WINDOW
-        return self._plant.monitored and self._plant.tick - self._recorded > lead
+        return self._recorded.outrun(0 if self._steering.reset_due or self._plant.at_end else WINDOW)
 
     def _on_command(self, side: int, topic: Topic, cdr: bytes) -> None:
         command = messages.raw_command(cdr)
@@ -148,15 +146,6 @@ class Lockstep:
             self._commands[side] = command[1]
             self.advance()
 
-    def _on_lyapunov(self, cdr: bytes) -> None:
-        stamp = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
-        tick, rest = divmod(stamp, self._plant.scene.period_ns)
-        if rest or not self._recorded <= tick <= self._plant.tick:
-            self._plant.refuse("refused records", LYAPUNOV)
-            return
-        self._recorded, self._heard = tick, time.monotonic()
-        self.advance()
-
     def advance(self) -> None:
         """Do what is due once the current state has been answered: reset, finish, pause or advance."""
         plant = self._plant
@@ -167,7 +156,7 @@ class Lockstep:
         self._answered = True
         if resetting:
             self._commands.clear()
-            self._recorded = -1
+            self._recorded.forget()
             self._steering.reset_done()
         elif self._steering.go_on():
             if plant.at_end:
