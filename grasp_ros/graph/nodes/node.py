@@ -167,9 +167,7 @@ class GraspNode(Node):
         return self.create_subscription(kind, topic.name, take, qos, raw=True)
 
     def guarded(self, action: Callable[..., None], *words: Any) -> None:
-        """Do something unless all is done; end with a sentence if it is refused: the executor has tracebacks."""
-        if self.finished:
-            return
+        """Do something; end with a sentence if it is refused. The executor would print a traceback."""
         try:
             action(*words)
         except Refused as error:
