@@ -18,6 +18,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph import rosbag2
+from grasp_ros.graph.chunk_index import keep_packed
 from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Reserve, Sink
 from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
@@ -104,6 +105,7 @@ class Recorder:
             self._sink, chunk_size=2**62, compression=CompressionType.ZSTD, index_types=IndexType.ALL,  # type: ignore[arg-type]
             enable_data_crcs=True,
         )
+        keep_packed(self._writer)
         self._writer.start(rosbag2.PROFILE, f"grasp_ros-{version('grasp_ros')}")
         self._writer.add_metadata(OWN_RECORD, signed(self._custom))
         schemas = {

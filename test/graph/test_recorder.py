@@ -9,6 +9,7 @@ import resource
 import shutil
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ import numpy as np
 import pytest
 import yaml
 from mcap.reader import make_reader
+from mcap.records import Chunk
+from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 from processes import wait_for
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -192,6 +195,35 @@ def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajec
     assert recording.versions == {"python": "3"}
 
 
+def test_the_index_of_many_chunks_is_whole_and_takes_little_memory(
+    tmp_path: Path, run: Trajectory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each tick a chunk: what a recording of minutes has."""
+    monkeypatch.setattr("grasp_ros.graph.recorder.CHUNK_BYTES", 0)
+    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
+    ticks = list(study.ticks_of(run))
+    for tick in ticks[:100]:
+        recorder.write_tick(*tick)
+    tracemalloc.start()
+    for tick in ticks[100:]:
+        recorder.write_tick(*tick)
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    recorder.close()
+    assert len(ticks) > 1000
+    assert held / len(ticks[100:]) < 400.0  # bytes; some 1400 as objects
+    with (tmp_path / "bag" / "bag.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert len(summary.chunk_indexes) == summary.statistics.chunk_count >= len(ticks)
+        file.seek(0)
+        chunks = [record for record in StreamReader(file, emit_chunks=True).records if isinstance(record, Chunk)]
+    found = [(one.message_start_time, one.message_end_time, one.compressed_size) for one in summary.chunk_indexes]
+    assert found == [(chunk.message_start_time, chunk.message_end_time, len(chunk.data)) for chunk in chunks]
+    assert all(one.message_index_offsets for one in summary.chunk_indexes)
+
+
 def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:
     recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
     for time_ns, messages, own in study.ticks_of(run):
@@ -276,6 +308,7 @@ def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Pat
 
 FULL = """
 import sys
+import tracemalloc
 from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
