@@ -6,7 +6,6 @@ import math
 from functools import partial
 from typing import Any
 
-from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
@@ -38,21 +37,17 @@ class Limits:
             if other == name and 0.0 <= value < math.inf:
                 self._limits[topic] = value
 
-    def allow(self, topic: Topic, cdr: bytes) -> bool:
-        """Whether the actuator can do what a serialized command says."""
-        limit = self._limits.get(topic)
-        try:
-            return limit is None or abs(messages.raw_force(cdr)) <= limit
-        except messages.UNREADABLE:
-            return False
+    def allow(self, topic: Topic, force: float) -> bool:
+        """Whether the actuator can do this."""
+        return abs(force) <= self._limits.get(topic, math.inf)
 
     def admit(self, topic: Topic, force: float) -> bool:
         """Whether the actuator can do this; if it cannot, the command is counted."""
-        limit = self._limits.get(topic, math.inf)
-        if abs(force) > limit:
-            self._node.refuse("commands beyond a limit", topic)
-            self._node.get_logger().warning(
-                f"{topic.name}: {force:g} N; allowed by the actuator of the scene: {limit:g} N",
-                throttle_duration_sec=PATIENCE_SECONDS,
-            )
-        return abs(force) <= limit
+        if allowed := self.allow(topic, force):
+            return allowed
+        self._node.refuse("commands beyond a limit", topic)
+        self._node.get_logger().warning(
+            f"{topic.name}: {force:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N",
+            throttle_duration_sec=PATIENCE_SECONDS,
+        )
+        return allowed

@@ -150,10 +150,10 @@ class Monitor(PeerNode):
         scene, running = self._scene, self._running
         beside = [TIMING] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
-        self._judge, self._picture = Judge(scene), Picture(self, scene)
+        self._judge, self._picture, self._end_ns = Judge(scene), Picture(self, scene), scene.ticks * scene.period_ns
         self._ticks = Ticks(
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
-            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
+            scene.period_ns, self._end_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
         )
         self._limits = Limits(self, scene)
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
@@ -197,10 +197,13 @@ class Monitor(PeerNode):
             self.refuse("refused announcements", CHANGES[side])
             self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
 
+    def _is_sure(self, topic: Topic, cdr: bytes) -> bool:
+        """Whether a command can be nobody else's."""
+        sources, command = self._sources[topic], messages.raw_command(cdr)
+        return sources.settled() and sources.now < 2 and command is not None and self._limits.allow(topic, command[1])
+
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        sources = self._sources.get(topic)
-        sure = sources is None or (sources.settled() and sources.now < 2 and self._limits.allow(topic, cdr))
-        arrival = self._ticks.put(topic, cdr, sure)
+        arrival = self._ticks.put(topic, cdr, topic not in self._sources or self._is_sure(topic, cdr))
         if arrival is Arrival.TAKEN:
             self._drain()
         elif arrival is Arrival.AGAIN:  # what was published has been lost
@@ -237,7 +240,7 @@ class Monitor(PeerNode):
         self._due.append(
             (self._bag_ns, tick, [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)])
         )
-        if len(self._due) >= MOST_TICKS or tick.time_ns == self._scene.ticks * self._scene.period_ns:
+        if len(self._due) >= MOST_TICKS or tick.time_ns == self._end_ns:
             self._complete()
         elif len(self._due) == 1:
             self._soon.reset()
@@ -247,7 +250,6 @@ class Monitor(PeerNode):
         due, self._due = self._due, []
         if not due:
             return
-        assert self._scene is not None
         assert self._recorder is not None
         self._soon.cancel()
         seen = [_seen(tick) for _, tick, _ in due]
@@ -258,7 +260,7 @@ class Monitor(PeerNode):
             self._values = values
             self._output.publish(self._template.fill(tick.time_ns, values))
             self._heed(row, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
-            self.finished = bool(self.exit_code) or tick.time_ns == self._scene.ticks * self._scene.period_ns
+            self.finished = bool(self.exit_code) or tick.time_ns == self._end_ns
             if self.finished:
                 return
 
