@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -67,12 +68,12 @@ class Recording:
     starts: np.ndarray
     lost: dict[str, str] = field(default_factory=dict)
 
-    @property
+    @cached_property
     def t(self) -> Array:
         """Times in s."""
         return np.array([self.scene.time_of(tick) for tick in self.tick.tolist()])
 
-    @property
+    @cached_property
     def inputs(self) -> Array:
         """What acted on the bodies from each tick to the next: forces (n, 3) in N by body, LEFT, RIGHT, OBJECT.
 
@@ -98,7 +99,7 @@ class Recording:
         """What `energy` is the energy of."""
         return PLANT_AND_FEEDBACK if self.closed else PLANT_ALONE
 
-    @property
+    @cached_property
     def energy(self) -> Energy:
         """V, V_c, V' and the contact mode at the ticks, from the states and the numbers that were in force.
 

@@ -33,6 +33,8 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
         _init()
         for make in makes:
             nodes.append(make())
+        gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
+        gc.enable()
         spin(nodes, received)
     except Refused as error:
         with suppress(OSError):  # nobody reads it
@@ -67,8 +69,6 @@ def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
         for node in nodes:
             executor.add_node(node)
         waited_for = [node for node in nodes if not node.stays] or list(nodes)
-        gc.collect()
-        gc.freeze()  # what was imported stays; to look through it again and again costs a tick 0.1 s now and then
         while not received:
             finished = [node for node in nodes if node.finished]  # a list is quicker than `any`
             if finished and (set(waited_for) <= set(finished) or any(node.exit_code for node in finished)):

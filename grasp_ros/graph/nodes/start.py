@@ -6,6 +6,7 @@ first and everything else after them.
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import sys
@@ -23,6 +24,7 @@ def main(name: str, child: bool = False) -> int:
     """
     received: list[int] = []
     note_signals(received)
+    gc.disable()  # until the nodes are there: imports make little garbage and much to look through
     if child:
         end_with_parent(received, name)
     else:
