@@ -79,9 +79,9 @@ def run_heyoka(tolerance: float, scene: Scene) -> Array:
 
 
 def run_scipy(tolerance: float, scene: Scene) -> Array:
-    """The last state of one scene."""
+    """The last state of one scene; NaN where the solver stops before, in whose favour it counts as a run."""
     found = simulate(scene, grid=np.array([scene.duration]), method=METHOD, setting=tolerance)
-    return np.asarray(found.state[-1])
+    return np.asarray(found.state[-1]) if len(found.state) else np.full(6, np.nan)
 
 
 def run_ensemble(accuracy: float, scene: Scene) -> Array:
