@@ -118,7 +118,7 @@ class FreeRunning:
             plant.refuse("refused commands", topic)
         elif tick < held.answers:
             plant.count("stale commands")
-        elif self._limits.admit(topic, force):
+        elif self._limits.admit(topic, command):
             held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
             self.advance()
 

@@ -6,6 +6,7 @@ import math
 from functools import partial
 from typing import Any
 
+from grasp_ros.graph.nodes.messages import Command
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
@@ -37,17 +38,17 @@ class Limits:
             if other == name and 0.0 <= value < math.inf:
                 self._limits[topic] = value
 
-    def allow(self, topic: Topic, force: float) -> bool:
-        """Whether the actuator can do this."""
-        return abs(force) <= self._limits.get(topic, math.inf)
+    def allow(self, topic: Topic, command: Command | None) -> bool:
+        """Whether the actuator can do what a command says; None, what is no command, it cannot."""
+        return command is not None and abs(command[1]) <= self._limits.get(topic, math.inf)
 
-    def admit(self, topic: Topic, force: float) -> bool:
-        """Whether the actuator can do this; if it cannot, the command is counted."""
-        if allowed := self.allow(topic, force):
+    def admit(self, topic: Topic, command: Command) -> bool:
+        """The same, and what it cannot do is counted."""
+        if allowed := self.allow(topic, command):
             return allowed
         self._node.refuse("commands beyond a limit", topic)
         self._node.get_logger().warning(
-            f"{topic.name}: {force:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N",
+            f"{topic.name}: {command[1]:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N",
             throttle_duration_sec=PATIENCE_SECONDS,
         )
         return allowed

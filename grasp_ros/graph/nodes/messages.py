@@ -41,6 +41,7 @@ _LENGTH, _NUMBER = struct.Struct("<I"), struct.Struct("<d")
 _CDR_HEADER = 4
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
+Command = tuple[int, float]  # time in ns of the state that it answers, force in N
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
 
 
@@ -99,7 +100,7 @@ def raw_force(cdr: bytes) -> float:
     return float(force)
 
 
-def raw_command(cdr: bytes) -> tuple[int, float] | None:
+def raw_command(cdr: bytes) -> Command | None:
     """Time in ns and force in N of a serialized WrenchStamped; None if a plant cannot take it, or a bag not hold it."""
     if not SHORTEST <= len(cdr) <= MOST_BYTES:
         return None

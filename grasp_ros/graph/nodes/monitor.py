@@ -199,8 +199,7 @@ class Monitor(PeerNode):
 
     def _is_sure(self, topic: Topic, cdr: bytes) -> bool:
         """Whether a command can be nobody else's."""
-        sources, command = self._sources[topic], messages.raw_command(cdr)
-        return sources.settled() and sources.now < 2 and command is not None and self._limits.allow(topic, command[1])
+        return self._sources[topic].alone() and self._limits.allow(topic, messages.raw_command(cdr))
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         arrival = self._ticks.put(topic, cdr, topic not in self._sources or self._is_sure(topic, cdr))
