@@ -192,3 +192,28 @@ def test_what_the_executor_was_not_told_of_is_found(node: tuple[Any, SingleThrea
     wait_for(found, "both")
     assert heard == ["text"]
     waiting.end()
+
+
+STANDING = """
+import time
+from pathlib import Path
+def law(tick, t, x, v):
+    if tick == 50:
+        Path("standing").touch()
+        time.sleep(3600.0)  # as in a call of DDS that waits for a lock which a stopped process holds
+    return -5.0 * x - 0.5 * v
+"""
+
+
+def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(STANDING)
+    plant = launch(*START, "plant", "--ros-args", "-p", "scene:=arm_alone", cwd=tmp_path, stderr=subprocess.DEVNULL)
+    controller = launch(
+        *START, "left_controller", "--ros-args", "-p", "law:=mine:law", "-p", "on_silence:=end", cwd=tmp_path,
+        stderr=subprocess.PIPE,
+    )
+    wait_for((tmp_path / "standing").exists, "a law that stands")
+    plant.send_signal(signal.SIGSTOP)
+    _, err = controller.communicate(timeout=DEADLINE)
+    assert controller.returncode == 1
+    assert re.search(r"\[FATAL\] \[left_controller\]: stands for \d+\.\d s: /plant was stopped\n", err), err

@@ -30,7 +30,7 @@ ACKNOWLEDGE_SECONDS = 0.2
 MISSED = 2.5  # signs, until somebody else may have taken the place
 MOST_SIGNS, MOST_BYTES = 64, 4096  # a stranger may send more; the oldest signs are forgotten
 ENDED = "ended"  # last words of a node that has nothing to say
-STOPPED = "TtZX"  # states of processes in /proc that do nothing
+FROZEN, STOPPED = "Tt", "TtZX"  # states of processes in /proc: that may go on, that do nothing
 LEASE_SECONDS = 30.0  # DDS has forgotten a process that was killed; 20 s by default
 
 
@@ -70,11 +70,16 @@ class Sign:
     heard: float = 0.0
 
     @property
-    def runs(self) -> bool:
-        """Whether this machine has the process, and has not stopped it: it is only slow, then."""
+    def state(self) -> str:
+        """State of the process in /proc; empty if this machine does not have it."""
         number = self.process.split()[0] if self.process else ""
         state, process = _process(number) if number.isdecimal() else ("", "")
-        return process == self.process and state not in STOPPED
+        return state if process == self.process else ""
+
+    @property
+    def runs(self) -> bool:
+        """Whether this machine has the process, and has not stopped it: it is only slow, then."""
+        return bool(self.state) and self.state not in STOPPED
 
 
 def _process(number: str) -> tuple[str, str]:
@@ -94,8 +99,8 @@ class Beats:
     node : GraspNode
     heard : callable
         Called after each sign of another node.
-    beaten : callable
-        Called in the thread after each of its own.
+    watch : callable
+        Called as often as a sign is given, in a thread that does nothing else and never waits for others.
 
     Attributes
     ----------
@@ -103,22 +108,23 @@ class Beats:
     publisher : Publisher
     """
 
-    def __init__(self, node: GraspNode, heard: Callable[[], None], beaten: Callable[[], None]) -> None:
-        self._heard, self._beaten = heard, beaten
+    def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
+        self._heard = heard
         self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", _process(str(os.getpid()))[1])
         self._signs: dict[str, Sign] = {}
         self._told = 0.0  # wall time of the last own sign
         self.publisher = node.publisher(ALIVE)
         node.subscribe(ALIVE, self._on_beat)
         self._stop = threading.Event()
-        self._thread = threading.Thread(target=self._go_on, name="beats", daemon=True)
-        self._thread.start()
+        self._threads = [threading.Thread(target=self._go_on, args=(action,), name="beats", daemon=True)
+                         for action in (self._beat, watch)]
+        for thread in self._threads:
+            thread.start()
 
-    def _go_on(self) -> None:
+    def _go_on(self, action: Callable[[], None]) -> None:
         while not self._stop.wait(BEAT_SECONDS):
             with suppress(Exception):  # of a context that has just become invalid
-                self._beat()
-                self._beaten()
+                action()
 
     def _beat(self) -> None:
         own, self._told = self.own, time.monotonic()
@@ -133,7 +139,8 @@ class Beats:
     def end(self, words: str) -> None:
         """The last sign."""
         self._stop.set()
-        self._thread.join()
+        for thread in self._threads:
+            thread.join()
         self.own.ended = words or ENDED
         with suppress(Exception):  # the context may be invalid
             self.tell()
@@ -178,6 +185,11 @@ class Beats:
     def vouched(self, name: str) -> Sign | None:
         """Who says a text, by its digest; None if nobody does."""
         return next((sign for sign in self._signs.values() if name in sign.texts and not sign.ended), None)
+
+    def frozen(self) -> list[str]:
+        """Nodes of this machine that were stopped and may go on; asked from any thread."""
+        signs = list(self._signs.values())
+        return sorted({sign.node for sign in signs if not sign.ended and sign.state and sign.state in FROZEN})
 
     def successor(self, identity: str) -> str:
         """Name of the node in another process that has begun to say texts, while this one gives no sign; or nothing."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import time
 from abc import abstractmethod
 from collections.abc import Callable, Iterator
@@ -13,8 +12,9 @@ from typing import Any, NamedTuple
 
 from rclpy.subscription import Subscription
 
-from grasp_ros.graph.nodes.beats import BEAT_SECONDS, ENDED, Beats, digest
+from grasp_ros.graph.nodes.beats import ENDED, Beats, digest
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode
+from grasp_ros.graph.nodes.watchdog import Watchdog
 from grasp_ros.graph.processes import PEER_SECONDS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
@@ -97,11 +97,13 @@ class PeerNode(GraspNode):
         self._takers: dict[Topic, Callable[[str], None]] = {}
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
-        self.beats = Beats(self, self.heard, self._on_beat)
+        self._watchdog = Watchdog(
+            self.get_name(), self.patience, self.start_patience, self._ends, lambda: self.beats.frozen()
+        )
+        self.beats = Beats(self, self.heard, self._watchdog.beat)
         self._created = self._looked = self._excused = time.monotonic()
         self._before: object = None
         self._still = 0  # looks in a row without progress
-        self._beats = 0  # since the last look
         self.wall_timer(LOOK_SECONDS, self.look)
 
     @abstractmethod
@@ -139,7 +141,8 @@ class PeerNode(GraspNode):
                 words = f"was stopped, or busy, for {now - self._looked:.1f} s"
                 self.get_logger().warning(f"this process {words}", throttle_duration_sec=PATIENCE_SECONDS)
             self._excused = now  # what others did meanwhile is not known yet
-        self._looked, self._beats = now, 0
+        self._looked = now
+        self._watchdog.seen(self.begun)
         self._offer()
         if self.finished:
             return
@@ -155,14 +158,6 @@ class PeerNode(GraspNode):
             self._note(need, self._trouble_with(need, now), now)
             if self.finished or self._left:
                 return
-
-    def _on_beat(self) -> None:
-        """In the thread of the signs: end a process that does not come back from a callback; nobody else could."""
-        self._beats += 1
-        seconds = self._beats * BEAT_SECONDS
-        if self.begun and self._ends and seconds > self.start_patience:
-            self.get_logger().fatal(f"busy with one thing for {seconds:.0f} s: a law that does not return, say")
-            os._exit(1)
 
     def _wait_for_start(self, now: float) -> None:
         waited = now - self._created

@@ -1,0 +1,58 @@
+"""Sees to it that a process comes back from what it does: nobody else in it could."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+from grasp_ros.graph.nodes.beats import BEAT_SECONDS
+
+EVERY = 12  # beats from one sentence to the next
+
+
+class Watchdog:
+    """Notices in a thread of its own that the nodes' thread stands: in a law that does not return, or in DDS.
+
+    A process that is stopped just while it holds a lock of shared memory stops those that wait for the lock as well, in
+    the middle of a call of DDS. So the sentence goes to the terminal alone: a log of ROS goes through DDS.
+
+    Parameters
+    ----------
+    name : str
+        Of the node.
+    patience, law_patience : float, s
+        How long it may stand while a node of this machine is stopped, and in any case.
+    ends : bool
+        Whether the process ends then.
+    frozen : callable
+        Names of the nodes of this machine that were stopped.
+    """
+
+    def __init__(
+        self, name: str, patience: float, law_patience: float, ends: bool, frozen: Callable[[], list[str]]
+    ) -> None:
+        self._name, self._patience, self._law_patience, self._ends = name, patience, law_patience, ends
+        self._frozen = frozen
+        self._beats, self._armed = 0, False
+
+    def seen(self, armed: bool) -> None:
+        """The nodes' thread goes on; armed: what it does from now on must not last."""
+        self._beats, self._armed = 0, armed
+
+    def beat(self) -> None:
+        """Look; called every BEAT_SECONDS."""
+        self._beats += 1
+        seconds = self._beats * BEAT_SECONDS
+        if not self._armed or seconds <= self._patience:
+            return
+        frozen = " and ".join(self._frozen())
+        if not frozen and not (self._ends and seconds > self._law_patience):
+            return
+        if self._ends or self._beats % EVERY == 0:
+            why = f"{frozen} was stopped" if frozen else "a law that does not return, say"
+            with suppress(OSError):
+                print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
+        if self._ends:
+            os._exit(1)
