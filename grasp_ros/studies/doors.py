@@ -7,7 +7,8 @@ import resource
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -58,11 +59,9 @@ def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: f
     count : int, optional
     seconds : float, optional
     """
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    resource.setrlimit(resource.RLIMIT_AS, (_used() + MEMORY, hard))
     answers: Counter[tuple[str, str]] = Counter()
     slowest, end = dict.fromkeys(["scene", "result", "bag", "journal"], 0.0), time.monotonic() + (seconds or np.inf)
-    with tempfile.TemporaryDirectory() as place:
+    with tempfile.TemporaryDirectory() as place, _limited(MEMORY):
         doors = all_doors(Path(place))
         for number in tqdm(range(first, first + (count or 10**9)), unit="file", total=count):
             if time.monotonic() > end:
@@ -122,9 +121,16 @@ def all_doors(place: Path) -> list[Door]:
     ]
 
 
-def _used() -> int:
-    """Bytes of address space of this process."""
-    return int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+@contextmanager
+def _limited(more: int) -> Iterator[None]:
+    """Let this process have no more bytes of address space than it has and these."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + more, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
 
 
 def _differs(what: str) -> NoReturn:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from pathlib import Path
 from typing import Any
@@ -83,8 +84,10 @@ def test_the_same_number_is_the_same_file(all_doors: list[doors.Door]) -> None:
 
 
 def test_the_command_prints_what_came_of_it(command: Any) -> None:
+    before = resource.getrlimit(resource.RLIMIT_AS)
     result = command("study", "doors", "--count", "8")
     assert result.returncode == 0, result.stderr
+    assert resource.getrlimit(resource.RLIMIT_AS) == before  # other tests of this process start programs
     lines = result.stdout.splitlines()
     assert [line.split()[:3] for line in lines] == [
         [name, "2", "files:"] for name in ("scene", "result", "bag", "journal")

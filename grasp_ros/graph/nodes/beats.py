@@ -30,7 +30,8 @@ ACKNOWLEDGE_SECONDS = 0.2
 MISSED = 2.5  # signs, until somebody else may have taken the place
 MOST_SIGNS, MOST_BYTES = 64, 4096  # a stranger may send more; the oldest signs are forgotten
 ENDED = "ended"  # last words of a node that has nothing to say
-FROZEN, STOPPED = "Tt", "TtZX"  # states of processes in /proc: that may go on, that do nothing
+FROZEN = {"T", "t"}  # states of processes in /proc that may go on
+IDLE = {*FROZEN, "Z", "X", ""}  # that do nothing, or are not there
 LEASE_SECONDS = 30.0  # DDS has forgotten a process that was killed; 20 s by default
 
 
@@ -79,7 +80,7 @@ class Sign:
     @property
     def runs(self) -> bool:
         """Whether this machine has the process, and has not stopped it: it is only slow, then."""
-        return bool(self.state) and self.state not in STOPPED
+        return self.state not in IDLE
 
 
 def _process(number: str) -> tuple[str, str]:
@@ -189,7 +190,7 @@ class Beats:
     def frozen(self) -> list[str]:
         """Nodes of this machine that were stopped and may go on; asked from any thread."""
         signs = list(self._signs.values())
-        return sorted({sign.node for sign in signs if not sign.ended and sign.state and sign.state in FROZEN})
+        return sorted({sign.node for sign in signs if not sign.ended and sign.state in FROZEN})
 
     def successor(self, identity: str) -> str:
         """Name of the node in another process that has begun to say texts, while this one gives no sign; or nothing."""

@@ -106,7 +106,6 @@ class Controller(PeerNode):
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
         self._scene, self._answered, self.concern = scene, -1, ""
-        self._end_ns = scene.ticks * scene.period_ns
         self._law = scene.system.laws[SIDES[self._side]]
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -161,7 +160,7 @@ class Controller(PeerNode):
         assert self._scene is not None
         true = False
         if state is not None and state.time_ns % self._scene.period_ns == 0:
-            true = state.time_ns == 0 or self._answered <= state.time_ns <= self._end_ns
+            true = state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * self._scene.period_ns
         if not true:
             self.refuse("refused states", JOINT_STATES)
         return true
@@ -175,7 +174,7 @@ class Controller(PeerNode):
         time_ns = state.time_ns
         if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
             self.count("repeated states")  # it, or what answered it, was lost on the way
-            self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
+            self._answer(time_ns)
             return
         if self._staged or time_ns <= self._answered or self._answered < 0:
             self._begin(time_ns)
@@ -195,8 +194,12 @@ class Controller(PeerNode):
             self.fail(f"the command is no longer finite, t = {time_ns / NANOSECONDS} s")
             return
         self._force = force
-        self._commands.publish(self._force_template.fill(time_ns, (force,)))
+        self._answer(time_ns)
         self.count("answered states")
+
+    def _answer(self, time_ns: int) -> None:
+        """Publish the command that answers a state."""
+        self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
 
 
 def main(name: str, received: Sequence[int]) -> int:

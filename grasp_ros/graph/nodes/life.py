@@ -17,7 +17,7 @@ from grasp_ros.physics.errors import Refused, place_of
 
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
 # A spin without a time limit burns a core and can hang; one until a future is complete, which does not return between
-# messages, takes a tenth less time, and corrupted the heap in one of 100 processes.
+# messages, takes less time, and has corrupted the heap of a process.
 POLL_SECONDS = 0.2
 
 

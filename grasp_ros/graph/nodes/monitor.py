@@ -150,10 +150,10 @@ class Monitor(PeerNode):
         scene, running = self._scene, self._running
         beside = [TIMING] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
-        self._judge, self._picture, self._end_ns = Judge(scene), Picture(self, scene), scene.ticks * scene.period_ns
+        self._judge, self._picture = Judge(scene), Picture(self, scene)
         self._ticks = Ticks(
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
-            scene.period_ns, self._end_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
+            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
         )
         self._limits = Limits(self, scene)
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
@@ -239,7 +239,7 @@ class Monitor(PeerNode):
         self._due.append(
             (self._bag_ns, tick, [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)])
         )
-        if len(self._due) >= MOST_TICKS or tick.time_ns == self._end_ns:
+        if len(self._due) >= MOST_TICKS or tick.time_ns == self._ticks.end_ns:
             self._complete()
         elif len(self._due) == 1:
             self._soon.reset()
@@ -259,7 +259,7 @@ class Monitor(PeerNode):
             self._values = values
             self._output.publish(self._template.fill(tick.time_ns, values))
             self._heed(row, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
-            self.finished = bool(self.exit_code) or tick.time_ns == self._end_ns
+            self.finished = bool(self.exit_code) or tick.time_ns == self._ticks.end_ns
             if self.finished:
                 return
 

@@ -13,11 +13,10 @@ from visualization_msgs.msg import Marker, MarkerArray
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.layout import OBJECT, STIFFNESS
-from grasp_ros.physics.model import Array, Contact, impact_force, penetration
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import FRAME, MARKERS, ROBOT_DESCRIPTION
+from grasp_ros.scene.topics import CONTACTS, FRAME, MARKERS, ROBOT_DESCRIPTION
 
 FRAME_SECONDS = 1 / 30  # wall time between two pictures
 SIZE, ROD = 0.06, 0.008  # m: edge of a mass, width of a spring and of an arrow
@@ -46,9 +45,8 @@ def robot_description(scene: Scene) -> str:
 def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
     """Masses as boxes, springs as lines from their rest, contact forces as arrows on the object."""
     system, found = scene.system, []
-    u_l, d_l, u_r, d_r = penetration(state)
-    forces = {side: float(impact_force(Contact(*system.pairs[SIDES[side]]), u, d))
-              for side, u, d in (("left", u_l, d_l), ("right", u_r, d_r)) if SIDES[side] in system.contacts}
+    published = {output.topic: output.value(system, 0, state) for output in scene.outputs}
+    forces = {side: published[topic] for side, topic in CONTACTS.items() if topic in published}
     touching = {side for side, force in forces.items() if force > 0.0}
     for body in system.present:
         name, x = NAMES[body], float(state[COLUMN[body]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from grasp_ros.graph.nodes.node import GraspNode
@@ -41,7 +42,8 @@ class Priority:
             return
         try:
             for thread in Path("/proc/self/task").iterdir():
-                os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(self._wanted))
+                with suppress(ProcessLookupError):  # it has just ended
+                    os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(self._wanted))
         except OSError as error:
             self._node.get_logger().info(f"{PARAMETER}: {self._wanted} is not to be had here ({error.strerror}):"
                                          " goes on without, and commands get older on busy processors")

@@ -73,13 +73,17 @@ class Ticks:
         How often the plant was reset, as it says itself: the first state may come again for that reason or another.
     delay : int, optional
         Control periods from a command's arrival to its action.
+
+    Attributes
+    ----------
+    end_ns : int, ns
     """
 
     def __init__(
         self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, turn: Callable[[], int],
         delay: int = 0,
     ) -> None:
-        self._reader, self._period_ns, self._end_ns, self._turn = StateReader(names), period_ns, end_ns, turn
+        self._reader, self._period_ns, self.end_ns, self._turn = StateReader(names), period_ns, end_ns, turn
         self._ahead_ns = PATIENCE_TICKS * period_ns
         self._states: deque[_State] = deque()
         self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
@@ -94,7 +98,7 @@ class Ticks:
             return Arrival.REFUSED
         try:
             stamp = messages.raw_stamp_ns(cdr)
-            if stamp % self._period_ns or not 0 <= stamp <= self._end_ns:
+            if stamp % self._period_ns or not 0 <= stamp <= self.end_ns:
                 return Arrival.STAMP
             return self._put_state(stamp, cdr) if topic == JOINT_STATES else self._put_other(topic, stamp, cdr, sure)
         except messages.UNREADABLE:

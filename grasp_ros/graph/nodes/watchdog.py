@@ -35,11 +35,12 @@ class Watchdog:
     ) -> None:
         self._name, self._patience, self._law_patience, self._ends = name, patience, law_patience, ends
         self._frozen = frozen
-        self._beats, self._armed = 0, False
+        self.seen(False)
 
     def seen(self, armed: bool) -> None:
         """The nodes' thread goes on; armed: what it does from now on must not last."""
-        self._beats, self._armed = 0, armed
+        self._beats = self._next = 0  # since then, and when to say it next
+        self._armed = armed
 
     def beat(self) -> None:
         """Look; called every BEAT_SECONDS."""
@@ -50,7 +51,8 @@ class Watchdog:
         frozen = " and ".join(self._frozen())
         if not frozen and not (self._ends and seconds > self._law_patience):
             return
-        if self._ends or self._beats % EVERY == 0:
+        if self._beats >= self._next:
+            self._next = self._beats + EVERY
             why = f"{frozen} was stopped" if frozen else "a law that does not return, say"
             with suppress(OSError):
                 print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
