@@ -15,7 +15,9 @@ from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 
-DISCOVERY_SECONDS, MATCH_SECONDS = 1.0, 5.0  # for readers to be found, and at most for those to be connected
+# For readers to be found, and at most for the first to come and all to be connected: who missed the announcements at
+# the start hears of this node again after 3 s.
+DISCOVERY_SECONDS, MATCH_SECONDS = 1.0, 5.0
 LOOK_SECONDS = 1e-3
 
 
@@ -44,9 +46,10 @@ class Player(GraspNode):
         self.when(self._ready, self._start)
 
     def _ready(self) -> bool:
-        """Whether those are connected who are there; what others of another quality of service want never is."""
-        matched = all(publisher.get_subscription_count() >= self.count_subscribers(publisher.topic_name)
-                      for publisher in self._outputs.values())
+        """Whether somebody is there, and connected; what others of another quality of service want never is."""
+        readers = [(publisher.get_subscription_count(), self.count_subscribers(publisher.topic_name))
+                   for publisher in self._outputs.values()]
+        matched = any(there for _, there in readers) and all(own >= there for own, there in readers)
         waited = time.monotonic() - self._created
         return waited > DISCOVERY_SECONDS and (matched or waited > MATCH_SECONDS)
 
