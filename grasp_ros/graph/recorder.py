@@ -18,7 +18,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph import rosbag2
-from grasp_ros.graph.chunk_index import keep_packed
+from grasp_ros.graph.chunks import Messages
 from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Reserve, Sink
 from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
@@ -78,7 +78,7 @@ class Recorder:
         running: Running | None = None,
     ) -> None:
         self._path, self._period_ns = path, scene.period_ns
-        self._counts = dict.fromkeys(rosbag2.topics_of(scene), 0)
+        self._topics = rosbag2.topics_of(scene)
         self._last_ns = self._next = 0
         self._gaps: list[tuple[int, int]] = []
         self._waiting = self._chunks = 0
@@ -105,19 +105,19 @@ class Recorder:
             self._sink, chunk_size=2**62, compression=CompressionType.ZSTD, index_types=IndexType.ALL,  # type: ignore[arg-type]
             enable_data_crcs=True,
         )
-        keep_packed(self._writer)
+        self._messages = Messages(self._writer)
         self._writer.start(rosbag2.PROFILE, f"grasp_ros-{version('grasp_ros')}")
         self._writer.add_metadata(OWN_RECORD, signed(self._custom))
         schemas = {
             kind: self._writer.register_schema(kind, rosbag2.SCHEMA_ENCODING, rosbag2.definition(kind))
-            for kind in dict.fromkeys(topic.type for topic in self._counts)
+            for kind in dict.fromkeys(topic.type for topic in self._topics)
         }
         self._channels = {
             topic: self._writer.register_channel(
                 self._names[topic], rosbag2.ENCODING, schemas[topic.type],
                 {"offered_qos_profiles": dump(rosbag2.qos_profiles(topic)).strip()},
             )
-            for topic in self._counts
+            for topic in self._topics
         }
         for topic, key in ((SCENE, "scene"), (RUN, "run")):
             self._add(topic, 0, rosbag2.text_message(self._custom[key]))
@@ -175,15 +175,14 @@ class Recorder:
                 self._add(topic, self._last_ns, cdr)
 
     def _add(self, topic: Topic, time_ns: int, cdr: bytes) -> None:
-        self._writer.add_message(self._channels[topic], time_ns, cdr, time_ns, self._counts[topic])
-        self._counts[topic] += 1
+        self._messages.add(self._channels[topic], time_ns, cdr)
         self._waiting += len(cdr)
 
     def _flush(self) -> None:
         """End the chunk; close the bag while there is room for its end."""
         if not self._waiting:
             return
-        self._writer.flush()  # type: ignore[no-untyped-call]
+        self._messages.flush()
         self._waiting, self._chunks = 0, self._chunks + 1
         index = INDEX_BYTES * self._chunks
         try:
@@ -256,9 +255,8 @@ class Recorder:
         """Write what was lost, the index, and the metadata."""
         self._closed = True
         self._reserve.release()
-        document = rosbag2.metadata(
-            f"{self._path.name}.mcap", self._counts, self._names, self._last_ns, self._custom
-        )
+        counts = {topic: self._messages.counts[channel] for topic, channel in self._channels.items()}
+        document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
         lost = {"end": why, "ticks that are missing": ranges(self._gaps), **counters, BESIDE: checksum(text)}
         self._writer.add_metadata(LOST_RECORD, signed(lost))

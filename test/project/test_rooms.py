@@ -91,7 +91,7 @@ def test_each_library_has_its_place(name: str) -> None:
         }
     if name not in ("graph/bag.py", "graph/columns.py", "graph/recover.py", "graph/rosbag2.py"):
         assert "rosbags" not in found
-    if name not in ("graph/chunk_index.py", "graph/recorder.py", "graph/storage.py"):
+    if name not in ("graph/chunks.py", "graph/recorder.py", "graph/storage.py"):
         assert "mcap" not in found
     if name not in DRAW:
         assert "matplotlib" not in found
