@@ -40,10 +40,10 @@ class Status(Enum):
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
-_OUTPUTS, _EVENTS = int(Filled.OUTPUTS), int(Filled.EVENTS)
+_OUTPUTS, _EVENTS, _FILLED = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled)
 _GOES_ON = (Outcome.GO_ON, Outcome.SQUEEZED)
 _NO_TIMES = np.zeros(0)
-_STATUS = {
+_STATUS: dict[int, Status] = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
     Outcome.STALLED: Status.STALLED,
@@ -88,7 +88,7 @@ class Integrator:
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._continuous, self._accuracy = system, continuous, accuracy
         self._max_events, self._max_work = max_events, max_work
-        self._time, self._clock = 0.0, np.zeros(3)
+        self._clock = np.zeros(3)
         self._given = system.closed_loop if continuous else system.bodies.copy()
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
@@ -130,7 +130,8 @@ class Integrator:
             return ""
         with np.errstate(over="ignore", invalid="ignore"):  # of states that are not finite any more
             mode = int(energy(self._system, self.state).mode)
-        return f"{self.status.value}: t = {self._time!r} s, mode {mode}, state {self.state.tolist()}"
+        time, rest, begin = self._clock.tolist()
+        return f"{self.status.value}: t = {begin + (time + rest)!r} s, mode {mode}, state {self.state.tolist()}"
 
     @property
     def event_table(self) -> Array:
@@ -191,15 +192,15 @@ class Integrator:
             States at the grid; only the rows reached, if `status` is not DONE afterwards or a controller has failed.
         """
         out = np.empty((len(grid), 6)) if rows is None else rows
-        filled = np.zeros(len(Filled), dtype=np.int64)
-        clock, outcome = self._clock, Outcome.GO_ON
+        filled = np.zeros(_FILLED, dtype=np.int64)
+        outcome = int(Outcome.GO_ON)
         with workspace(self._accuracy) as (tables, event_rows):
             if self._watcher is not None:
                 self._watcher.attach(filled, tables)
             while self.status is Status.DONE:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
                 most = min(self._spent + BREATH, self._max_work)
-                own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, clock)
+                own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, self._clock)
                 if outcome == Outcome.SQUEEZED:
                     k = int(loop.place[Place.INTERVAL])
                     outcome = creep(*own, loop.lengths[k], self._accuracy, most, grid[: loop.bounds[k + 1]], out,
@@ -213,7 +214,6 @@ class Integrator:
                     filled[_EVENTS] = 0
                 if outcome == Outcome.NO_COMMAND or self._ends(outcome):
                     break
-        self._time = float(clock[2] + (clock[0] + clock[1]))
         return out[: filled[_OUTPUTS]]
 
     def _ends(self, outcome: int) -> bool:
@@ -226,7 +226,7 @@ class Integrator:
             return False
         if outcome == Outcome.WORK_USED and self._spent < self._max_work:
             return False
-        self.status = _STATUS[Outcome(outcome)]
+        self.status = _STATUS[outcome]
         return True
 
 

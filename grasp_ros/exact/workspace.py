@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 
 from grasp_ros.exact.records import Array, Tables
@@ -14,18 +11,23 @@ EVENT_ROWS = 1024
 _FREE: dict[float, list[tuple[Tables, Array]]] = {}  # by accuracy; what nobody uses
 
 
-@contextmanager
-def workspace(accuracy: float) -> Iterator[tuple[Tables, Array]]:
+class workspace:  # noqa: N801 - a context manager; as a generator it costs a sampled tick more
     """Tables, and rows for events; no run leaves anything there.
 
     A second run at the same time may be in another thread, or in a controller of the first one.
     """
-    free = _FREE.setdefault(accuracy, [])
-    try:
-        borrowed = free.pop()
-    except IndexError:
-        borrowed = new_tables(series_order(accuracy)), np.empty((EVENT_ROWS, 5))
-    try:
-        yield borrowed
-    finally:
-        free.append(borrowed)
+
+    def __init__(self, accuracy: float) -> None:
+        self._accuracy, self._free = accuracy, _FREE.setdefault(accuracy, [])
+
+    def __enter__(self) -> tuple[Tables, Array]:
+        """Borrow one."""
+        try:
+            self._borrowed = self._free.pop()
+        except IndexError:
+            self._borrowed = new_tables(series_order(self._accuracy)), np.empty((EVENT_ROWS, 5))
+        return self._borrowed
+
+    def __exit__(self, *_: object) -> None:
+        """Give it back."""
+        self._free.append(self._borrowed)

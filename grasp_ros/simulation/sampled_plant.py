@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -120,11 +121,25 @@ class SampledPlant:
             States at the offsets; only the rows reached, and the tick stays, if `status` is not DONE afterwards.
         """
         times = NO_TIMES if offsets is None else np.array(offsets, dtype=float)
-        waits = len(self._waiting)
+        waits, loop = len(self._waiting), self._one
         self.effort = self._waiting[self.tick % waits].copy() if waits else np.array(commands, dtype=float)
-        record = self._go(Outputs(times, np.array([0, len(times)])), np.array([commands], dtype=float))
-        self.inputs = record.inputs[0]
-        return record.states
+        loop.begins[0], loop.bounds[1], loop.answers[0] = self.time, len(times), commands
+        loop.place[:] = new_place(self.tick)
+        if self._system.external:
+            loop.external[:] = self._system.external_over(np.array([self.tick]))
+        states = self._integrator.run(loop, times)
+        self.tick += int(loop.place[Place.INTERVAL])
+        self.inputs = loop.inputs[0].copy()
+        return states
+
+    @cached_property
+    def _one(self) -> Loop:
+        """A period under commands from outside: a graph makes each of its steps with it."""
+        external = np.zeros((1, 3)) if self._system.external else _DEFAULT["external"]
+        return Loop(
+            np.array([self._period]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place(), np.zeros((1, 3)), external,
+            np.zeros((1, 3)), GIVEN.callee, GIVEN.rows, GIVEN.normals, self._waiting,
+        )
 
     def follow(self, answers: Array) -> Array:
         """Advance by one control period for each row of answers that are known beforehand.

@@ -43,7 +43,7 @@ def test_forces_and_clocks_have_their_time_and_number() -> None:
 
 
 def test_a_wrong_number_of_numbers_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"zip|subsection"):
+    with pytest.raises(ValueError, match="2 numbers; allowed: 1"):
         rosbag2.force_template().fill(0, [1.0, 2.0])
-    with pytest.raises(ValueError, match=r"zip|subsection"):
+    with pytest.raises(ValueError, match="subsection"):
         Template(lambda _: b"nothing of it", 1)

@@ -150,10 +150,11 @@ class Judge:
 
     def _explains(self, tick: int, seen: Seen) -> bool:
         """Whether the commands are those of the laws that were announced, but for rounding."""
+        state = seen.state.tolist()  # plain floats take a third of the time, with the same bits
         for side, force in seen.commands.items():
             body = SIDES[side]
             law = self._scene.system.laws[body]
-            x, v = seen.state[COLUMN[body]], seen.state[COLUMN[body] + 1]
+            x, v = state[COLUMN[body]], state[COLUMN[body] + 1]
             expected = law.command(tick, x, v)
             if force != expected:
                 size = abs(law.position_gain) * (abs(x) + abs(law.set_point)) + abs(law.velocity_gain * v)
