@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.exact.events import Event, to_events
 from grasp_ros.exact.hybrid import advance
-from grasp_ros.exact.jit import with_deep_stack
+from grasp_ros.exact.jit import compiling
 from grasp_ros.exact.outputs import SPARE
 from grasp_ros.exact.records import Loop, Plant, State, new_place
 from grasp_ros.exact.sight import Wanted
@@ -230,7 +230,7 @@ class Integrator:
         return True
 
 
-@with_deep_stack
+@compiling
 def compile_kernels() -> None:
     """Compile the kernels, or load them from disk, by integrating over no time at all."""
     arm = Arm(1.0, 1.0, 0.0, 0.0, 0.0)

@@ -3,14 +3,17 @@
 `NUMBA_DISABLE_JIT=1` in the environment runs the same source uncompiled.
 """
 
-from collections.abc import Callable
-from contextlib import suppress
-from functools import cache
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache, wraps
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numba
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from grasp_ros.exact.disk import cache_directory
@@ -22,12 +25,38 @@ numba.config.SLP_VECTORIZE = 1
 DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
+class Part(JITCodeLibrary):  # type: ignore[misc]
+    """The code of a function that others call, without machine code: theirs has a copy of it.
+
+    Machine code of every function by itself would be a fifth of the time of compiling.
+    """
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+    def serialize_using_object_code(self) -> Any:
+        """What is kept on disk."""
+        return self.serialize_using_bitcode()
+
+
+class InlinedPart(Part):
+    """The same of a function that goes into its callers as a whole, which optimize it there."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+
 class Kernel(CPUDispatcher):  # type: ignore[misc]
     """A function that other kernels call; for Python it is compiled once more.
 
     A call from Python goes through a wrapper that unpacks the arguments, as large as many a kernel: without it
     compiling takes a sixth less. Nothing but a test calls such a function.
     """
+
+    def compile(self, signature: Any) -> Any:
+        """Compile for arguments of some types."""
+        with global_compiler_lock, _libraries(self, InlinedPart if self.targetoptions["forceinline"] else Part):
+            return super().compile(signature)
 
     def __call__(self, *arguments: Any) -> Any:
         """What the function returns."""
@@ -60,19 +89,49 @@ def allocating(function: Callable[..., Any]) -> Any:
     return _compiled(function, door=True, counts=True)
 
 
+@contextmanager
+def _libraries(dispatcher: CPUDispatcher, kind: type[Part]) -> Iterator[None]:
+    """Of what kind the code is that this thread compiles meanwhile; it must have numba's lock."""
+    own = vars(dispatcher.targetctx.codegen())
+    before = own.copy()
+    own.update(_library_class=kind, set_env=_no_environment)
+    try:
+        yield
+    finally:
+        own.clear()
+        own.update(before)
+
+
+def _no_environment(*_: object) -> None:
+    """Hand nothing over to machine code that is not there."""
+
+
 @cache
 def _door(function: Callable[..., Any]) -> Any:
     return door(function)
 
 
-def with_deep_stack(function: Callable[[], None]) -> Callable[[], None]:
+def compiling(function: Callable[[], None]) -> Callable[[], None]:
     """A function that compiles kernels, with room on CPython's stack for all the compiler's frames.
 
     CPython asks the system for 16 kB more whenever a call does not fit, and gives it back when that call returns.
-    Compiling makes millions of calls; where they go back and forth over such an edge, this took seconds.
+    Compiling makes millions of calls; where they go back and forth over such an edge, this took seconds. So did looking
+    for garbage, again and again, among millions of objects that are none.
     """
     code = function.__code__.replace(co_stacksize=DEEP_STACK)
-    return FunctionType(code, function.__globals__, function.__name__)
+    deep = FunctionType(code, function.__globals__, function.__name__)
+
+    @wraps(function)
+    def compile_all() -> None:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            deep()
+        finally:
+            if collects:
+                gc.enable()
+
+    return compile_all
 
 
 def compiled_address(function: Any, signature: str) -> int:

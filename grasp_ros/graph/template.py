@@ -26,13 +26,14 @@ class Template:
     def __init__(self, serialize: Callable[[list[float]], bytes], count: int) -> None:
         marks = [_MARK * (number + 1) for number in range(count)]
         cdr = bytes(serialize(marks))
-        self._cdr, self._count = bytearray(cdr), count
+        self._cdr = bytearray(cdr)
         self._runs: list[tuple[struct.Struct, int, slice]] = []  # numbers that lie side by side, and where
         places = [cdr.index(_NUMBER.pack(mark)) for mark in marks]
         first = 0
         for last, place in enumerate(places, 1):
             if last == count or places[last] != place + _NUMBER.size:
-                self._runs.append((struct.Struct(f"<{last - first}d"), places[first], slice(first, last)))
+                which = slice(first, last if last < count else None)  # also what is too much
+                self._runs.append((struct.Struct(f"<{last - first}d"), places[first], which))
                 first = last
 
     def fill(self, time_ns: int, numbers: Sequence[float]) -> bytes:
@@ -40,12 +41,10 @@ class Template:
 
         Raises
         ------
-        ValueError
+        struct.error
             If there are more or fewer numbers than it has.
         """
         _STAMP.pack_into(self._cdr, _STAMP_AT, *divmod(time_ns, NANOSECONDS))
-        if len(numbers) != self._count:
-            raise ValueError(f"{len(numbers)} numbers; allowed: {self._count}")
         for run, place, which in self._runs:
             run.pack_into(self._cdr, place, *numbers[which])
         return bytes(self._cdr)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -43,7 +45,8 @@ def test_forces_and_clocks_have_their_time_and_number() -> None:
 
 
 def test_a_wrong_number_of_numbers_is_refused() -> None:
-    with pytest.raises(ValueError, match="2 numbers; allowed: 1"):
-        rosbag2.force_template().fill(0, [1.0, 2.0])
+    for template, numbers in ((rosbag2.force_template(), [1.0, 2.0]), (rosbag2.lyapunov_template(), [1.0] * 8)):
+        with pytest.raises(struct.error, match=r"expected . items for packing"):
+            template.fill(0, numbers)
     with pytest.raises(ValueError, match="subsection"):
         Template(lambda _: b"nothing of it", 1)
