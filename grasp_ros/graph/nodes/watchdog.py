@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
 
 from grasp_ros.graph.nodes.beats import BEAT_SECONDS
 
-EVERY = 12  # beats from one sentence to the next
+EVERY_SECONDS = 5.0  # from one sentence to the next
+PAUSE_SECONDS = 2.0 * BEAT_SECONDS  # between two beats, if the process was stopped itself
 
 
 class Watchdog:
@@ -34,25 +37,26 @@ class Watchdog:
         self, name: str, patience: float, law_patience: float, ends: bool, frozen: Callable[[], list[str]]
     ) -> None:
         self._name, self._patience, self._law_patience, self._ends = name, patience, law_patience, ends
-        self._frozen = frozen
+        self._frozen, self._beaten = frozen, time.monotonic()
         self.seen(False)
 
     def seen(self, armed: bool) -> None:
         """The nodes' thread goes on; armed: what it does from now on must not last."""
-        self._beats = self._next = 0  # since then, and when to say it next
-        self._armed = armed
+        self._since, self._said, self._armed = time.monotonic(), -math.inf, armed
 
     def beat(self) -> None:
         """Look; called every BEAT_SECONDS."""
-        self._beats += 1
-        seconds = self._beats * BEAT_SECONDS
+        before, self._beaten = self._beaten, time.monotonic()
+        if self._beaten - before > PAUSE_SECONDS:  # nobody stood meanwhile
+            self._since = self._beaten
+        seconds = self._beaten - self._since
         if not self._armed or seconds <= self._patience:
             return
         frozen = " and ".join(self._frozen())
         if not frozen and not (self._ends and seconds > self._law_patience):
             return
-        if self._beats >= self._next:
-            self._next = self._beats + EVERY
+        if self._beaten - self._said > EVERY_SECONDS:
+            self._said = self._beaten
             why = f"{frozen} was stopped" if frozen else "a law that does not return, say"
             with suppress(OSError):
                 print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)

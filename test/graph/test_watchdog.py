@@ -1,0 +1,70 @@
+"""When a node says that it stands, on a clock that the test sets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from grasp_ros.graph.nodes import watchdog
+from grasp_ros.graph.nodes.beats import BEAT_SECONDS
+from grasp_ros.graph.nodes.watchdog import EVERY_SECONDS, Watchdog
+
+PATIENCE, LAW_PATIENCE = 2.1, 60.0
+
+
+class Clock:
+    """The wall time that a watchdog sees, and the nodes that were stopped."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, ends: bool) -> None:
+        self.now, self.frozen, self.ended = 100.0, ["/plant"], list[int]()
+        monkeypatch.setattr(watchdog.time, "monotonic", lambda: self.now)
+        monkeypatch.setattr(watchdog.os, "_exit", self.ended.append)
+        self.dog = Watchdog("monitor", PATIENCE, LAW_PATIENCE, ends, lambda: self.frozen)
+        self.dog.seen(True)
+
+    def beat(self, times: int, seconds: float = BEAT_SECONDS) -> None:
+        for _ in range(times):
+            self.now += seconds
+            self.dog.beat()
+
+
+def test_a_process_that_stands_behind_a_stopped_one_says_so_and_ends(monkeypatch: Any, capsys: Any) -> None:
+    clock = Clock(monkeypatch, ends=True)
+    clock.beat(5)
+    assert not clock.ended
+    clock.beat(1)
+    assert clock.ended == [1]
+    assert capsys.readouterr().err == "[FATAL] [monitor]: stands for 2.4 s: /plant was stopped\n"
+
+
+def test_one_that_waits_on_says_it_at_once_and_now_and_then(monkeypatch: Any, capsys: Any) -> None:
+    clock = Clock(monkeypatch, ends=False)
+    clock.beat(6)
+    assert capsys.readouterr().err.count("stands for") == 1
+    clock.beat(int(2 * EVERY_SECONDS / BEAT_SECONDS) + 2)
+    assert capsys.readouterr().err.count("stands for") == 2
+    assert not clock.ended
+
+
+def test_its_own_sleep_is_no_standing(monkeypatch: Any, capsys: Any) -> None:
+    clock = Clock(monkeypatch, ends=True)
+    clock.beat(4)
+    clock.beat(1, 3600.0)
+    clock.beat(5)
+    assert not clock.ended
+    assert not capsys.readouterr().err
+
+
+def test_a_law_that_does_not_return_has_longer(monkeypatch: Any, capsys: Any) -> None:
+    clock = Clock(monkeypatch, ends=True)
+    clock.frozen = []
+    clock.beat(int(LAW_PATIENCE / BEAT_SECONDS) - 1)
+    assert not clock.ended
+    clock.beat(2)
+    assert clock.ended
+    assert "a law that does not return, say" in capsys.readouterr().err
+    clock.dog.seen(False)
+    clock.ended.clear()
+    clock.beat(1000)
+    assert not clock.ended
