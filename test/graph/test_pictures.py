@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
@@ -21,11 +22,14 @@ from visualization_msgs.msg import Marker, MarkerArray
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.picture import ASIDE, NEWTONS_PER_METRE, TOUCHING, markers
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.view import SIGNS, TRACK, View
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
-from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
+from grasp_ros.physics.system import NAMES
+from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
 
 pytestmark = pytest.mark.slow  # real processes
 CONFIG = Path(__file__).parents[2] / "config"
@@ -69,6 +73,32 @@ def test_markers_show_the_states_and_only_where_somebody_looks(
     assert {joint.get("name") for joint in joints} == {"left", "object", "right"}
     assert {joint.get("type") for joint in joints} == {"prismatic"}
     assert {joint.find("parent").get("link") for joint in joints} == {FRAME}  # type: ignore[union-attr]
+
+
+def test_the_markers_show_what_the_drawing_of_the_same_state_shows(two_runs: tuple[Path, Path]) -> None:
+    """Places of the masses in a terminal's picture, contacts and forces as the bag has them."""
+    recording = bag.read(two_runs[0] / "bag")
+    view, level = View(recording.scene), recording.energy
+    impacts = np.column_stack([recording.outputs[topic.name] for topic in CONTACTS.values()])
+    ticks = [0, *np.flatnonzero(np.diff(level.mode)), *np.argmax(impacts, axis=0)]
+    assert len(set(level.mode[ticks])) == 4
+    for tick in ticks:
+        state, impact = recording.state[tick], dict(zip(CONTACTS, impacts[tick], strict=True))
+        line = view._line(state).plain
+        picture = markers(recording.scene, 0, state).markers
+        boxes = {marker.id: marker for marker in picture if marker.ns == "masses"}
+        places = {name: boxes[body].pose.position.x - ASIDE[name] for body, name in NAMES.items()}
+        column = {name: (x / view._reach + 1.0) * 0.5 * (TRACK - 1) for name, x in places.items()}
+        away = {name: abs(line.index(SIGNS[name]) + 1 - column[name]) for name in places}
+        apart = np.diff([column[name] for name in ("left", "object", "right")]).min() > 4.0
+        assert max(away.values()) <= 0.5 if apart else away["left"] <= 0.5  # others are moved aside where one hides
+        assert re.fullmatch(r" *\[L\] *\(O\) *\[R\] *", line)
+        red = {NAMES[body] for body, box in boxes.items() if (box.color.r, box.color.g, box.color.b) == TOUCHING}
+        touching = {name for name, force in impact.items() if force > 0.0}
+        assert red == (touching | {"object"} if touching else set())
+        arrows = [marker for marker in picture if marker.ns == "contact forces" and marker.action == Marker.ADD]
+        lengths = [abs(arrow.points[1].x - arrow.points[0].x) for arrow in arrows]
+        assert np.allclose([length * NEWTONS_PER_METRE for length in lengths], [f for f in impact.values() if f > 0.0])
 
 
 def test_layouts_name_topics_and_values_that_are_there() -> None:
