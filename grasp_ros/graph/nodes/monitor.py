@@ -45,6 +45,7 @@ from grasp_ros.scene.topics import (
     RUN,
     SCENE,
     TIMING,
+    WINDOW,
     Topic,
     state_of,
 )
@@ -80,7 +81,7 @@ class Monitor(PeerNode):
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._values: list[float] = []  # of the last tick
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
-        self._leaving = False  # after a signal
+        self._leaving = 0  # after a signal: ticks to which it still records, what was on the way with them
         self._plant = ""  # identity of the one that is recorded
         self._advanced = 0.0  # wall time of the last tick
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
@@ -107,8 +108,8 @@ class Monitor(PeerNode):
 
     def behind(self) -> object:
         """The ticks so far: it records what had arrived before a signal, and needs nobody any more."""
-        self._leaving = True
-        return self.counters["ticks"]
+        self._leaving = self._leaving or int(self.counters["ticks"]) + WINDOW
+        return min(int(self.counters["ticks"]), self._leaving)
 
     def look(self) -> None:
         """See to it that everybody is there, unless it is about to end itself; go on without what does not come."""
@@ -236,9 +237,8 @@ class Monitor(PeerNode):
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
-        self._due.append(
-            (self._bag_ns, tick, [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)])
-        )
+        beside = [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)]
+        self._due.append((self._bag_ns, tick, beside))
         if len(self._due) >= MOST_TICKS or tick.time_ns == self._ticks.end_ns:
             self._complete()
         elif len(self._due) == 1:

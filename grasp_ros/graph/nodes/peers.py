@@ -23,7 +23,7 @@ from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
 LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this process itself stood still
 SWEEPS = 4  # looks without progress that sweep, each of them at first and then one of as many
-GONE_SECONDS = 0.8  # without a source: its last messages are on the way
+GONE_SECONDS = 0.7  # without a source: its last messages are on the way
 START_SECONDS = 60.0
 SLOW = 4  # times longer who shows that it lives may take
 MOST_TEXTS = 8  # that wait for somebody to vouch for them

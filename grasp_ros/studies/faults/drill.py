@@ -24,7 +24,7 @@ from grasp_ros.studies.faults.verdict import LOST_SECONDS, Evidence
 TERMINALS = (*NODES, "run")  # last words of the names of what a user has in a terminal
 DEADLINE_SECONDS = 30.0
 STILL_SECONDS = 15.0  # without a tick and without a word: it hangs; `grasp run` itself waits 10 s for its nodes to end
-GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 2.5  # after the accident: it goes on, and not without its monitor
+GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 4.0  # after the accident, when who was told to end has, and been missed
 LOOK_SECONDS = 0.1
 CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
 
