@@ -25,7 +25,7 @@ from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
-REPEAT_SECONDS = 1.0
+REPEAT_SECONDS, FIRST_SECONDS = 1.0, 0.4  # the first state is the one that a reader may miss: it has just come
 SETTLE_SECONDS = 0.3  # after a source has come or gone; its messages are here by then
 NAMES_SECONDS = 2.0  # for discovery to tell the name of a source
 UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without controllers
@@ -94,11 +94,12 @@ class Lockstep:
             yield Need(LYAPUNOV, Gone.ENDS, what=what, due=due)
 
     def ask_again(self, now: float) -> None:
-        """Publish the current state again if nothing has come of it for a second: it, or an answer, was lost."""
+        """Publish the current state again if nothing has come of it for a while: it, or an answer, was lost."""
+        patience = REPEAT_SECONDS if self._answered else FIRST_SECONDS
         since = max(self._plant.asked, self._asked, self._recorded.heard if self._complete else 0.0)
         if self._unsettled:
             self._settle(now)
-        elif (self._ahead or not self._complete) and now - since > REPEAT_SECONDS:
+        elif (self._ahead or not self._complete) and now - since > patience:
             self._repeat(now)
 
     def _repeat(self, now: float) -> None:
