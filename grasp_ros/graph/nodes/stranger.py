@@ -12,7 +12,6 @@ import queue
 import sys
 import threading
 import time
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -55,6 +54,7 @@ class Stranger:
         self._period_ns, self._latest_ns = period_ns, 0
         self._concerns: dict[str, tuple[float, int, str]] = {}
         self._answer: dict[str, Any] = {}
+        self._commands: Any = None  # where it answers
         best_effort = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
         self._node.create_subscription(JointState, topic, self._on_tick, best_effort, raw=True)
         self._node.create_subscription(messages.TYPES[DIAGNOSTICS.type], DIAGNOSTICS.name, self._on_health, 100)
@@ -125,16 +125,14 @@ class Stranger:
         """
         first = not self._answer
         self._answer = {"side": side, "force": force, "times": 1, **fields}
-        if first:
+        if first:  # listen first: a plant begins as soon as there is a source that does
             topic = COMMANDS[side]
-            commands = self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
-            self._wait(commands, 2)  # plant and monitor
-            self._node.create_subscription(
-                JointState, JOINT_STATES.name, partial(self._control, commands), messages.qos(JOINT_STATES)
-            )
+            self._node.create_subscription(JointState, JOINT_STATES.name, self._control, messages.qos(JOINT_STATES))
+            self._commands = self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
+            self._wait(self._commands, 2)  # plant and monitor
         return {}
 
-    def _control(self, commands: Any, state: JointState) -> None:
+    def _control(self, state: JointState) -> None:
         side, force, times, *_ = self._answer.values()
         row = state.name.index(side)
         if force is None:
@@ -142,7 +140,7 @@ class Stranger:
         message = messages.wrench(messages.to_ns(state.header.stamp), force)
         filled(message, {key: value for key, value in self._answer.items() if key not in ("side", "force", "times")})
         for _ in range(times):
-            commands.publish(message)
+            self._commands.publish(message)
 
 
 def filled(message: Any, fields: dict[str, Any]) -> Any:
