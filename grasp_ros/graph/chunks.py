@@ -15,9 +15,10 @@ from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
 from mcap.writer import Writer
 
-RECORD = struct.Struct("<BQHIQQ")  # opcode, length, channel, number and both times of a message
+HEAD = struct.Struct("<BQ")  # opcode and length of every record
+RECORD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
 ENTRY = struct.Struct("<QQ")  # time of a message, and its place in the content of its chunk
-HEAD_BYTES = RECORD.size - 9  # of a record's length
+_OWN_BYTES = RECORD.size - HEAD.size  # of a message, beside its data
 _MESSAGE = int(Opcode.MESSAGE)
 _CHUNK, _INDEXES, _STATISTICS = (f"_Writer__{name}" for name in ("chunk_builder", "chunk_indices", "statistics"))
 
@@ -61,7 +62,7 @@ class Messages:
         entries += ENTRY.pack(time_ns, self._begin + len(records))
         number = self.counts[channel]
         self.counts[channel] = number + 1
-        records += RECORD.pack(_MESSAGE, HEAD_BYTES + len(data), channel, number, time_ns, time_ns)
+        records += RECORD.pack(_MESSAGE, _OWN_BYTES + len(data), channel, number, time_ns, time_ns)
         records += data
         if time_ns > self._last:
             self._last = time_ns
@@ -81,9 +82,8 @@ class Messages:
         chunk.message_indices.update({channel: _Index(channel, entries) for channel, entries in self._entries.items()})
         chunk.num_messages = sum(len(entries) // ENTRY.size for entries in self._entries.values())
         chunk.message_start_time, chunk.message_end_time = self._first, self._last
-        if statistics.message_count:
-            self._first = min(self._first, statistics.message_start_time)
-        statistics.message_start_time = self._first
+        begun = statistics.message_count > 0
+        statistics.message_start_time = min(self._first, statistics.message_start_time) if begun else self._first
         statistics.message_end_time = max(self._last, statistics.message_end_time)
         statistics.message_count += chunk.num_messages
         statistics.channel_message_counts.update(self.counts)

@@ -21,11 +21,11 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
+from grasp_ros.graph.chunks import HEAD
 from grasp_ros.graph.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
 from grasp_ros.graph.rosbag2 import PROFILE, BagError
 
 MAGIC = b"\x89MCAP0\r\n"
-HEAD = struct.Struct("<BQ")  # opcode and length of every record
 MESSAGE = struct.Struct("<H4xQ8x")  # channel and time of a message; the library's reader takes ten times as long
 SUM = struct.Struct("<I")
 DATA_END_BYTES = HEAD.size + SUM.size

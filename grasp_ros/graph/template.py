@@ -27,13 +27,12 @@ class Template:
         marks = [_MARK * (number + 1) for number in range(count)]
         cdr = bytes(serialize(marks))
         self._cdr = bytearray(cdr)
-        self._runs: list[tuple[struct.Struct, int, slice]] = []  # numbers that lie side by side, and where
-        places = [cdr.index(_NUMBER.pack(mark)) for mark in marks]
-        first = 0
+        self._numbers, size = struct.Struct(f"<{count}d"), _NUMBER.size
+        self._runs: list[tuple[slice, slice]] = []  # where numbers lie side by side, in the message and among all
+        places, first = [cdr.index(_NUMBER.pack(mark)) for mark in marks], 0
         for last, place in enumerate(places, 1):
-            if last == count or places[last] != place + _NUMBER.size:
-                which = slice(first, last if last < count else None)  # also what is too much
-                self._runs.append((struct.Struct(f"<{last - first}d"), places[first], which))
+            if last == count or places[last] != place + size:
+                self._runs.append((slice(places[first], place + size), slice(size * first, size * last)))
                 first = last
 
     def fill(self, time_ns: int, numbers: Sequence[float]) -> bytes:
@@ -45,6 +44,7 @@ class Template:
             If there are more or fewer numbers than it has.
         """
         _STAMP.pack_into(self._cdr, _STAMP_AT, *divmod(time_ns, NANOSECONDS))
-        for run, place, which in self._runs:
-            run.pack_into(self._cdr, place, *numbers[which])
+        packed = self._numbers.pack(*numbers)
+        for place, which in self._runs:
+            self._cdr[place] = packed[which]
         return bytes(self._cdr)

@@ -336,7 +336,6 @@ import tracemalloc
 from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.chunks import Messages
 from grasp_ros.graph.recorder import Recorder
 from grasp_ros.simulation import simulate
 from grasp_ros.studies import recorder as study

@@ -45,8 +45,9 @@ def test_forces_and_clocks_have_their_time_and_number() -> None:
 
 
 def test_a_wrong_number_of_numbers_is_refused() -> None:
-    for template, numbers in ((rosbag2.force_template(), [1.0, 2.0]), (rosbag2.lyapunov_template(), [1.0] * 8)):
+    refused = {rosbag2.force_template(): 2, rosbag2.lyapunov_template(): 8, rosbag2.clock_template(): 1}
+    for template, count in refused.items():
         with pytest.raises(struct.error, match=r"expected . items for packing"):
-            template.fill(0, numbers)
+            template.fill(0, [1.0] * count)
     with pytest.raises(ValueError, match="subsection"):
         Template(lambda _: b"nothing of it", 1)

@@ -123,9 +123,8 @@ class Stranger:
 
         Further fields are those of the message, as in `publish`; `times`: how often each is sent.
         """
-        first = not self._answer
         self._answer = {"side": side, "force": force, "times": 1, **fields}
-        if first:  # listen first: a plant begins as soon as there is a source that does
+        if self._commands is None:  # listen first: a plant begins as soon as there is a source that does
             topic = COMMANDS[side]
             self._node.create_subscription(JointState, JOINT_STATES.name, self._control, messages.qos(JOINT_STATES))
             self._commands = self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
