@@ -6,16 +6,16 @@ import math
 
 import numpy as np
 
+from grasp_ros.exact.beside import flies_free, free_flight, part_free, place_beside, place_free
 from grasp_ros.exact.clock import tick
-from grasp_ros.exact.flight import fly, launch
 from grasp_ros.exact.friction import slide_in_contact
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.kinematics import arm_of, keep_resting, rate_lanes
+from grasp_ros.exact.kinematics import keep_resting, rate_lanes
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.observer import leave_orders, leave_step, notify
 from grasp_ros.exact.outputs import due
-from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values
+from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values_and_ways
 from grasp_ros.exact.records import (
     Array,
     Candidate,
@@ -23,7 +23,6 @@ from grasp_ros.exact.records import (
     Integers,
     Output,
     Plant,
-    Regime,
     Settings,
     SlideCandidate,
     State,
@@ -34,15 +33,12 @@ from grasp_ros.exact.roots import first_rise
 from grasp_ros.exact.scales import new_step
 from grasp_ros.exact.taylor_step import accepted_length, fitted_step
 from grasp_ros.physics.layout import (
-    DAMPING,
     DISSIPATION,
     EPS,
     LANES,
     LEFT,
-    MASS,
     OBJECT,
     RIGHT,
-    STIFFNESS,
     TIME,
     U_L,
     U_R,
@@ -136,53 +132,6 @@ def write_state(at: Array, u_l: float, u_r: float, y: Array) -> None:
 
 
 @inlined
-def flies_free(plant: Plant, y: Array, side: Body, touches: bool, t: float) -> bool:
-    """Whether an arm that touches nothing is better put where it flies than where object and gap say.
-
-    Their roundings, of the size of x_o, would show in its place, or drive it by its spring within t s; a damper that
-    stops it within t leaves less than the roundings of a series.
-    """
-    x, v, _ = arm_of(y, side)
-    row, x_o = plant.bodies[side], abs(y[X_O])
-    coarse = x_o > abs(x) or row[STIFFNESS] * t * x_o > row[MASS] * abs(v)
-    return not touches and (coarse or row[DAMPING] * t > row[MASS])
-
-
-@inlined
-def free_flight(plant: Plant, y: Array, side: Body, flies: bool) -> Flight:
-    """Flight of an arm; what nobody reads if it does not, because a launch has its price."""
-    x, v, _ = arm_of(y, side)
-    return launch(plant.bodies[side], x, v) if flies else Flight(Regime.DRIFT, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@inlined
-def place_free(flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: float, y: Array) -> None:
-    """Put the arms that fly where they are after t s."""
-    if flies_l:
-        y[X_L], y[V_L], _ = fly(free[0], t)
-    if flies_r:
-        y[X_R], y[V_R], _ = fly(free[1], t)
-
-
-@inlined
-def gap_shows(row: Array, t: float, x_before: float, x: float, x_o: float) -> bool:
-    """Whether places tell u of an arm better than a series that its damper has made coarse in t s.
-
-    They do where it is far from the object, or has come far.
-    """
-    return row[DAMPING] * t > row[MASS] and 2.0 * max(abs(x - x_o), abs(x - x_before)) >= max(abs(x), abs(x_o))
-
-
-@inlined
-def part_free(plant: Plant, flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: float, y: Array) -> None:
-    """Let u of damped arms that have flown for t s follow their places, or roundings of the series add up in it."""
-    if flies_l and gap_shows(plant.bodies[LEFT], t, free[0].x, y[X_L], y[X_O]):
-        y[U_L] = y[X_L] - y[X_O]
-    if flies_r and gap_shows(plant.bodies[RIGHT], t, free[1].x, y[X_R], y[X_O]):
-        y[U_R] = y[X_O] - y[X_R]
-
-
-@inlined
 def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, bool], free: tuple[Flight, Flight],
             state: State, out: Output) -> None:
     """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
@@ -190,8 +139,9 @@ def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, b
     tau = due(state, out)
     while tau < t:
         row = out.rows[out.filled[Filled.OUTPUTS]]
-        values(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
+        values_and_ways(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
         write_state(at, penetration(at[Z_L], step.left), penetration(at[Z_R], step.right), row)
+        place_beside(at, step, free, row)
         place_free(flies[0], flies[1], free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
@@ -214,16 +164,18 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         return math.nan
     s = min(h, left.when, right.when, slide.when)
     if s < h:
-        values(c, n, s, at)
+        values_and_ways(c, n, s, at)
     t = at[TIME]
     if t > span:
         s = invert_time(tables, step, span, s, t)
         t = span
-        values(c, n, s, at)
-    flies = (flies_free(plant, y, LEFT, step.left, t), flies_free(plant, y, RIGHT, step.right, t))
+        values_and_ways(c, n, s, at)
+    flies = (not step.left and flies_free(tables, plant, y, LEFT, s, t),
+             not step.right and flies_free(tables, plant, y, RIGHT, s, t))
     free = (free_flight(plant, y, LEFT, flies[0]), free_flight(plant, y, RIGHT, flies[1]))
     y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
     write_state(at, y[U_L], y[U_R], y)
+    place_beside(at, step, free, y)
     place_free(flies[0], flies[1], free, t, y)
     part_free(plant, flies[0], flies[1], free, t, y)
     keep_resting(state)

@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.polynomial import INVERSE
 from grasp_ros.exact.records import Array, Flight, Flights, Plant, Regime
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -30,7 +31,6 @@ from grasp_ros.physics.layout import (
 )
 
 SHORT = 0.25  # of the time constants: there the power series keeps all digits
-INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 25))])  # a quotient would keep the next one waiting
 FLIGHT_ORDER = np.int64(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
 
 

@@ -4,10 +4,11 @@ With |g''| <= M for all later times,
 
     g(t + h) <= g(t) + g'(t) h + M h^2 / 2,
 
-so up to the zero of the right-hand side g stays negative. The steps approach the first root from the left and
-converge quadratically. Where arm and object move nearly alike their accelerations cancel, and a bound on g''' allows
-longer ones. Where the arm's whole remaining swing cannot reach the object, the envelope of the swing allows a longer
-step, or proves that no root exists.
+so up to the zero of the right-hand side g stays negative. The steps approach the first root from the left until the
+bounds show that g rises to it all the way; then the series of g about that time has the same root. Where arm and object
+move nearly alike their accelerations cancel, and a bound on the third derivative allows longer steps. Where the arm's
+whole remaining swing cannot reach the object, the envelope of the swing allows a longer step, or proves that no root
+exists.
 """
 
 from __future__ import annotations
@@ -16,18 +17,24 @@ import math
 
 from grasp_ros.exact.flight import fly
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import bound, next_derivative, own_acceleration
-from grasp_ros.exact.records import Array, EventFunction, Flights, Integers, Motion, PairFlight, Plant
+from grasp_ros.exact.kinematics import bound_by, rates_of
+from grasp_ros.exact.records import (
+    Array,
+    Derivatives,
+    EventSeries,
+    Flights,
+    Integers,
+    Motion,
+    PairFlight,
+    Plant,
+    Rates,
+)
 from grasp_ros.exact.roots import safe_step
 from grasp_ros.physics.layout import (
-    DAMPING,
     DISSIPATION,
     EPS,
-    FORCE,
     LEFT,
-    MASS,
     OBJECT,
-    STIFFNESS,
     U_L,
     Body,
     Transition,
@@ -35,6 +42,8 @@ from grasp_ros.physics.layout import (
 )
 
 MAX_ITERATIONS = 10_000_000
+MAX_NEWTON = 50
+SMALLEST = 1e-250  # of a rate: products of what is smaller have lost their digits
 
 
 @kernel
@@ -43,18 +52,18 @@ def envelope_step(pair: PairFlight, at: Motion) -> float:
 
     Drag can only delay an object that approaches, but it also brakes one that moves away.
     """
-    arm, body = pair.arm, pair.body
-    if arm[STIFFNESS] <= 0.0:
+    arm, body = pair.arm_rates, pair.body_rates
+    if arm.stiffness <= 0.0:
         return 0.0
-    x_e = arm[FORCE] / arm[STIFFNESS]
-    swing = bound(arm, at.x - x_e, at.v, math.inf)
+    x_e = pair.x_e
+    swing = bound_by(arm, at.x - x_e, at.v, math.inf)
     room = pair.sign * (at.x_o - x_e) - swing - 8.0 * EPS * (abs(at.x_o) + abs(x_e) + swing)
     if not room > 0.0:
         return 0.0
     towards = -pair.sign * at.v_o
-    if body[DAMPING] > 0.0:
+    if body.damping > 0.0:
         towards = max(towards, 0.0)
-    return safe_step(-room, towards, max(-pair.sign * body[FORCE] / body[MASS], 0.0))
+    return safe_step(-room, towards, max(-pair.sign * body.force, 0.0))
 
 
 @kernel
@@ -68,42 +77,85 @@ def motion_at(pair: PairFlight, t: float) -> Motion:
     return Motion(x, v, x_o, v_o, pair.u + moved, d, abs(pair.u) + abs(away) + abs(away_o))
 
 
+@kernel
+def derivatives_of(rates: Rates, x: float, v: float) -> Derivatives:
+    """Derivatives of a body's flight."""
+    second = (rates.force - rates.stiffness * x) - rates.damping * v
+    third = -(rates.damping * second + rates.stiffness * v)
+    fourth = -(rates.damping * third + rates.stiffness * second)
+    return Derivatives(second, third, fourth, -(rates.damping * fourth + rates.stiffness * third))
+
+
 @inlined
-def event_function(kind: Transition, pair: PairFlight, at: Motion, left: float) -> EventFunction:
-    """A function g of time that rises through 0 at an event."""
-    arm, body = pair.arm, pair.body
-    a, a_o = own_acceleration(arm, at.x, at.v), own_acceleration(body, at.x_o, at.v_o)
-    j, j_o = next_derivative(arm, at.v, a), next_derivative(body, at.v_o, a_o)
-    snap, snap_o = next_derivative(arm, a, j), next_derivative(body, a_o, j_o)
-    if pair.alike:
-        growth = bound(arm, j - j_o, snap - snap_o, left)
-    else:
-        growth = bound(arm, j, snap, left) + bound(body, j_o, snap_o, left)
+def event_series(kind: Transition, pair: PairFlight, at: Motion, own: Derivatives, body: Derivatives) -> EventSeries:
+    """The series of a function g of time that rises through 0 at an event."""
+    sign = -pair.sign if kind == Transition.RELEASE else pair.sign
+    second, third = sign * (own.second - body.second), sign * (own.third - body.third)
+    fourth, fifth = sign * (own.fourth - body.fourth), sign * (own.fifth - body.fifth)
     if kind == Transition.REENTRY:
-        return EventFunction(at.d + pair.inverse_p, pair.sign * (a - a_o), growth, EPS * pair.inverse_p, growth, 0.0)
-    turn = 1.0 if kind == Transition.TOUCH else -1.0
-    if pair.alike:
-        curvature = bound(arm, a - a_o, j - j_o, left)
-    else:
-        curvature = bound(arm, a, j, left) + bound(body, a_o, j_o, left)
-    bend = turn * pair.sign * (a - a_o) + 4.0 * EPS * (abs(a) + abs(a_o))
-    return EventFunction(turn * at.u, turn * at.d, curvature, EPS * at.size, bend, growth)
+        noise, doubt = EPS * pair.inverse_p, 4.0 * EPS * (abs(own.third) + abs(body.third))
+        return EventSeries(at.d + pair.inverse_p, second, third, fourth, fifth, noise, doubt)
+    turn, doubt = -1.0 if kind == Transition.RELEASE else 1.0, 4.0 * EPS * (abs(own.second) + abs(body.second))
+    return EventSeries(turn * at.u, turn * at.d, second, third, fourth, EPS * at.size, doubt)
 
 
 @inlined
-def certain_step(g: EventFunction, last: float) -> float:
-    """Time for which g stays below 0: by its bound, or by its own curvature for as long as that can change little."""
+def event_bounds(kind: Transition, pair: PairFlight, own: Derivatives, body: Derivatives, left: float
+                 ) -> tuple[float, float]:
+    """Bounds on the second and the third derivative of g for `left` seconds."""
+    third = relative_bound(pair, own.third, own.fourth, body.third, body.fourth, left)
+    if kind == Transition.REENTRY:
+        return third, relative_bound(pair, own.fourth, own.fifth, body.fourth, body.fifth, left)
+    return relative_bound(pair, own.second, own.third, body.second, body.third, left), third
+
+
+@inlined
+def relative_bound(pair: PairFlight, q: float, q_rate: float, q_o: float, q_o_rate: float, left: float) -> float:
+    """Bound on the difference of a derivative q of the arm's flight and q_o of the object's for `left` seconds."""
+    if pair.alike:
+        return bound_by(pair.arm_rates, q - q_o, q_rate - q_o_rate, left)
+    return bound_by(pair.arm_rates, q, q_rate, left) + bound_by(pair.body_rates, q_o, q_o_rate, left)
+
+
+@inlined
+def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -> float:
+    """Time for which g stays below 0: by the bound on |g''|, or for as long as g'' can change little."""
     below = min(g.value, -g.noise)
-    step = safe_step(below, g.rate, g.curvature)
+    step = safe_step(below, g.rate, curvature)
     reach = 4.0 * max(step, last)
-    bend = max(g.bend + g.growth * reach, 0.0)
-    if bend < 0.5 * g.curvature:
+    bend = max(g.second + g.doubt + growth * reach, 0.0)
+    if bend < 0.5 * curvature:
         step = max(step, min(reach, safe_step(below, g.rate, bend)))
     return step
 
 
+@inlined
+def rises_to_root(g: EventSeries, growth: float, left: float) -> bool:
+    """Whether g has one root within twice Newton's step, because g' keeps half of its size there."""
+    if not (g.value < 0.0 and g.rate > SMALLEST):
+        return False
+    reach = -2.0 * g.value / g.rate
+    return reach <= left and reach * (max(g.doubt - g.second, 0.0) + growth * reach) <= 0.5 * g.rate
+
+
+@inlined
+def root_of_series(g: EventSeries) -> float:
+    """Time to the root of g by its series, by Newton's iteration."""
+    two, three, four = 0.5 * g.second, g.third / 6.0, g.fourth / 24.0
+    t = -g.value / g.rate
+    for _ in range(MAX_NEWTON):
+        value = (((four * t + three) * t + two) * t + g.rate) * t + g.value
+        rate = ((4.0 * four * t + 3.0 * three) * t + 2.0 * two) * t + g.rate
+        step = value / rate
+        t -= step
+        if abs(step) <= 1e-8 * abs(t):
+            break
+    return t
+
+
 @kernel
-def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: float, work: Integers) -> float:
+def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: float, until: float, work: Integers
+               ) -> float:
     """First time in (t, span] at which u rises or falls through 0, or u' rises through -1/p; inf if there is none.
 
     Parameters
@@ -112,22 +164,33 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
         TOUCH, RELEASE or REENTRY.
     t, at : float in s, Motion
         Where the search begins.
+    until : float, s
+        What comes later need not be found.
     """
-    step = 0.0
+    step, growth, near = 0.0, 0.0, False
     for _ in range(MAX_ITERATIONS):
         work[Work.ROOT_ITERATIONS] += 1
-        left = span - t
-        g = event_function(kind, pair, at, min(left, pair.horizon))
-        if g.value >= -g.noise and g.rate > 0.0:
+        own, body = derivatives_of(pair.arm_rates, at.x, at.v), derivatives_of(pair.body_rates, at.x_o, at.v_o)
+        g = event_series(kind, pair, at, own, body)
+        if g.rate > 0.0 and (abs(g.value) if near else -g.value) <= g.noise:  # the series may have led beyond the root
             return t
-        step = certain_step(g, step)
-        if kind == Transition.TOUCH:
-            step = max(step, envelope_step(pair, at))
-        step = min(step, pair.horizon)
-        if not step <= left:
-            return math.inf if step > left else math.nan
-        if step <= EPS * t or step == 0.0:
-            return t
+        if not near:
+            left = min(span - t, pair.horizon)
+            curvature, growth = event_bounds(kind, pair, own, body, left)
+            near = rises_to_root(g, growth, left)
+        if near:
+            step = root_of_series(g)
+            if growth * pair.square_rate * abs(step) ** 5 <= 8.0 * EPS * t * g.rate:  # / 60: a few roundings of t
+                return t + step
+        else:
+            step = certain_step(g, curvature, growth, step)
+            if kind == Transition.TOUCH:
+                step = max(step, envelope_step(pair, at))
+            step = min(step, pair.horizon)
+            if not step <= span - t or t > until:
+                return math.nan if math.isnan(step) else math.inf
+            if step <= EPS * t or step == 0.0:
+                return t
         t += step
         at = motion_at(pair, t)
     return math.nan
@@ -137,12 +200,11 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
 def pair_in_flight(plant: Plant, y: Array, flights: Flights, side: Body) -> PairFlight:
     """Arm and object of a flight from y."""
     flight, sign = (flights.left, 1.0) if side == LEFT else (flights.right, -1.0)
-    arm, body, loss = plant.bodies[side], plant.bodies[OBJECT], plant.pairs[side, DISSIPATION]
-    alike = arm[STIFFNESS] * body[MASS] == body[STIFFNESS] * arm[MASS]
-    alike = alike and arm[DAMPING] * body[MASS] == body[DAMPING] * arm[MASS]
-    growth = max(-arm[DAMPING] / arm[MASS], -body[DAMPING] / body[MASS])
+    arm, body, loss = rates_of(plant.bodies[side]), rates_of(plant.bodies[OBJECT]), plant.pairs[side, DISSIPATION]
+    alike = arm.stiffness == body.stiffness and arm.damping == body.damping
+    growth = max(-arm.damping, -body.damping)
     horizon = 1.0 / growth if growth > 0.0 else math.inf
     inverse_p = 1.0 / loss if loss > 0.0 else math.inf
-    return PairFlight(arm, body, flight, flights.object, sign, y[U_L + side], alike, horizon, inverse_p)
-
-
+    x_e = arm.force / arm.stiffness if arm.stiffness > 0.0 else 0.0
+    fastest = max(arm.stiffness + arm.damping * arm.damping, body.stiffness + body.damping * body.damping)
+    return PairFlight(arm, body, flight, flights.object, sign, y[U_L + side], alike, horizon, inverse_p, x_e, fastest)

@@ -17,7 +17,7 @@ from grasp_ros.exact.kinematics import (
     own_acceleration,
     write_penetrations,
 )
-from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.modes import TOGETHER, make_transitions
 from grasp_ros.exact.observer import notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
@@ -62,8 +62,9 @@ def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
 
 
 @kernel
-def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, span: float, work: Integers) -> Candidate:
-    """First event of one pair in a flight of at most `span` seconds."""
+def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, span: float, until: float, work: Integers
+                   ) -> Candidate:
+    """First event of one pair in a flight of at most `span` seconds, unless it is later than `until`."""
     mode, y = state.mode[side], state.y
     if mode in (Pair.RESTING, Pair.ABSENT):
         return Candidate(math.inf, Transition.TOUCH)
@@ -79,10 +80,10 @@ def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, spa
             if t >= span:
                 return Candidate(math.inf, Transition.TOUCH)
             at = motion_at(pair, t)
-        return Candidate(first_root(Transition.TOUCH, pair, t, at, span, work), Transition.TOUCH)
-    released = first_root(Transition.RELEASE, pair, 0.0, at, span, work)
+        return Candidate(first_root(Transition.TOUCH, pair, t, at, span, until, work), Transition.TOUCH)
+    released = first_root(Transition.RELEASE, pair, 0.0, at, span, until, work)
     if mode == Pair.CLAMPED:
-        back = first_root(Transition.REENTRY, pair, 0.0, at, min(span, released), work)
+        back = first_root(Transition.REENTRY, pair, 0.0, at, min(span, released), until, work)
         if not back >= released:
             return Candidate(back, Transition.REENTRY)
     return Candidate(released, Transition.RELEASE)
@@ -130,8 +131,8 @@ def flight_segment(tables: Tables, plant: Plant, state: State, settings: Setting
     """Fly to the first event, make its transitions, or to the end of the span; returns the time in s, nan: failed."""
     out.work[Work.FLIGHTS] += 1
     flights = flights_of(plant, state.y)
-    left = pair_candidate(plant, state, flights, LEFT, span, out.work)
-    right = pair_candidate(plant, state, flights, RIGHT, span, out.work)
+    left = pair_candidate(plant, state, flights, LEFT, span, math.inf, out.work)
+    right = pair_candidate(plant, state, flights, RIGHT, span, TOGETHER * left.when, out.work)
     if math.isnan(left.when) or math.isnan(right.when):
         return math.nan
     slide = slide_in_flight(plant, state)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Integers, Plant, State
+from grasp_ros.exact.records import Array, Integers, Plant, Rates, State
 from grasp_ros.physics.layout import (
     DAMPING,
     FORCE,
@@ -98,23 +98,33 @@ def reduced_mass(bodies: Array, side: Body) -> float:
 
 
 @kernel
-def bound(body: Array, q: float, q_rate: float, span: float) -> float:
+def rates_of(body: Array) -> Rates:
+    """What the equation of a body divides by its mass; body is its row (4,)."""
+    m, k, c, f = body[MASS], body[STIFFNESS], body[DAMPING], body[FORCE]
+    return Rates(k / m, c / m, f / m, m / c if c > 0.0 else math.inf, m / k if k > 0.0 else math.inf)
+
+
+@kernel
+def bound_by(rates: Rates, q: float, q_rate: float, span: float) -> float:
     """Bound on |q| for the next `span` seconds, for q with m q'' + c q' + k q = 0.
 
     x - x_e, x'', x''' are such quantities. The first bound is the energy of q, the second uses the impulse
     response, which stays below min(t, m/c). What a feedback drives, c < 0,
     grows by e in the time m/|c|; no span may be longer.
     """
-    grown = math.e if body[DAMPING] < 0.0 else 1.0
+    grown = math.e if rates.damping < 0.0 else 1.0
     if q_rate == 0.0:
         return grown * abs(q)
-    response = span
-    if body[DAMPING] > 0.0:
-        response = min(response, body[MASS] / body[DAMPING])
-    linear = abs(q) + abs(q_rate) * response
-    if body[STIFFNESS] > 0.0:
-        linear = min(linear, math.sqrt(q * q + q_rate * q_rate * body[MASS] / body[STIFFNESS]))
+    linear = abs(q) + abs(q_rate) * min(span, rates.response)
+    if rates.square_time < math.inf:
+        linear = min(linear, math.sqrt(q * q + q_rate * q_rate * rates.square_time))
     return grown * linear
+
+
+@kernel
+def bound(body: Array, q: float, q_rate: float, span: float) -> float:
+    """`bound_by` of a body's row (4,)."""
+    return bound_by(rates_of(body), q, q_rate, span)
 
 
 @kernel

@@ -10,11 +10,13 @@ import math
 
 import numpy as np
 
+from grasp_ros.exact.fused import fma
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Lanes, Step, Tables
 from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R
 
 FIRST, SECOND = np.int64(0), np.int64(2)  # typed: numba would compile `lanes` and `sizes` once more for a literal
+INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would keep the next one waiting
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 
 
@@ -48,6 +50,12 @@ def larger(x: Lanes, z: Lanes) -> Lanes:
 
 
 @kernel
+def sums(x: Lanes, z: Lanes) -> Lanes:
+    """The sum of each lane."""
+    return (x[0] + z[0], x[1] + z[1], x[2] + z[2], x[3] + z[3], x[4] + z[4], x[5] + z[5], x[6] + z[6], x[7] + z[7])
+
+
+@kernel
 def products(x: Lanes, s: float) -> Lanes:
     """Each lane times s."""
     return (x[0] * s, x[1] * s, x[2] * s, x[3] * s, x[4] * s, x[5] * s, x[6] * s, x[7] * s)
@@ -57,9 +65,19 @@ def products(x: Lanes, s: float) -> Lanes:
 def horner(total: Lanes, s: float, x: Lanes) -> Lanes:
     """One more coefficient of each lane."""
     return (
-        total[0] * s + x[0], total[1] * s + x[1], total[2] * s + x[2], total[3] * s + x[3],
-        total[4] * s + x[4], total[5] * s + x[5], total[6] * s + x[6], total[7] * s + x[7],
+        fma(total[0], s, x[0]), fma(total[1], s, x[1]), fma(total[2], s, x[2]), fma(total[3], s, x[3]),
+        fma(total[4], s, x[4]), fma(total[5], s, x[5]), fma(total[6], s, x[6]), fma(total[7], s, x[7]),
     )
+
+
+@inlined
+def ways(c: Array, n: int, s: float) -> Lanes:
+    """How far the lanes come on the way to s, of the even degree n."""
+    square = s * s
+    even, odd = lanes(c, n), lanes(c, n - 1)
+    for k in range(n - 2, 0, -2):
+        even, odd = horner(even, square, lanes(c, k)), horner(odd, square, lanes(c, k - 1))
+    return products(horner(even, s, odd), s)
 
 
 @inlined
@@ -68,13 +86,18 @@ def values(c: Array, n: int, s: float, at: Array) -> None:
 
     The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
     """
-    square = s * s
-    even, odd = lanes(c, n), lanes(c, n - 1)
-    for k in range(n - 2, 0, -2):
-        even, odd = horner(even, square, lanes(c, k)), horner(odd, square, lanes(c, k - 1))
-    total = horner(horner(even, s, odd), s, lanes(c, FIRST))
+    total = sums(ways(c, n, s), lanes(c, FIRST))
     for lane in range(LANES):
         at[lane] = total[lane]
+
+
+@inlined
+def values_and_ways(c: Array, n: int, s: float, at: Array) -> None:
+    """Write the lanes' values at s, of the even degree n, to `at`, and behind them how far they have come."""
+    way = ways(c, n, s)
+    total = sums(way, lanes(c, FIRST))
+    for lane in range(LANES):
+        at[lane], at[LANES + lane] = total[lane], way[lane]
 
 
 @inlined

@@ -100,7 +100,7 @@ class Tables(NamedTuple):
 
     c: Array  # (LANES (order + 1),)
     f: Array  # (FACTORS (order + 1),)
-    at: Array  # (LANES,) values of the lanes at some s
+    at: Array  # (2 LANES,) values of the lanes at some s, and how far they have come
     size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
     row: Array  # (order + 1,) one polynomial
     start: Start
@@ -147,11 +147,30 @@ class Flights(NamedTuple):
     object: Flight
 
 
+class Rates(NamedTuple):
+    """What a body's equation of motion divides by its mass, and what bounds its flight."""
+
+    stiffness: float  # k / m, 1/s^2
+    damping: float  # c / m, 1/s
+    force: float  # f / m, m/s^2
+    response: float  # m / c, s: how long a velocity goes on; inf without a damper
+    square_time: float  # m / k, s^2; inf without a spring
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of a body's position in flight, m/s^n."""
+
+    second: float
+    third: float
+    fourth: float
+    fifth: float
+
+
 class PairFlight(NamedTuple):
     """Arm and object in free flight: all that an event of the pair depends on."""
 
-    arm: Array  # (4,) row of the bodies
-    body: Array  # (4,)
+    arm_rates: Rates
+    body_rates: Rates
     arm_flight: Flight
     body_flight: Flight
     sign: float  # +1 for the left side, -1 for the right one: u = sign (x - x_o)
@@ -159,6 +178,8 @@ class PairFlight(NamedTuple):
     alike: bool  # equal rates: they move relative to each other as one such body
     horizon: float  # time in s for which a bound may be taken: what a feedback drives may grow
     inverse_p: float  # 1 / p, m/s; only read by a re-entry
+    x_e: float  # rest position of an arm with a spring, m
+    square_rate: float  # of the faster body, 1/s^2
 
 
 class Motion(NamedTuple):
@@ -173,15 +194,16 @@ class Motion(NamedTuple):
     size: float  # what the roundings of u are relative to, m
 
 
-class EventFunction(NamedTuple):
-    """A function g of time, for some time to come, that rises through 0 at an event."""
+class EventSeries(NamedTuple):
+    """A function g of time that rises through 0 at an event: g and its derivatives."""
 
-    value: float  # g
-    rate: float  # g'
-    curvature: float  # bound on |g''|
+    value: float
+    rate: float
+    second: float
+    third: float
+    fourth: float
     noise: float  # rounding of g
-    bend: float  # g'' now, or a little more
-    growth: float  # bound on |g'''|
+    doubt: float  # rounding of its second derivative
 
 
 class Candidate(NamedTuple):

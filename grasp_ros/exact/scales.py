@@ -1,9 +1,10 @@
-"""Powers of two for units and times, and the unit of a Taylor step, from the state alone; the step may correct it."""
+"""The unit of a Taylor step, a power of two, from the state alone; the step may correct it."""
 
 from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.bits import exponent, power_of_two, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
@@ -31,26 +32,6 @@ STIFF = 500.0  # relaxations within an implicit step from which on it is no dear
 
 
 @kernel
-def exponent(x: float) -> int:
-    """e of the power of two 2^e <= x < 2^(e + 1)."""
-    return math.frexp(x)[1] - 1
-
-
-@kernel
-def orders_to_one(x: float, most: int) -> int:
-    """Binary orders by which a unit is to change for x >= 0 to come near 1: at most `most`, and these for 0 and inf."""
-    if 0.0 < x < math.inf:
-        return min(max(math.frexp(x)[1], -most), most)
-    return most if x > 0.0 else -most
-
-
-@kernel
-def power_of_two_root(x: float, degree: int) -> float:
-    """The power of two above the root of x >= 0; comparing exponents is cheaper than taking the root."""
-    return math.ldexp(1.0, exponent(x) // degree + 1) if x > 0.0 else 0.0
-
-
-@kernel
 def time_of_impulse(per_hertz: float, loss: float, order: int, a: float) -> float:
     """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
 
@@ -61,7 +42,7 @@ def time_of_impulse(per_hertz: float, loss: float, order: int, a: float) -> floa
     e = (4 * exponent(per_hertz * n * n) - 2 * above) // (2 * order + 8)
     if loss > 0.0:
         e = min(e, (2 * exponent(per_hertz * n / loss) - 3 * above) // (3 * order + 2))
-    return math.ldexp(1.0, e)
+    return power_of_two(e)
 
 
 @kernel

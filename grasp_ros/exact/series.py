@@ -23,6 +23,7 @@ import numpy as np
 
 from grasp_ros.exact.collocation import ROW, WORKSPACE
 from grasp_ros.exact.flight import FLIGHT_ORDER
+from grasp_ros.exact.fused import fma
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Lanes, PerMass, Start, Tables
 from grasp_ros.exact.start import ORDER
@@ -73,14 +74,14 @@ def convolve(f: Array, k: int, lane: int, skip: int) -> Lanes:
     for j in range(np.uint64(skip), np.uint64(max(k + 1 - skip, skip))):
         i = np.uint64(FACTORS) * j + np.uint64(lane)
         m = np.uint64(FACTORS) * (end - j) + np.uint64(SECOND + lane)
-        s0 += f[i] * f[m]
-        s1 += f[i + np.uint64(1)] * f[m + np.uint64(1)]
-        s2 += f[i + np.uint64(2)] * f[m + np.uint64(2)]
-        s3 += f[i + np.uint64(3)] * f[m + np.uint64(3)]
-        s4 += f[i + np.uint64(4)] * f[m + np.uint64(4)]
-        s5 += f[i + np.uint64(5)] * f[m + np.uint64(5)]
-        s6 += f[i + np.uint64(6)] * f[m + np.uint64(6)]
-        s7 += f[i + np.uint64(7)] * f[m + np.uint64(7)]
+        s0 = fma(f[i], f[m], s0)
+        s1 = fma(f[i + np.uint64(1)], f[m + np.uint64(1)], s1)
+        s2 = fma(f[i + np.uint64(2)], f[m + np.uint64(2)], s2)
+        s3 = fma(f[i + np.uint64(3)], f[m + np.uint64(3)], s3)
+        s4 = fma(f[i + np.uint64(4)], f[m + np.uint64(4)], s4)
+        s5 = fma(f[i + np.uint64(5)], f[m + np.uint64(5)], s5)
+        s6 = fma(f[i + np.uint64(6)], f[m + np.uint64(6)], s6)
+        s7 = fma(f[i + np.uint64(7)], f[m + np.uint64(7)], s7)
     return s0, s1, s2, s3, s4, s5, s6, s7
 
 
@@ -96,9 +97,9 @@ def accelerations(left: PerMass, right: PerMass, middle: PerMass, one: float, x_
                   v_l: float, v_o: float, v_r: float) -> tuple[float, float, float]:
     """A coefficient of the bodies' accelerations without impact, (1) to (3); `one` is 1 in order 0, then 0."""
     return (
-        (one * left[3] - left[1] * (x_o + u_l)) - left[2] * v_l,
-        (one * right[3] - right[1] * (x_o - u_r)) - right[2] * v_r,
-        (one * middle[3] - middle[1] * x_o) - middle[2] * v_o,
+        fma(-left[2], v_l, fma(-left[1], x_o + u_l, one * left[3])),
+        fma(-right[2], v_r, fma(-right[1], x_o - u_r, one * right[3])),
+        fma(-middle[2], v_o, fma(-middle[1], x_o, one * middle[3])),
     )
 
 
@@ -114,7 +115,7 @@ def put(table: Array, i: int, x0: float, x1: float, x2: float, x3: float, x4: fl
 def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: float, b_1: float, a_before: float,
               b_before: float) -> float:
     """A sum of `convolve` with its four outer terms; a, the newest coefficient, comes last."""
-    return ((total + a_0 * b) + (a_before * b_1 + a_1 * b_before)) + a * b_0
+    return fma(a, b_0, fma(a_0, b, total) + fma(a_before, b_1, a_1 * b_before))
 
 
 @inlined
@@ -136,14 +137,14 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
     first = second = before = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
         gv, gd, gl, gr, go, u, q, z = convolve(f, k, FIRST, TWO)
-        u = (u + w_next * w_before) + w_end * w
-        q = (q + u_next * u_before) + u_end * u
+        u = fma(w_end, w, fma(w_next, w_before, u))
+        q = fma(u_end, u, fma(u_next, u_before, q))
         g = hertzian * q  # H w^4: the elastic force H w^3, times the w of dt = 2 w ds
         u_l, u_r = (u, gap) if on_left else (gap, u)
         one = 1.0 if k == 0 else 0.0
         a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d, d_open = (v_l - v_o, v_o - v_r) if on_left else (v_o - v_r, v_l - v_o)
-        e = one + loss * d  # 1 + p u'
+        e = fma(loss, d, one)  # 1 + p u'
         now = (v_o, d_open, a_l, a_r, a_o, e)
         # The impact law (6) per 2 ds: H w^4 (1 + p u').
         z = with_ends(z, e, g, first[5], g_0, second[5], g_1, before[5], g_before)
@@ -165,8 +166,8 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
         c[LANES * k + CHECK] = u
         time, w = 2.0 * step * w, step * d
         x_o, gap = 2.0 * step * gv, 2.0 * step * gd
-        v_l, v_r = 2.0 * step * (gl - push_l * z), 2.0 * step * (gr + push_r * z)
-        v_o = 2.0 * step * (go + push_o * z)
+        v_l, v_r = 2.0 * step * fma(-push_l, z, gl), 2.0 * step * fma(push_r, z, gr)
+        v_o = 2.0 * step * fma(push_o, z, go)
         z_l, z_r = (w, gap) if on_left else (gap, w)
         put(c, LANES * (k + 1), time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r)
 
@@ -189,21 +190,19 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     for k in range(np.uint64(n)):
         gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, FIRST, ONE)
         u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, UPPER, ONE)
-        u_l, u_r = u_l + w_end_l * w_l, u_r + w_end_r * w_r
-        q_l, q_r = q_l + u_end_l * u_l, q_r + u_end_r * u_r
-        g_l, g_r = hertz_l * ((g_l + a[8] * w_r) + q_l * b[2]), hertz_r * ((g_r + a[9] * w_l) + q_r * b[1])
-        g = 0.5 * (((ww + a[4] * w_r) + w_l * b[2]) + ((ww_mirrored + a[5] * w_l) + w_r * b[1]))
+        u_l, u_r = fma(w_end_l, w_l, u_l), fma(w_end_r, w_r, u_r)
+        q_l, q_r = fma(u_end_l, u_l, q_l), fma(u_end_r, u_r, q_r)
+        g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[8], w_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[9], w_l, g_r))
+        g = 0.5 * (fma(w_l, b[2], fma(a[4], w_r, ww)) + fma(w_r, b[1], fma(a[5], w_l, ww_mirrored)))
         one = 1.0 if k == 0 else 0.0
         a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d_l, d_r = v_l - v_o, v_o - v_r
-        e_l, e_r = one + loss_l * d_l, one + loss_r * d_r
+        e_l, e_r = fma(loss_l, d_l, one), fma(loss_r, d_r, one)
         # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
-        z_l, z_r = (z_l + a[10] * g_l) + e_l * b[3], (z_r + a[11] * g_r) + e_r * b[4]
-        wd_l, wd_r = (wd_l + a[6] * w_r) + d_l * b[2], (wd_r + a[7] * w_l) + d_r * b[1]
-        gv, gl, gr, go = (
-            (gv + a[0] * g) + v_o * b[0], (gl + a[1] * g) + a_l * b[0], (gr + a[2] * g) + a_r * b[0],
-            (go + a[3] * g) + a_o * b[0],
-        )
+        z_l, z_r = fma(e_l, b[3], fma(a[10], g_l, z_l)), fma(e_r, b[4], fma(a[11], g_r, z_r))
+        wd_l, wd_r = fma(d_l, b[2], fma(a[6], w_r, wd_l)), fma(d_r, b[1], fma(a[7], w_l, wd_r))
+        gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
+        gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
         put(f, FACTORS * k, v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r)
         put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r)
         put(f, FACTORS * k + SECOND, g, g, g, g, w_r, w_l, w_r, w_l)
@@ -215,15 +214,15 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         twice = 2.0 * step
         c[LANES * k + CHECK] = g
         w_l, w_r, x_o = step * wd_l, step * wd_r, twice * gv
-        v_l, v_r = twice * (gl - left[0] * z_l), twice * (gr + right[0] * z_r)
-        v_o = twice * (go + middle[0] * (z_l - z_r))
+        v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
+        v_o = twice * fma(middle[0], z_l - z_r, go)
         put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)
 
 
 def new_tables(order: int) -> Tables:
     """Workspace for steps of one order; its tables begin at cache lines, which vector loads want."""
     orders, line = max(order, int(FLIGHT_ORDER)) + 1, CACHE_LINE // 8
-    ends = list(itertools.accumulate((LANES * orders, max(FACTORS * orders, WORKSPACE), LANES, ROW)))
+    ends = list(itertools.accumulate((LANES * orders, max(FACTORS * orders, WORKSPACE), 2 * LANES, ROW)))
     room = np.zeros(ends[-1] + order + 1 + line)
     room = room[-(room.ctypes.data // 8) % line :]
     c, f, at, size, row = np.split(room, ends)

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.beside import free_flight, part_free, place_free
 from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, motion_of
-from grasp_ros.exact.contact import free_flight, part_free, place_free, write_state
+from grasp_ros.exact.contact import write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.friction import slide_in_contact, slip_candidate
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait

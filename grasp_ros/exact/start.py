@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from grasp_ros.exact.bits import orders_to_one, power_of_two, power_of_two_root
 from grasp_ros.exact.clock import tick
 from grasp_ros.exact.friction import push_on_object
 from grasp_ros.exact.jit import inlined, kernel
@@ -19,7 +20,7 @@ from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, Start, State, Tables
 from grasp_ros.exact.rest import NEVER, UNDECIDED, is_negligible, leaning
-from grasp_ros.exact.scales import orders_to_one, power_of_two_root, time_of_impulse
+from grasp_ros.exact.scales import time_of_impulse
 from grasp_ros.exact.start_series import NONE, POWERS, damped_leads, expand_start, first_of, force_of, leads, reach_of
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -133,7 +134,7 @@ def scaled_series(tables: Tables, plant: Plant, state: State, settings: Settings
         reach = reach_of(tables.start.c, n, settings, tail)
         if 1.0 / FITS < reach < FITS or reach == math.inf:
             break
-        scale *= math.ldexp(1.0, POWERS * orders_to_one(reach, MOST))
+        scale *= power_of_two(POWERS * orders_to_one(reach, MOST))
     return scale, reach
 
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from grasp_ros.exact.bits import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.kinematics import rate_lanes, velocity_lane
-from grasp_ros.exact.polynomial import curvatures, larger, products, sizes, values
-from grasp_ros.exact.records import Array, Integers, Plant, Settings, State, Step, Tables
-from grasp_ros.exact.scales import orders_to_one
-from grasp_ros.exact.series import ONE, expand_both, expand_one
+from grasp_ros.exact.kinematics import velocity_lane
+from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
+from grasp_ros.exact.records import Array, Integers, Lanes, Plant, Settings, State, Step, Tables
+from grasp_ros.exact.series import expand_both, expand_one
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -24,58 +26,56 @@ from grasp_ros.physics.layout import (
     TIME,
     U_L,
     U_R,
-    V_L,
-    V_O,
-    V_R,
-    X_O,
     Z_L,
     Z_R,
+    Body,
     Pair,
     Work,
 )
 
-HEAD = TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
+TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
+ONE, TWO, THREE, FOUR, FIVE = (np.int64(k) for k in range(1, TAIL + 1))  # typed, see `polynomial`
 SMALLEST = 1e-290  # of what moves
 STILL = 2.0**-300  # part of the fastest motion that is none
 BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**10  # steps whose unit does not fit
 MOST = 16  # binary orders by which a unit is changed at once
 MAX_UNITS = 200
-LN_2 = math.log(2.0)
 
 
 @inlined
-def motion_sizes(c: Array, reach: float, size: Array) -> None:
-    """Write to `size` the sizes (LANES,) of what moves in each lane within `reach`: the largest of a few terms."""
-    power = reach
-    largest = products(sizes(c, ONE), power)
-    for k in range(2, HEAD + 1):
-        power *= reach
-        largest = larger(largest, products(sizes(c, k), power))
-    for lane in range(LANES):
-        size[lane] = largest[lane]
+def motion_sizes(c: Array, reach: float) -> Lanes:
+    """Sizes of what moves in each lane within `reach`: the largest of a few terms."""
+    square = reach * reach
+    cube, fourth = square * reach, square * square
+    low = larger(products(sizes(c, ONE), reach), products(sizes(c, TWO), square))
+    high = larger(products(sizes(c, THREE), cube), products(sizes(c, FOUR), fourth))
+    return larger(larger(low, high), products(sizes(c, FIVE), fourth * reach))
 
 
 @inlined
-def step_size(c: Array, size: Array, n: int, first: float) -> float:
+def largest_part(x: Lanes, inverse: Lanes) -> float:
+    """The largest size of a lane, by the inverse of what it is measured by."""
+    left = max(max(x[0] * inverse[0], x[1] * inverse[1]), max(x[2] * inverse[2], x[3] * inverse[3]))
+    right = max(max(x[4] * inverse[4], x[5] * inverse[5]), max(x[6] * inverse[6], x[7] * inverse[7]))
+    return max(left, right)
+
+
+@inlined
+def step_size(c: Array, inverse: Lanes, n: int, first: float) -> float:
     """Step in s / unit at which the first neglected term of a lane is a part of its size; `first`: the part's root.
 
-    The radius of convergence is estimated from the last TAIL coefficients. Where they have vanished it is inf. The
-    logarithms are those of a broken line through the powers of two, which is near enough.
+    The radius of convergence is estimated from the last TAIL coefficients. Where they have vanished it is inf.
     """
     last = sizes(c, n)
     if not last[0] + last[1] + last[2] + last[3] + last[5] + last[6] + last[7] < math.inf:
         return 0.0  # the coefficients have left the range of numbers
     growth = -math.inf  # binary logarithm of the inverse radius
     for k in range(n - TAIL + 1, n + 1):
-        x = sizes(c, k)
-        largest = 0.0
-        for lane in range(LANES):
-            largest = max(largest, x[lane] * size[lane])
+        largest = largest_part(sizes(c, k), inverse)
         if largest > 0.0:
-            m, e = math.frexp(largest)
-            growth = max(growth, (e + 2.0 * (m - 1.0)) / k)
-    return first * math.exp(-LN_2 * growth) if growth > -math.inf else math.inf
+            growth = max(growth, near_log2(largest) * INVERSE[k])
+    return first * near_exp2(-growth) if growth > -math.inf else math.inf
 
 
 @inlined
@@ -101,6 +101,28 @@ def expand(tables: Tables, plant: Plant, step: Step) -> None:
 
 
 @inlined
+def driven(plant: Plant, y: Array, body: Body, t: float, size: float) -> float:
+    """Size of a velocity that moves by no less than a part t / s of the terms of its equation."""
+    row, lane = plant.bodies[body], velocity_lane(body)
+    terms = abs(row[FORCE]) + abs(row[STIFFNESS] * y[lane - 1]) + abs(row[DAMPING] * y[lane])
+    return max(size, t * (terms / row[MASS]))  # the quotient does not wait for the series
+
+
+@inlined
+def depth_size(z: float, touches: bool, size: float, moved: float) -> float:
+    """Size of the lane of a pair whose u moves by `moved`."""
+    if touches:
+        return max(size, moved * near_inverse(2.0 * z)) if z > SMALLEST else size
+    return max(size, moved)
+
+
+@inlined
+def inverse(size: float) -> float:
+    """1 / size; 0 for what does not move."""
+    return near_inverse(size) if size > SMALLEST else 0.0
+
+
+@inlined
 def length(tables: Tables, plant: Plant, y: Array, step: Step, settings: Settings, reach: float) -> float:
     """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`.
 
@@ -108,28 +130,18 @@ def length(tables: Tables, plant: Plant, y: Array, step: Step, settings: Setting
     positions with them.
     The product has a test of its own.
     """
-    c, size = tables.c, tables.size
-    motion_sizes(c, reach, size)
-    t, doubt = size[TIME], EPS / settings.tolerance
-    for body in (LEFT, OBJECT, RIGHT):
-        row, lane = plant.bodies[body], velocity_lane(body)
-        terms = abs(row[FORCE]) + abs(row[STIFFNESS] * y[lane - 1]) + abs(row[DAMPING] * y[lane])
-        size[lane] = max(size[lane], t * doubt * terms / row[MASS])
-    fastest = max(size[V_L], size[V_O], size[V_R])
-    for body in (LEFT, OBJECT, RIGHT):
-        size[velocity_lane(body)] = max(size[velocity_lane(body)], STILL * fastest)
-    size[X_O] = max(size[X_O], t * size[V_O])
-    for side in (LEFT, RIGHT):
-        front, back = rate_lanes(side)
-        lane = Z_L + side
-        moved = t * (size[front] + size[back])
-        touching = step.left if side == LEFT else step.right
-        if not touching or c[lane] > 0.0:
-            size[lane] = max(size[lane], moved / (2.0 * c[lane]) if touching else moved)
-    size[CHECK] = 0.0
-    for lane in range(LANES):
-        size[lane] = 1.0 / size[lane] if size[lane] > SMALLEST else 0.0
-    return step_size(c, size, step.order, step.first)
+    c = tables.c
+    t, v_l, x_o, v_o, _, v_r, z_l, z_r = motion_sizes(c, reach)
+    doubt = t * (EPS / settings.tolerance)
+    v_l, v_o = driven(plant, y, LEFT, doubt, v_l), driven(plant, y, OBJECT, doubt, v_o)
+    v_r = driven(plant, y, RIGHT, doubt, v_r)
+    still = STILL * max(v_l, v_o, v_r)
+    v_l, v_o, v_r = max(v_l, still), max(v_o, still), max(v_r, still)
+    x_o = max(x_o, t * v_o)
+    z_l = depth_size(c[Z_L], step.left, z_l, t * (v_l + v_o))
+    z_r = depth_size(c[Z_R], step.right, z_r, t * (v_o + v_r))
+    parts = (inverse(t), inverse(v_l), inverse(x_o), inverse(v_o), 0.0, inverse(v_r), inverse(z_l), inverse(z_r))
+    return step_size(c, parts, step.order, step.first)
 
 
 @inlined
@@ -155,7 +167,7 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
             apart = (step.left and tables.at[Z_L] <= 0.0) or (step.right and tables.at[Z_R] <= 0.0)
             if apart or tables.at[TIME] >= span:
                 return step, 1.0
-        unit = step.unit * math.ldexp(1.0, orders_to_one(h, MOST))
+        unit = step.unit * power_of_two(orders_to_one(h, MOST))
         step = Step(step.order, step.first, unit, step.left, step.right)
     return step, math.nan
 
@@ -179,7 +191,7 @@ def accepted_length(tables: Tables, step: Step, h: float, settings: Settings, wo
     Shortening it costs no new expansion.
     """
     for _ in range(60):
-        values(tables.c, step.order, h, tables.at)
+        values_and_ways(tables.c, step.order, h, tables.at)
         curvatures(tables.c, step.order, h, tables.size)
         if is_exact(tables, step, h, settings.tolerance):
             return h
