@@ -5,7 +5,7 @@ from __future__ import annotations
 from grasp_ros.exact.flight import fly, launch
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of
-from grasp_ros.exact.records import Array, Flight, Plant, Regime, Step, Tables
+from grasp_ros.exact.records import Array, Flight, Placing, Plant, Regime, Tables
 from grasp_ros.physics.layout import (
     DAMPING,
     LANES,
@@ -25,19 +25,27 @@ from grasp_ros.physics.layout import (
     Body,
 )
 
+FAR = 4.0  # times as far from 0 as the arm: there u is no better known than the place of the arm
+
 
 @inlined
-def flies_free(tables: Tables, plant: Plant, y: Array, side: Body, s: float, t: float) -> bool:
-    """Whether an arm that touches nothing is better put where it flies than where the ways of object and gap tell.
+def placing(tables: Tables, plant: Plant, y: Array, side: Body, touches: bool, s: float, t: float) -> Placing:
+    """How an arm is placed after a step to s of t s.
 
-    The roundings of these ways would show in its place, or those of the object drive it by its spring within t s; a
-    damper that stops it within t leaves less than the roundings of a series.
+    With the gap the roundings of the object would show in the place of an arm that is much nearer to 0, which moves on
+    by the ways of object and gap instead, if those are short. It flies where they are not, where roundings of the
+    object would drive it by its spring, or where its damper stops it: it leaves less than the roundings of a series.
     """
+    if touches:
+        return Placing.BY_GAP
     x, v, _ = arm_of(y, side)
-    row = plant.bodies[side]
-    coarse = way_bound(tables, X_O, s) + way_bound(tables, Z_L + side, s) > abs(x)
-    driven = row[STIFFNESS] * t * abs(y[X_O]) > row[MASS] * abs(v)
-    return bool(coarse or driven or row[DAMPING] * t > row[MASS])
+    row, x_o = plant.bodies[side], abs(y[X_O])
+    if row[STIFFNESS] * t * x_o > row[MASS] * abs(v) or row[DAMPING] * t > row[MASS]:
+        return Placing.BY_FLIGHT
+    if x_o <= FAR * abs(x):
+        return Placing.BY_GAP
+    way = way_bound(tables, X_O, s) + way_bound(tables, Z_L + side, s)
+    return Placing.BY_WAY if way <= abs(x) else Placing.BY_FLIGHT
 
 
 @inlined
@@ -47,43 +55,43 @@ def way_bound(tables: Tables, lane: int, s: float) -> float:
 
 
 @inlined
-def free_flight(plant: Plant, y: Array, side: Body, flies: bool) -> Flight:
-    """Flight of an arm; what nobody reads if it does not, because a launch has its price."""
+def free_flight(plant: Plant, y: Array, side: Body, how: Placing) -> Flight:
+    """Flight of an arm; no more than its begin if it does not fly, because a launch has its price."""
     x, v, _ = arm_of(y, side)
-    return launch(plant.bodies[side], x, v) if flies else Flight(Regime.DRIFT, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if how == Placing.BY_FLIGHT:
+        flight: Flight = launch(plant.bodies[side], x, v)
+        return flight
+    return Flight(Regime.DRIFT, x, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @inlined
-def place_beside(at: Array, step: Step, free: tuple[Flight, Flight], y: Array) -> None:
-    """Put the arms that touch nothing where the ways of object and gap take them, whose roundings are small."""
-    if not step.left:
+def place_beside(at: Array, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float, y: Array) -> None:
+    """Put arms where they are after t s, if that is not where object and gap are."""
+    if how[0] == Placing.BY_WAY:
         y[X_L] = free[0].x + (at[LANES + X_O] + at[LANES + Z_L])
-    if not step.right:
-        y[X_R] = free[1].x + (at[LANES + X_O] - at[LANES + Z_R])
-
-
-@inlined
-def place_free(flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: float, y: Array) -> None:
-    """Put the arms that fly where they are after t s."""
-    if flies_l:
+    elif how[0] == Placing.BY_FLIGHT:
         y[X_L], y[V_L], _ = fly(free[0], t)
-    if flies_r:
+    if how[1] == Placing.BY_WAY:
+        y[X_R] = free[1].x + (at[LANES + X_O] - at[LANES + Z_R])
+    elif how[1] == Placing.BY_FLIGHT:
         y[X_R], y[V_R], _ = fly(free[1], t)
 
 
 @inlined
-def gap_shows(row: Array, t: float, x_before: float, x: float, x_o: float) -> bool:
-    """Whether places tell u of an arm better than a series that its damper has made coarse in t s.
+def gap_shows(row: Array, how: Placing, t: float, x_before: float, x: float, x_o: float) -> bool:
+    """Whether places tell u of an arm better than a series, or no worse.
 
-    They do where it is far from the object, or has come far.
+    They do where a damper has made the series coarse, and it is far from the object or has come far.
     """
-    return row[DAMPING] * t > row[MASS] and 2.0 * max(abs(x - x_o), abs(x - x_before)) >= max(abs(x), abs(x_o))
+    if how != Placing.BY_FLIGHT:
+        return how == Placing.BY_WAY
+    return bool(row[DAMPING] * t > row[MASS] and 2.0 * max(abs(x - x_o), abs(x - x_before)) >= max(abs(x), abs(x_o)))
 
 
 @inlined
-def part_free(plant: Plant, flies_l: bool, flies_r: bool, free: tuple[Flight, Flight], t: float, y: Array) -> None:
-    """Let u of damped arms that have flown for t s follow their places, or roundings of the series add up in it."""
-    if flies_l and gap_shows(plant.bodies[LEFT], t, free[0].x, y[X_L], y[X_O]):
+def part_beside(plant: Plant, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float, y: Array) -> None:
+    """Let u of arms follow their places after t s where these show it, or roundings of the series add up in it."""
+    if gap_shows(plant.bodies[LEFT], how[0], t, free[0].x, y[X_L], y[X_O]):
         y[U_L] = y[X_L] - y[X_O]
-    if flies_r and gap_shows(plant.bodies[RIGHT], t, free[1].x, y[X_R], y[X_O]):
+    if gap_shows(plant.bodies[RIGHT], how[1], t, free[1].x, y[X_R], y[X_O]):
         y[U_R] = y[X_O] - y[X_R]

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.beside import flies_free, free_flight, part_free, place_beside, place_free
+from grasp_ros.exact.beside import free_flight, part_beside, place_beside, placing
 from grasp_ros.exact.clock import tick
 from grasp_ros.exact.friction import slide_in_contact
 from grasp_ros.exact.impact import damping_factor
@@ -22,6 +22,7 @@ from grasp_ros.exact.records import (
     Flight,
     Integers,
     Output,
+    Placing,
     Plant,
     Settings,
     SlideCandidate,
@@ -132,7 +133,7 @@ def write_state(at: Array, u_l: float, u_r: float, y: Array) -> None:
 
 
 @inlined
-def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, bool], free: tuple[Flight, Flight],
+def deliver(tables: Tables, step: Step, s: float, t: float, how: tuple[Placing, Placing], free: tuple[Flight, Flight],
             state: State, out: Output) -> None:
     """Write the states at the output times before the end of a Taylor step, at s and after the time t."""
     at = tables.at
@@ -141,8 +142,7 @@ def deliver(tables: Tables, step: Step, s: float, t: float, flies: tuple[bool, b
         row = out.rows[out.filled[Filled.OUTPUTS]]
         values_and_ways(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
         write_state(at, penetration(at[Z_L], step.left), penetration(at[Z_R], step.right), row)
-        place_beside(at, step, free, row)
-        place_free(flies[0], flies[1], free, tau, row)
+        place_beside(at, how, free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
 
@@ -170,16 +170,14 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         s = invert_time(tables, step, span, s, t)
         t = span
         values_and_ways(c, n, s, at)
-    flies = (not step.left and flies_free(tables, plant, y, LEFT, s, t),
-             not step.right and flies_free(tables, plant, y, RIGHT, s, t))
-    free = (free_flight(plant, y, LEFT, flies[0]), free_flight(plant, y, RIGHT, flies[1]))
+    how = (placing(tables, plant, y, LEFT, step.left, s, t), placing(tables, plant, y, RIGHT, step.right, s, t))
+    free = (free_flight(plant, y, LEFT, how[0]), free_flight(plant, y, RIGHT, how[1]))
     y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
     write_state(at, y[U_L], y[U_R], y)
-    place_beside(at, step, free, y)
-    place_free(flies[0], flies[1], free, t, y)
-    part_free(plant, flies[0], flies[1], free, t, y)
+    place_beside(at, how, free, t, y)
+    part_beside(plant, how, free, t, y)
     keep_resting(state)
-    deliver(tables, step, s, t, flies, free, state, out)
+    deliver(tables, step, s, t, how, free, state, out)
     tick(state.clock, t)
     leave_step(tables, s, step.unit)
     leave_orders(tables, n, out)

@@ -14,36 +14,39 @@ exists.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from grasp_ros.exact.flight import fly
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import bound_by, rates_of
-from grasp_ros.exact.records import (
-    Array,
-    Derivatives,
-    EventSeries,
-    Flights,
-    Integers,
-    Motion,
-    PairFlight,
-    Plant,
-    Rates,
-)
+from grasp_ros.exact.records import Array, Flights, Integers, Motion, PairFlight, Plant, Rates
 from grasp_ros.exact.roots import safe_step
-from grasp_ros.physics.layout import (
-    DISSIPATION,
-    EPS,
-    LEFT,
-    OBJECT,
-    U_L,
-    Body,
-    Transition,
-    Work,
-)
+from grasp_ros.physics.layout import DISSIPATION, EPS, LEFT, OBJECT, U_L, Body, Transition, Work
 
 MAX_ITERATIONS = 10_000_000
-MAX_NEWTON = 50
+MAX_NEWTON, MAX_REFINEMENTS = 20, 200
 SMALLEST = 1e-250  # of a rate: products of what is smaller have lost their digits
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of a body's position in flight, m/s^n."""
+
+    second: float
+    third: float
+    fourth: float
+    fifth: float
+
+
+class EventSeries(NamedTuple):
+    """A function g of time that rises through 0 at an event: g and its derivatives."""
+
+    value: float
+    rate: float
+    second: float
+    third: float
+    fourth: float
+    noise: float  # rounding of g
+    doubt: float  # rounding of its second derivative
 
 
 @kernel
@@ -130,12 +133,13 @@ def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -
 
 
 @inlined
-def rises_to_root(g: EventSeries, growth: float, left: float) -> bool:
-    """Whether g has one root within twice Newton's step, because g' keeps half of its size there."""
+def reach_of_root(g: EventSeries, growth: float, left: float) -> float:
+    """Time within which g has its only root, because g' keeps half of its size so long; 0 if that is not known."""
     if not (g.value < 0.0 and g.rate > SMALLEST):
-        return False
+        return 0.0
     reach = -2.0 * g.value / g.rate
-    return reach <= left and reach * (max(g.doubt - g.second, 0.0) + growth * reach) <= 0.5 * g.rate
+    lost = reach * (max(g.doubt - g.second, 0.0) + growth * reach)
+    return reach if reach <= left and lost <= 0.5 * g.rate else 0.0
 
 
 @inlined
@@ -154,6 +158,37 @@ def root_of_series(g: EventSeries) -> float:
 
 
 @kernel
+def root_between(kind: Transition, pair: PairFlight, low: float, high: float, g: EventSeries, growth: float,
+                 work: Integers) -> float:
+    """The root in (low, high] of a function that rises there; g is its series at low.
+
+    The step to the root of the series is the last one if what the series neglects, of fifth order, is less than a few
+    roundings of the time. Where the series does not lead into the interval its middle does.
+    """
+    t = low
+    for _ in range(MAX_REFINEMENTS):
+        step = root_of_series(g)
+        if not low <= t + step <= high:
+            step = 0.5 * (low + high) - t
+        elif growth * pair.square_rate * abs(step) ** 5 <= 8.0 * EPS * t * g.rate:
+            return t + step
+        t += step
+        if high - low <= 2.0 * EPS * high:
+            return t
+        work[Work.ROOT_ITERATIONS] += 1
+        at = motion_at(pair, t)
+        own, body = derivatives_of(pair.arm_rates, at.x, at.v), derivatives_of(pair.body_rates, at.x_o, at.v_o)
+        g = event_series(kind, pair, at, own, body)
+        if abs(g.value) <= g.noise:
+            return t
+        if g.value > 0.0:
+            high = t
+        else:
+            low = t
+    return t
+
+
+@kernel
 def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: float, until: float, work: Integers
                ) -> float:
     """First time in (t, span] at which u rises or falls through 0, or u' rises through -1/p; inf if there is none.
@@ -167,30 +202,26 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
     until : float, s
         What comes later need not be found.
     """
-    step, growth, near = 0.0, 0.0, False
+    step = 0.0
     for _ in range(MAX_ITERATIONS):
         work[Work.ROOT_ITERATIONS] += 1
+        left = min(span - t, pair.horizon)
         own, body = derivatives_of(pair.arm_rates, at.x, at.v), derivatives_of(pair.body_rates, at.x_o, at.v_o)
         g = event_series(kind, pair, at, own, body)
-        if g.rate > 0.0 and (abs(g.value) if near else -g.value) <= g.noise:  # the series may have led beyond the root
+        if g.value >= -g.noise and g.rate > 0.0:
             return t
-        if not near:
-            left = min(span - t, pair.horizon)
-            curvature, growth = event_bounds(kind, pair, own, body, left)
-            near = rises_to_root(g, growth, left)
-        if near:
-            step = root_of_series(g)
-            if growth * pair.square_rate * abs(step) ** 5 <= 8.0 * EPS * t * g.rate:  # / 60: a few roundings of t
-                return t + step
-        else:
-            step = certain_step(g, curvature, growth, step)
-            if kind == Transition.TOUCH:
-                step = max(step, envelope_step(pair, at))
-            step = min(step, pair.horizon)
-            if not step <= span - t or t > until:
-                return math.nan if math.isnan(step) else math.inf
-            if step <= EPS * t or step == 0.0:
-                return t
+        curvature, growth = event_bounds(kind, pair, own, body, left)
+        reach = reach_of_root(g, growth, left)
+        if reach > 0.0:
+            return root_between(kind, pair, t, t + reach, g, growth, work)
+        step = certain_step(g, curvature, growth, step)
+        if kind == Transition.TOUCH:
+            step = max(step, envelope_step(pair, at))
+        step = min(step, pair.horizon)
+        if not step <= span - t or t > until:
+            return math.nan if math.isnan(step) else math.inf
+        if step <= EPS * t or step == 0.0:
+            return t
         t += step
         at = motion_at(pair, t)
     return math.nan

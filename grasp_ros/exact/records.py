@@ -125,6 +125,14 @@ class Regime(IntEnum):
     OVER = 3  # over-damped, with a rest position far away or none
 
 
+class Placing(IntEnum):
+    """What tells the place of an arm after a step in contact, see `beside.placing`."""
+
+    BY_GAP = 0  # where the object is, and u
+    BY_WAY = 1  # where it was, and how far object and gap have come
+    BY_FLIGHT = 2  # its own equation
+
+
 class Flight(NamedTuple):
     """One body in free flight from (x, v), see `flight.launch`."""
 
@@ -157,15 +165,6 @@ class Rates(NamedTuple):
     square_time: float  # m / k, s^2; inf without a spring
 
 
-class Derivatives(NamedTuple):
-    """Derivatives of a body's position in flight, m/s^n."""
-
-    second: float
-    third: float
-    fourth: float
-    fifth: float
-
-
 class PairFlight(NamedTuple):
     """Arm and object in free flight: all that an event of the pair depends on."""
 
@@ -192,18 +191,6 @@ class Motion(NamedTuple):
     u: float  # in a short flight exact where the difference of the positions is not
     d: float  # u'
     size: float  # what the roundings of u are relative to, m
-
-
-class EventSeries(NamedTuple):
-    """A function g of time that rises through 0 at an event: g and its derivatives."""
-
-    value: float
-    rate: float
-    second: float
-    third: float
-    fourth: float
-    noise: float  # rounding of g
-    doubt: float  # rounding of its second derivative
 
 
 class Candidate(NamedTuple):

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.beside import free_flight, part_free, place_free
+from grasp_ros.exact.beside import free_flight, part_beside, place_beside
 from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, motion_of
 from grasp_ros.exact.contact import write_state
@@ -30,6 +30,7 @@ from grasp_ros.exact.records import (
     Flight,
     Integers,
     Output,
+    Placing,
     Plant,
     SlideCandidate,
     Start,
@@ -92,15 +93,15 @@ def squeezed_candidate(tables: Tables, plant: Plant, state: State, side: Body, h
 
 
 @inlined
-def deliver(tables: Tables, h: float, t: float, flies: tuple[bool, bool], free: tuple[Flight, Flight], state: State,
-            out: Output) -> None:
+def deliver(tables: Tables, h: float, t: float, how: tuple[Placing, Placing], free: tuple[Flight, Flight],
+            state: State, out: Output) -> None:
     """Write the states at the output times before the end t of a segment, from the polynomials in t / h."""
     tau = due(state, out)
     while tau < t:
         row = out.rows[out.filled[Filled.OUTPUTS]]
         values(tables.c, STAGES, tau / h, tables.at)
         write_state(tables.at, tables.at[U_L], tables.at[U_R], row)
-        place_free(flies[0], flies[1], free, tau, row)
+        place_beside(tables.at, how, free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
 
@@ -140,14 +141,15 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     else:
         out.filled[Filled.PENALTY] = 0
     t = s * h
-    flies = (state.mode[LEFT] != Pair.CONTACT, state.mode[RIGHT] != Pair.CONTACT)
-    free = (free_flight(plant, y, LEFT, flies[0]), free_flight(plant, y, RIGHT, flies[1]))
-    deliver(tables, h, t, flies, free, state, out)
+    how = (Placing.BY_GAP if state.mode[LEFT] == Pair.CONTACT else Placing.BY_FLIGHT,
+           Placing.BY_GAP if state.mode[RIGHT] == Pair.CONTACT else Placing.BY_FLIGHT)
+    free = (free_flight(plant, y, LEFT, how[0]), free_flight(plant, y, RIGHT, how[1]))
+    deliver(tables, h, t, how, free, state, out)
     values(c, STAGES, s, at)
     y[U_L], y[U_R] = at[U_L], at[U_R]
     write_state(at, y[U_L], y[U_R], y)
-    place_free(flies[0], flies[1], free, t, y)
-    part_free(plant, flies[0], flies[1], free, t, y)
+    place_beside(at, how, free, t, y)
+    part_beside(plant, how, free, t, y)
     keep_resting(state)
     tick(state.clock, t)
     leave_step(tables, s, h)
