@@ -116,6 +116,11 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
         if slips and abs(a_o) * plant.bodies[OBJECT, MASS] <= doubt:
             a_o = 0.0
         c[following + V_O] = share * a_o
+        # Both move alike until u begins; what tells them apart before is rounding, which a strong damper would enlarge.
+        if k + 2 * POWERS < begin_l:
+            c[following + V_L] = c[following + V_O]
+        if k + 2 * POWERS < begin_r:
+            c[following + V_R] = c[following + V_O]
         c[following + X_L], c[following + X_R] = share * c[i + V_L], share * c[i + V_R]
         c[following + X_O] = share * c[i + V_O]
         if k + POWERS >= begin_l:

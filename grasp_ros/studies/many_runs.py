@@ -26,11 +26,7 @@ from grasp_ros.simulation.simulate import simulate
 from grasp_ros.studies.peer_heyoka import BALLISTIC_HERTZ, BALLISTIC_S, HeyokaGrasp, Leg, heyoka_system
 
 ERROR, OFF = 1e-6, 0.02
-LADDERS = {
-    "ensemble": (1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
-    "heyoka": (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
-    "scipy": (1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12),
-}
+LADDER = (1e-6, 3e-7, 1e-7, 3e-8, 1e-8, 3e-9, 1e-9, 3e-10, 1e-10, 3e-11, 1e-11, 3e-12, 1e-12)  # of settings
 ROWS = {"ensemble": 4000, "heyoka": 400, "scipy": 8}
 METHOD = "dop853_events"
 
@@ -97,7 +93,7 @@ def coarsest(name: str, scene: Scene) -> tuple[float, float]:
     """The coarsest setting whose last state has no larger error than `ERROR`, and that error."""
     truth = simulate(scene, grid=np.array([scene.duration])).state[-1]
     setting, error = 0.0, np.inf
-    for setting in LADDERS[name]:
+    for setting in LADDER:
         error = float(np.abs(ONE[name](setting, scene) - truth).max())
         if error <= ERROR:
             break
