@@ -1,4 +1,4 @@
-"""Exponents, logarithms and powers of two by the bits of a number: the C library's take ten times as long."""
+"""Exponents, logarithms and powers of two by the bits of a number, without a call of the C library."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def near_exp2(x: float) -> float:
 
 @inlined
 def near_inverse(x: float) -> float:
-    """1 / x for 0 < x < inf, at most an eighth too large or too small, and exact for powers of two."""
+    """1 / x for 0 < x < inf, at most an eighth too large, and exact for powers of two."""
     return np.int64(2 * ONE - int(np.float64(x).view(np.int64))).view(np.float64)
 
 
