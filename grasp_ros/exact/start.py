@@ -45,7 +45,7 @@ from grasp_ros.physics.layout import (
 )
 
 ORDER = np.int64(72)  # of the series: the force of a pair appears at s^(3a/2), and acts on itself every a/2 + 8 orders
-HALVINGS = 400  # from a span to any time that there is: h^4 goes with it
+HALVINGS = 30
 NOTHING = 2.0**-500  # of its impulse: a pair that has just touched stands at u = 0
 FITS, MOST, MAX_SCALES = 4.0, 16, 100  # of the reach, and binary orders by which the time scale is changed at once
 
@@ -164,8 +164,6 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
         if is_quiet(tables.start, plant, state, n, left, right, h):
             break
         h *= 0.5
-    else:
-        return math.nan
     t = span if h == whole else scale * ((h * h) * (h * h))
     tau = due(state, out)
     while tau < t:
