@@ -92,13 +92,14 @@ def derivatives_of(rates: Rates, x: float, v: float) -> Derivatives:
 @inlined
 def event_series(kind: Transition, pair: PairFlight, at: Motion, own: Derivatives, body: Derivatives) -> EventSeries:
     """The series of a function g of time that rises through 0 at an event."""
-    sign = -pair.sign if kind == Transition.RELEASE else pair.sign
+    turn = -1.0 if kind == Transition.RELEASE else 1.0
+    sign = turn * pair.sign
     second, third = sign * (own.second - body.second), sign * (own.third - body.third)
     fourth, fifth = sign * (own.fourth - body.fourth), sign * (own.fifth - body.fifth)
     if kind == Transition.REENTRY:
         noise, doubt = EPS * pair.inverse_p, 4.0 * EPS * (abs(own.third) + abs(body.third))
         return EventSeries(at.d + pair.inverse_p, second, third, fourth, fifth, noise, doubt)
-    turn, doubt = -1.0 if kind == Transition.RELEASE else 1.0, 4.0 * EPS * (abs(own.second) + abs(body.second))
+    doubt = 4.0 * EPS * (abs(own.second) + abs(body.second))
     return EventSeries(turn * at.u, turn * at.d, second, third, fourth, EPS * at.size, doubt)
 
 

@@ -11,7 +11,7 @@ from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import velocity_lane
 from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
 from grasp_ros.exact.records import Array, Integers, Lanes, Plant, Settings, State, Step, Tables
-from grasp_ros.exact.series import expand_both, expand_one
+from grasp_ros.exact.series import ONE, TWO, expand_both, expand_one
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
@@ -34,7 +34,7 @@ from grasp_ros.physics.layout import (
 )
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
-ONE, TWO, THREE, FOUR, FIVE = (np.int64(k) for k in range(1, TAIL + 1))  # typed, see `polynomial`
+THREE, FOUR, FIVE = (np.int64(k) for k in range(3, TAIL + 1))  # typed, see `polynomial`
 SMALLEST = 1e-290  # of what moves
 STILL = 2.0**-300  # part of the fastest motion that is none
 BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit

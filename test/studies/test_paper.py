@@ -116,9 +116,7 @@ def test_a_symmetric_start_is_a_knife_edge() -> None:
 
 def test_times_beyond_what_can_be_known_are_ranges() -> None:
     assert seconds(settlings(CASES[1])) == "18.2 s"
-    found = re.fullmatch(r"(\d{3}) to (\d{3}) s", seconds(settlings(CASES[3])))
-    assert found is not None
-    assert 300 < int(found[1]) < int(found[2]) < 900
+    assert re.fullmatch(r"5\d\d to [67]\d\d s", seconds(settlings(CASES[3])))
     assert seconds([np.inf, np.inf]) == "never"
 
 
