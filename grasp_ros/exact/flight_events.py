@@ -145,17 +145,17 @@ def reach_of_root(g: EventSeries, growth: float, left: float) -> float:
 
 @inlined
 def root_of_series(g: EventSeries) -> float:
-    """Time to the root of g by its series, by Newton's iteration."""
+    """Time to the root of g by its series, by Newton's iteration; nan if that does not converge."""
     two, three, four = 0.5 * g.second, g.third / 6.0, g.fourth / 24.0
-    t = -g.value / g.rate
+    t = safe_step(g.value, g.rate, max(g.second, 0.0)) if g.value < 0.0 else -g.value / g.rate
     for _ in range(MAX_NEWTON):
         value = (((four * t + three) * t + two) * t + g.rate) * t + g.value
         rate = ((4.0 * four * t + 3.0 * three) * t + 2.0 * two) * t + g.rate
         step = value / rate
         t -= step
         if abs(step) <= 1e-8 * abs(t):
-            break
-    return t
+            return t
+    return math.nan
 
 
 @kernel

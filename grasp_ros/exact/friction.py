@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, rate_lanes
+from grasp_ros.exact.kinematics import approach, arm_of, rate_lanes
 from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
 from grasp_ros.exact.roots import first_rise
 from grasp_ros.physics.layout import (
@@ -27,10 +27,12 @@ from grasp_ros.physics.layout import (
     MASS,
     OBJECT,
     RIGHT,
+    STIFFNESS,
     TIME,
     U_L,
     V_O,
     Z_L,
+    Body,
     Pair,
     Slide,
 )
@@ -59,23 +61,41 @@ def apply_friction(plant: Plant, mode: Integers) -> None:
 
 
 @kernel
+def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
+    """The impact of one pair on an object at rest, and its roundings.
+
+    Of 1 + p u', which may have cancelled, the terms count. An arm that glides at u' = -1/p, where rounding hides its
+    force, is held there by as much as its own force.
+    """
+    x, v, sign = arm_of(state.y, side)
+    body, loss = plant.bodies[side], plant.pairs[side, DISSIPATION]
+    elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
+    force = elastic * damping_factor(loss, approach(state.y, side))
+    noise = ROUNDINGS * (elastic * (1.0 + loss * (abs(v) + abs(state.y[V_O]))))
+    spring, drag = body[STIFFNESS] * x, body[DAMPING] * v
+    own = sign * (body[FORCE] - spring - drag)
+    if abs(force) <= noise and 0.0 < own <= noise:
+        return Push(own, ROUNDINGS * (abs(body[FORCE]) + abs(spring) + abs(drag)), noise)
+    return Push(force, noise, noise)
+
+
+@kernel
 def push_on_object(plant: Plant, state: State) -> Push:
     """What pushes the object beside its dry friction, by (3), and the rounding of that and of the friction.
 
     This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
-    by more than the rounding. Of 1 + p u', which may have cancelled, the terms count.
+    by more than the rounding.
     """
-    total, size = 0.0, 0.0  # of both sides first, for mirror images
+    given = plant.given[OBJECT, FORCE]
+    value, rounding, noise = 0.0, 0.0, 0.0  # of both sides first, for mirror images
     for side in (LEFT, RIGHT):
         if state.mode[side] == Pair.CONTACT:
-            loss = plant.pairs[side, DISSIPATION]
-            front, back = rate_lanes(side)
-            elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
-            force = elastic * damping_factor(loss, approach(state.y, side))
-            size += elastic * (1.0 + loss * (abs(state.y[front]) + abs(state.y[back])))
-            total += force if side == LEFT else -force
-    given = plant.given[OBJECT, FORCE]
-    return Push(total + given, ROUNDINGS * (size + (abs(given) + plant.coulomb)))
+            impact = impact_on_object(plant, state, side)
+            value += impact.value if side == LEFT else -impact.value
+            rounding += impact.rounding
+            noise += impact.noise
+    still = ROUNDINGS * (abs(given) + plant.coulomb)
+    return Push(value + given, rounding + still, noise + still)
 
 
 @inlined
@@ -140,9 +160,9 @@ def beyond(over: float, rounding: float) -> float:
 
 
 @kernel
-def slip_candidate(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
+def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, rounding: float, work: Integers) -> SlideCandidate:
     """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction."""
-    row, copy, rounding = tables.row, tables.start.f, push_on_object(plant, state).rounding
+    row, copy = tables.row, tables.start.f
     push = row[0] + plant.given[OBJECT, FORCE]
     for k in range(n + 1):
         copy[k] = -row[k]
@@ -167,9 +187,9 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
         for k in range(n + 1):
             row[k] = factor * c[LANES * k + V_O]
         if row[0] == 0.0:
-            accelerating = c[LANES + TIME] * push_on_object(plant, state).rounding / plant.bodies[OBJECT, MASS]
+            accelerating = c[LANES + TIME] * push_on_object(plant, state).noise / plant.bodies[OBJECT, MASS]
             if abs(row[1]) <= accelerating:
                 row[1] = 0.0
         return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
-    return slip_candidate(tables, plant, state, n, h, work)
+    return slip_candidate(tables, plant, n, h, push_on_object(plant, state).noise, work)

@@ -208,10 +208,11 @@ class SlideCandidate(NamedTuple):
 
 
 class Push(NamedTuple):
-    """What pushes the object beside its dry friction."""
+    """What pushes the object, at rest, beside its dry friction."""
 
     value: float  # N, to the right
     rounding: float  # N, of it and of the friction
+    noise: float  # N, of what the state itself says
 
 
 class Leaning(NamedTuple):

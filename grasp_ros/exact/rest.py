@@ -57,14 +57,16 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     force grows with t^(3n/2), which moves the object with t^(2 + 3n/2).
     """
     y, beside = state.y, other(side)
-    if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf:
+    push, pace = impact_beside(plant, state, side)
+    u, d = y[U_L + beside], approach(y, beside)
+    ends = u > 0.0 and d < 0.0 and push * (u / -d) == 0.0  # before it gives the object any velocity that is a number
+    if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf or ends:
         return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
-    if y[U_L + beside] > 0.0:
-        push, pace = impact_beside(plant, state, side)
+    if u > 0.0:
         found = first_difference(plant, y, side, push, pace, 3)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
     begins = 1.0
-    if approach(y, beside) == 0.0:
+    if d == 0.0:
         begins = first_difference(plant, y, beside, 0.0, 0.0, HIGHEST).order
     found = first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
     return found if found.order < 2.0 + 1.5 * begins else Leaning(2.0 + 1.5 * begins, math.inf)

@@ -109,9 +109,9 @@ def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> floa
     n = without_zeros(f, n)
     if n < degree and f[0] > 0.0:
         return EPS * EPS * h
-    begin = 0.0
+    begin, last = 0.0, 0.0
     for _ in range(MAX_SHIFTS):
-        s, noise = search(f, n, h, noise, work)
+        s, noise, last = search(f, n, h, noise, last, work)
         if not (0.0 < s < h) or noise == FOUND:
             return begin + s
         shift(f, n, s)
@@ -121,17 +121,19 @@ def first_rise(f: Array, n: int, h: float, noise: float, work: Integers) -> floa
 
 
 @kernel
-def search(f: Array, n: int, h: float, noise: float, work: Integers) -> tuple[float, float]:
-    """`first_rise` with a limited number of steps: the root and FOUND, or where it got to and the noise there."""
+def search(f: Array, n: int, h: float, noise: float, last: float, work: Integers) -> tuple[float, float, float]:
+    """`first_rise` with a limited number of steps: the root and FOUND, or where it got to and the noise there.
+
+    `last` is the length of the last step, here and in what is returned.
+    """
     curvature = curvature_bound(f, n, h)
     s = 0.0
     value, rate, size = f[0], f[1] if n > 0 else 0.0, abs(f[0])
-    last = 0.0
     near = max(noise, EPS * size)
     for _ in range(MAX_STEPS):
         work[Work.ROOT_ITERATIONS] += 1
         if value < -near and rate > curvature * (h - s):
-            return root_of_rise(f, n, s, h, noise, work), FOUND
+            return root_of_rise(f, n, s, h, noise, work), FOUND, last
         step = safe_step(min(value, -near), rate, curvature)
         reach = 4.0 * max(step, last)
         if reach < h - s:  # a bound for the neighbourhood alone allows a longer step
@@ -142,11 +144,11 @@ def search(f: Array, n: int, h: float, noise: float, work: Integers) -> tuple[fl
             last = EPS * EPS * h
         s += last
         if not s <= h:
-            return math.inf if s > h else math.nan, FOUND
+            return math.inf if s > h else math.nan, FOUND, last
         value, rate, size = value_and_rate(f, n, s)
         near = max(noise, EPS * size)
         if value >= -near and rate > 0.0:
-            return s, FOUND
-    return s, near
+            return s, FOUND, last
+    return s, near, last
 
 

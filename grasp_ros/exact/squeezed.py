@@ -15,7 +15,7 @@ from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, motion_of
 from grasp_ros.exact.contact import write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
-from grasp_ros.exact.friction import slide_in_contact, slip_candidate
+from grasp_ros.exact.friction import push_on_object, slide_in_contact, slip_candidate
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
 from grasp_ros.exact.jit import door, inlined, kernel
 from grasp_ros.exact.kinematics import is_clamped, keep_resting
@@ -116,7 +116,7 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
         row[j] = impact_at(f, LEFT, motion_of(plant, state, LEFT, h), h, j) - impact_at(
             f, RIGHT, motion_of(plant, state, RIGHT, h), h, j)
     expand_row(tables)
-    return slip_candidate(tables, plant, state, STAGES - 1, 1.0, work)
+    return slip_candidate(tables, plant, STAGES - 1, 1.0, push_on_object(plant, state).rounding, work)
 
 
 @kernel

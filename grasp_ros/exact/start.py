@@ -128,7 +128,7 @@ def scaled_series(tables: Tables, plant: Plant, state: State, settings: Settings
     """Expand in a time scale that fits; returns it, and how far the series reach in s."""
     scale = time_scale(plant, state, settings)
     n, tail = ORDER, 2 * POWERS + max(left, right, 0) // 2
-    reach, doubt = 0.0, push_on_object(plant, state).rounding
+    reach, doubt = 0.0, push_on_object(plant, state).noise
     for _ in range(MAX_SCALES):
         expand_start(tables.start, plant, state.y, n, left, right, scale, doubt)
         reach = reach_of(tables.start.c, n, settings, tail)
