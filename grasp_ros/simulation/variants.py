@@ -8,6 +8,7 @@ so that the rules and the sentences are those of `scene.validation` alone.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -101,8 +102,7 @@ class Variants:
     def __init__(self, scene: Scene, changes: Mapping[str, ArrayLike]) -> None:
         self.scene = scene
         self.changes = {name: np.asarray(column, dtype=float) for name, column in changes.items()}
-        for name in self.changes:
-            parameter_of(scene, name)
+        self._parameters = {name: parameter_of(scene, name) for name in self.changes}
         lengths = {name: column.shape for name, column in self.changes.items()}
         if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
             raise Refused(f"changes: shapes {lengths} are not allowed; allowed: arrays (n,) of one length")
@@ -110,7 +110,10 @@ class Variants:
 
     def part(self, first: int, last: int) -> Variants:
         """Rows from the first to before the last one."""
-        return Variants(self.scene, {name: column[first:last] for name, column in self.changes.items()})
+        part = copy(self)
+        part.changes = {name: column[first:last] for name, column in self.changes.items()}
+        part.rows = last - first
+        return part
 
     def row(self, i: int) -> Scene:
         """One row as a scene.
@@ -143,7 +146,7 @@ class Variants:
         """Rows with a number outside its range, or with a negative sum of an arm's own and its feedback's."""
         doubt = np.zeros(self.rows, dtype=bool)
         for name, column in self.changes.items():
-            allowed = parameter_of(self.scene, name)
+            allowed = self._parameters[name]
             above = column > allowed.low if allowed.open_low else column >= allowed.low
             doubt |= ~(above & (column <= allowed.high))
         loop = self.block().closed_loop
