@@ -59,7 +59,7 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     y, beside = state.y, other(side)
     push, pace = impact_beside(plant, state, side)
     u, d = y[U_L + beside], approach(y, beside)
-    ends = u > 0.0 and d < 0.0 and push * (u / -d) == 0.0  # before it gives the object any velocity that is a number
+    ends = d < 0.0 and push * (u / -d) == 0.0  # before it gives the object any velocity that is a number
     if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf or ends:
         return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
     if u > 0.0:

@@ -1,10 +1,10 @@
-"""The unit of a Taylor step, a power of two, from the state alone; the step may correct it."""
+"""The unit of a Taylor step, near the inverse of the fastest rate, from the state alone; the step may correct it."""
 
 from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.bits import exponent, power_of_two, power_of_two_root
+from grasp_ros.exact.bits import exponent, near_inverse, power_of_two, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
@@ -82,7 +82,7 @@ def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
     beside = other(side)
     if state.mode[beside] == Pair.CONTACT:
         a += abs(impact_beside(plant, state, side)[0])
-    rate = max(v / w if w > 0.0 else 0.0, math.sqrt(2.0 * a))
+    rate = max(v * near_inverse(w) if w > 0.0 else 0.0, math.sqrt(2.0 * a))
     stiff = plant.pairs[side, DISSIPATION] * hertzian / mu
     return w, max(rate, 2.0 * stiff * (u * u))
 
@@ -128,7 +128,7 @@ def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Ste
     if right:
         w_r, rate_r = turning_rate(plant, state, RIGHT)
     fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
-    unit = 1.0 / fastest if fastest > 0.0 else 1.0
+    unit = near_inverse(fastest) if fastest > 0.0 else 1.0
     order, first = order_for(settings, reach_of_span(state, left, right, unit, span))
     return Step(order, first, unit, left, right)
 

@@ -101,11 +101,16 @@ def expand(tables: Tables, plant: Plant, step: Step) -> None:
 
 
 @inlined
-def driven(plant: Plant, y: Array, body: Body, t: float, size: float) -> float:
-    """Size of a velocity that moves by no less than a part t / s of the terms of its equation."""
+def pull(plant: Plant, y: Array, body: Body) -> float:
+    """Sum of the sizes of the terms of a body's equation, m/s^2."""
     row, lane = plant.bodies[body], velocity_lane(body)
-    terms = abs(row[FORCE]) + abs(row[STIFFNESS] * y[lane - 1]) + abs(row[DAMPING] * y[lane])
-    return max(size, t * (terms / row[MASS]))  # the quotient does not wait for the series
+    return (abs(row[FORCE]) + abs(row[STIFFNESS] * y[lane - 1]) + abs(row[DAMPING] * y[lane])) / row[MASS]
+
+
+@inlined
+def pulls(plant: Plant, y: Array) -> tuple[float, float, float]:
+    """`pull` of the left arm, the object and the right arm."""
+    return pull(plant, y, LEFT), pull(plant, y, OBJECT), pull(plant, y, RIGHT)
 
 
 @inlined
@@ -123,8 +128,8 @@ def inverse(size: float) -> float:
 
 
 @inlined
-def length(tables: Tables, plant: Plant, y: Array, step: Step, settings: Settings, reach: float) -> float:
-    """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`.
+def length(tables: Tables, pulled: tuple[float, float, float], step: Step, settings: Settings, reach: float) -> float:
+    """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`; `pulled`: of `pulls`.
 
     Velocities move by the step's own motion, and no less than by the rounding of the terms of their equation;
     positions with them.
@@ -133,8 +138,8 @@ def length(tables: Tables, plant: Plant, y: Array, step: Step, settings: Setting
     c = tables.c
     t, v_l, x_o, v_o, _, v_r, z_l, z_r = motion_sizes(c, reach)
     doubt = t * (EPS / settings.tolerance)
-    v_l, v_o = driven(plant, y, LEFT, doubt, v_l), driven(plant, y, OBJECT, doubt, v_o)
-    v_r = driven(plant, y, RIGHT, doubt, v_r)
+    pull_l, pull_o, pull_r = pulled
+    v_l, v_o, v_r = max(v_l, doubt * pull_l), max(v_o, doubt * pull_o), max(v_r, doubt * pull_r)
     still = STILL * max(v_l, v_o, v_r)
     v_l, v_o, v_r = max(v_l, still), max(v_o, still), max(v_r, still)
     x_o = max(x_o, t * v_o)
@@ -152,12 +157,13 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
     Most units do at once. Coefficients of a wrong one leave the range of numbers, so the next follows from the length;
     where they vanish, the end of the span or a release ends the step.
     """
+    pulled = pulls(plant, state.y)  # before the series: quotients after it would be waited for
     for _ in range(MAX_UNITS):
         begin_series(tables, state)
         expand(tables, plant, step)
         h = 1.0
         for _ in range(2):
-            h = length(tables, plant, state.y, step, settings, h)
+            h = length(tables, pulled, step, settings, h)
             if BELOW < h < ABOVE or not 0.0 < h < math.inf:
                 break
         if FAR_BELOW < h < FAR_ABOVE:

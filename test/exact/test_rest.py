@@ -19,6 +19,7 @@ from grasp_ros.exact.rest import (
     NEVER,
     UNDECIDED,
     certain_time,
+    difference,
     glides,
     impact_beside,
     leaning,
@@ -193,6 +194,13 @@ def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: B
 
 
 @SIDES
+def test_a_push_that_ends_before_it_moves_anything_is_none(side: Body) -> None:
+    b = bench(side, 0.0, 0.0, beside=(1e-132, -88.0), beside_mode=Pair.CONTACT, p=0.0)
+    assert impact_beside(b.plant, b.state, side)[0] > 0.0
+    assert leaning(b.plant, b.state, side) == (NEVER, 0.0)
+
+
+@SIDES
 def test_a_wall_hands_no_force_on(side: Body) -> None:
     b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=Pair.CONTACT, slide=Slide.STUCK)
     b.plant.bodies[OBJECT, MASS], b.plant.bodies[OBJECT, FORCE] = math.inf, 0.0
@@ -247,6 +255,31 @@ def test_a_certain_time_is_not_too_long_nor_nothing(side: Body, order: int) -> N
     plant, state = pair_at_rest(side, arm, body, x, v)
     found, value = leaning(plant, state, side)
     span = certain_time(plant, state.y, side, int(found), value, 100.0)
+    assert sign_holds(plant, state, side, span, value)
+    assert span > 1e-2
+
+
+@SIDES
+def test_a_later_derivative_may_turn_a_pair_back(side: Body) -> None:
+    """1e-6 t^2 / 2 - t^3 / 6 turns back at 3e-6 s."""
+    plant, state = pair_at_rest(side, (1.0, 1.0, 0.0, 1e-6), (1.0, 0.0, 0.0, 0.0), 0.0, 1.0)
+    order, value = leaning(plant, state, side)
+    span = certain_time(plant, state.y, side, int(order), value, 100.0)
+    assert (order, value) == (2.0, 1e-6)
+    assert sign_holds(plant, state, side, span, value)
+
+
+@SIDES
+@pytest.mark.parametrize("v", [-0.7, -1.4, -2.3])
+def test_a_derivative_that_is_rounding_hides_no_later_one(side: Body, v: float) -> None:
+    """-1e-6 t^2 / 2 alone is certain for some 1e-5 s; the third derivative is rounding, the fourth has its sign."""
+    k, c = 0.7, 0.3
+    a = -k * v / c  # c a + k v = 0
+    plant, state = pair_at_rest(side, (1.0, k, c, a + c * v), (1.0, 0.0, 0.0, a + 1e-6), 0.0, v)
+    order, value = leaning(plant, state, side)
+    span = certain_time(plant, state.y, side, int(order), value, 100.0)
+    assert (order, value) == (2.0, pytest.approx(-1e-6))
+    assert 0.0 < difference(plant, state.y, side, 3)[0] < 1e-15  # rounding, and of the other sign
     assert sign_holds(plant, state, side, span, value)
     assert span > 1e-2
 

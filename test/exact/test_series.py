@@ -13,7 +13,7 @@ from grasp_ros.exact.polynomial import curvatures, invert_time, lane_range, valu
 from grasp_ros.exact.records import Plant, Settings, Start, State, Step, Tables
 from grasp_ros.exact.scales import impact_scales, new_step, rate_bound
 from grasp_ros.exact.series import expand_both, expand_one, new_tables, series_order
-from grasp_ros.exact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length
+from grasp_ros.exact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length, pulls
 from grasp_ros.exact.taylor_step import expand as expand_step
 from grasp_ros.physics.layout import (
     CHECK,
@@ -247,9 +247,9 @@ def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[
     tables.f[:] = np.nan
     begin_series(tables, state)
     expand_step(tables, plant, step)
-    h = length(tables, plant, state.y, step, settings, 1.0)
+    h = length(tables, pulls(plant, state.y), step, settings, 1.0)
     if not BELOW < h < ABOVE:
-        h = length(tables, plant, state.y, step, settings, h)
+        h = length(tables, pulls(plant, state.y), step, settings, h)
     return tables, step, h
 
 
@@ -355,7 +355,7 @@ def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -
     step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.order)
     begin_series(tables, state)
     expand_step(tables, plant, step)
-    h = length(tables, plant, y, step, settings, 1.0)
+    h = length(tables, pulls(plant, y), step, settings, 1.0)
     assert 0.25 < h < 4.0
     duration = 2.9432751843247047 * depth / speed
     table = tables.c[: LANES * (settings.order + 1)].reshape(-1, LANES)
