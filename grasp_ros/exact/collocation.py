@@ -49,6 +49,7 @@ WORKSPACE = int(SUMS + 2 * (STAGES + 1))
 ROW = int(STAGES) + 1  # one polynomial
 CLOSE = 1e-7  # correction after which Newton's next one is below rounding
 SHRINKS = 0.1  # part of a correction that the next one of Newton's has, unless both are rounding
+NEAR, TINY = 0.01, 1e-12  # what is not linear, and a correction, beyond which neither is rounding
 MAX_CORRECTIONS = 10
 
 
@@ -227,7 +228,8 @@ def collocate(f: Array, bodies: Array, left: Approach, right: Approach, start: B
         size_l, bent_l = correct_side(f, LEFT, left, start)
         size_r, bent_r = correct_side(f, RIGHT, right, start)
         size, bent = size + (size_l + size_r), bent_l + bent_r
-        if size <= CLOSE and (bent <= CLOSE or bent >= SHRINKS * before):
+        rounding = bent >= SHRINKS * before and (bent <= NEAR or size <= TINY)
+        if size <= CLOSE and (bent <= CLOSE or rounding):
             return True
         before = bent
         if not size < math.inf:
