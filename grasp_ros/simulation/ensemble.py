@@ -25,7 +25,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Chunk, Setup, check, compute
 from grasp_ros.simulation.variants import Variants
 
-CHUNK_S, ROW_S, TICK_S = 0.1, 4e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
+CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]
 
 

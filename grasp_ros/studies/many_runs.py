@@ -27,7 +27,7 @@ from grasp_ros.studies.peer_heyoka import BALLISTIC_HERTZ, BALLISTIC_S, HeyokaGr
 
 ERROR, OFF = 1e-6, 0.02
 LADDER = (1e-6, 3e-7, 1e-7, 3e-8, 1e-8, 3e-9, 1e-9, 3e-10, 1e-10, 3e-11, 1e-11, 3e-12, 1e-12)  # of settings
-ROWS = {"ensemble": 4000, "heyoka": 400, "scipy": 8}
+ROWS = {"ensemble": 20_000, "heyoka": 2000, "scipy": 8}
 METHOD = "dop853_events"
 
 
