@@ -182,11 +182,11 @@ def settle_resting(plant: Plant, state: State, out: Output) -> None:
 def leave_together(plant: Plant, state: State, settings: Settings) -> None:
     """Take both pairs off a release at one instant, where the product w_l w_r stops the regularised time."""
     mode, y = state.mode, state.y
-    if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT:
+    slipping = mode[OBJECT] in (Slide.RIGHTWARD, Slide.LEFTWARD) and y[V_O] == 0.0  # by their force alone
+    if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT or slipping:
         return
     for side in (LEFT, RIGHT):
-        d, a = relative_motion(plant, y, side)
-        u = y[U_L + side]
+        u, (d, a) = y[U_L + side], relative_motion(plant, y, side)
         leaves = d < 0.0 and TURNS * (u / -d) * abs(a) < -d  # in this order, because squares underflow
         if not (leaves and is_negligible(plant, side, u, d, LEFT_OUT * settings.tolerance)):
             return

@@ -564,6 +564,14 @@ def test_both_pairs_leave_together(
 
 
 @SIDES
+@pytest.mark.parametrize("slide", [Slide.RIGHTWARD, Slide.LEFTWARD])
+def test_an_object_at_rest_that_slips_needs_the_force_that_lets_it(side: Body, slide: Slide) -> None:
+    """Without it friction would push the object instead of braking it."""
+    assert together(side, 0.1, -0.3, (0.1, -0.3), slide=slide, coulomb=1e-9) == STAY
+    assert together(side, 0.1, -0.3, (0.1, -0.3), slide=slide, coulomb=1e-9, object_speed=0.5) == LEAVING
+
+
+@SIDES
 def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
     """20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact."""
     assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
