@@ -45,7 +45,7 @@ def near_exp2(x: float) -> float:
 
 @inlined
 def near_inverse(x: float) -> float:
-    """1 / x for 0 < x < inf, at most an eighth too large, and exact for powers of two."""
+    """1 / x for 0 < x < 2^1023, at most an eighth too large, and exact for powers of two."""
     return np.int64(2 * ONE - int(np.float64(x).view(np.int64))).view(np.float64)
 
 

@@ -49,7 +49,7 @@ WORKSPACE = int(SUMS + 2 * (STAGES + 1))
 ROW = int(STAGES) + 1  # one polynomial
 CLOSE = 1e-7  # correction after which Newton's next one is below rounding
 SHRINKS = 0.1  # part of a correction that the next one of Newton's has, unless both are rounding
-NEAR, TINY = 0.01, 1e-12  # what is not linear, and a correction, beyond which neither is rounding
+NEAR, TINY = 0.01, 1e-12  # where both exceed these, what is not linear and the correction, it is no rounding
 MAX_CORRECTIONS = 10
 
 

@@ -84,7 +84,7 @@ def push_on_object(plant: Plant, state: State) -> Push:
     """What pushes the object beside its dry friction, by (3), and the rounding of that and of the friction.
 
     This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
-    by more than the rounding.
+    by more than the rounding. A series from the state, which knows nothing of glides, is held against the noise.
     """
     given = plant.given[OBJECT, FORCE]
     value, rounding, noise = 0.0, 0.0, 0.0  # of both sides first, for mirror images

@@ -28,8 +28,8 @@ what pushes it but for the rounding of its terms (`push_on_object`); stuck it is
 * at ticks: for the object, and pairs that are LEAVING or about to begin from rest (`begin_interval`).
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
-one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse; and so does a
-pair whose force dies out at u' = -1/p, where nothing else moves it off that surface.
+one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse, unless an
+object at rest slips by it; so does a pair whose force dies out at u' = -1/p, off which nothing else moves it.
 """
 
 from __future__ import annotations

@@ -53,13 +53,14 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
 def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
 
-    The force of the other pair takes part with its value and its rate. Where that pair begins at u = 0 with t^n, its
-    force grows with t^(3n/2), which moves the object with t^(2 + 3n/2).
+    The force of the other pair takes part with its value and its rate, unless it ends at once. Where that pair begins
+    at u = 0 with t^n, its force grows with t^(3n/2), which moves the object with t^(2 + 3n/2).
     """
     y, beside = state.y, other(side)
     push, pace = impact_beside(plant, state, side)
     u, d = y[U_L + beside], approach(y, beside)
-    ends = d < 0.0 and push * (u / -d) == 0.0  # before it gives the object any velocity that is a number
+    left = u / -d if d < 0.0 else math.inf  # s until it ends; at once, if no velocity that is a number comes of it
+    ends = left < math.inf and push * left == 0.0 and pace * left * left == 0.0
     if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf or ends:
         return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
     if u > 0.0:

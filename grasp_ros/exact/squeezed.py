@@ -111,12 +111,13 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
     """First event of the object within an implicit step of h s, in units of it."""
     if state.mode[OBJECT] != Slide.STUCK:
         return slide_in_contact(tables, plant, state, STAGES, 1.0, work)
-    f, row = tables.f, tables.row
+    f, row, push = tables.f, tables.row, push_on_object(plant, state)
+    left, right = motion_of(plant, state, LEFT, h), motion_of(plant, state, RIGHT, h)
     for j in range(STAGES):
-        row[j] = impact_at(f, LEFT, motion_of(plant, state, LEFT, h), h, j) - impact_at(
-            f, RIGHT, motion_of(plant, state, RIGHT, h), h, j)
+        row[j] = impact_at(f, LEFT, left, h, j) - impact_at(f, RIGHT, right, h, j)
     expand_row(tables)
-    return slip_candidate(tables, plant, STAGES - 1, 1.0, push_on_object(plant, state).rounding, work)
+    resolved = (left.stiff or left.hertzian == 0.0) and (right.stiff or right.hertzian == 0.0)  # e has its own digits
+    return slip_candidate(tables, plant, STAGES - 1, 1.0, push.rounding if resolved else push.noise, work)
 
 
 @kernel

@@ -38,7 +38,7 @@ THREE, FOUR, FIVE = (np.int64(k) for k in range(3, TAIL + 1))  # typed, see `pol
 SMALLEST = 1e-290  # of what moves
 STILL = 2.0**-300  # part of the fastest motion that is none
 BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit
-FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; terms of a large one underflow
+FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
 MOST = 16  # binary orders by which a unit is changed at once
 MAX_UNITS = 200
 

@@ -194,6 +194,16 @@ def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: B
 
 
 @SIDES
+@pytest.mark.parametrize("push", [-3.0, 3.0])
+def test_a_force_that_only_begins_at_the_surface_decides_with_its_rate(side: Body, push: float) -> None:
+    """At u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way."""
+    b = bench(side, 0.0, 0.0, beside=(0.01, -2.0), beside_mode=Pair.CONTACT, p=0.5, beside_push=push)
+    value, pace = impact_beside(b.plant, b.state, side)
+    assert (value, pace) == (0.0, pytest.approx(-5.0 * push))
+    assert leaning(b.plant, b.state, side) == pytest.approx((3.0, pace))
+
+
+@SIDES
 def test_a_push_that_ends_before_it_moves_anything_is_none(side: Body) -> None:
     b = bench(side, 0.0, 0.0, beside=(1e-132, -88.0), beside_mode=Pair.CONTACT, p=0.0)
     assert impact_beside(b.plant, b.state, side)[0] > 0.0
