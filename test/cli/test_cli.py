@@ -45,6 +45,14 @@ def test_simulate_with_a_controller_of_a_module_here(command: Any, tmp_path: Pat
     assert loaded.state.tobytes() == expected.state.tobytes()
 
 
+def test_an_interrupt_within_exec_is_an_exit_status_too(tmp_path: Path) -> None:
+    """`python -m` would end by the signal, because Python does not know that the interrupt was answered."""
+    (tmp_path / "interrupted.py").write_text('exec("raise KeyboardInterrupt")')
+    command = [sys.executable, "-m", "grasp_ros.cli", "simulate", "case_01", "--controller", "left=interrupted:law"]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stderr) == (130, "grasp: interrupted\n")
+
+
 def test_a_reader_that_stops_early_is_no_error() -> None:
     program = f"{shlex.quote(sys.executable)} -m grasp_ros.cli scenes | head -n 1; exit ${{PIPESTATUS[0]}}"
     result = subprocess.run(["bash", "-c", program], capture_output=True, text=True, timeout=60, check=False)
