@@ -81,7 +81,8 @@ def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, spa
                 return Candidate(math.inf, Transition.TOUCH)
             at = motion_at(pair, t)
         return Candidate(first_root(Transition.TOUCH, pair, t, at, span, until, work), Transition.TOUCH)
-    released = first_root(Transition.RELEASE, pair, 0.0, at, span, until, work)
+    latest = math.inf if mode == Pair.CLAMPED else until  # which pair comes first must not set the next search's span
+    released = first_root(Transition.RELEASE, pair, 0.0, at, span, latest, work)
     if mode == Pair.CLAMPED:
         back = first_root(Transition.REENTRY, pair, 0.0, at, min(span, released), until, work)
         if not back >= released:
