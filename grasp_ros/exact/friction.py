@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, arm_of, rate_lanes
+from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
 from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
 from grasp_ros.exact.roots import first_rise
 from grasp_ros.physics.layout import (
@@ -27,7 +27,6 @@ from grasp_ros.physics.layout import (
     MASS,
     OBJECT,
     RIGHT,
-    STIFFNESS,
     TIME,
     U_L,
     V_O,
@@ -72,10 +71,9 @@ def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
     elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
     force = elastic * damping_factor(loss, approach(state.y, side))
     noise = ROUNDINGS * (elastic * (1.0 + loss * (abs(v) + abs(state.y[V_O]))))
-    spring, drag = body[STIFFNESS] * x, body[DAMPING] * v
-    own = sign * (body[FORCE] - spring - drag)
+    own = sign * (body[MASS] * own_acceleration(body, x, v))
     if abs(force) <= noise and 0.0 < own <= noise:
-        return Push(own, ROUNDINGS * (abs(body[FORCE]) + abs(spring) + abs(drag)), noise)
+        return Push(own, ROUNDINGS * (body[MASS] * own_size(body, x, v)), noise)
     return Push(force, noise, noise)
 
 

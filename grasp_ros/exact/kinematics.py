@@ -81,6 +81,12 @@ def own_acceleration(body: Array, x: float, v: float) -> float:
     return (body[FORCE] - body[STIFFNESS] * x - body[DAMPING] * v) / body[MASS]
 
 
+@kernel
+def own_size(body: Array, x: float, v: float) -> float:
+    """Sum of the sizes of the terms of `own_acceleration`, m/s^2."""
+    return (abs(body[FORCE]) + abs(body[STIFFNESS] * x) + abs(body[DAMPING] * v)) / body[MASS]
+
+
 @inlined
 def relative_motion(plant: Plant, y: Array, side: Body) -> tuple[float, float]:
     """u' and the u'' that both bodies would have without impact forces."""
@@ -136,8 +142,8 @@ def next_derivative(body: Array, before: float, value: float) -> float:
 @kernel
 def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, float, float]:
     """Derivatives `order` >= 2 and order + 1 of a body's flight, m/s^order, and the sum of the sizes of the first."""
-    m, k, c, f = body[MASS], body[STIFFNESS], body[DAMPING], body[FORCE]
-    value, size = own_acceleration(body, x, v), (abs(f) + abs(k * x) + abs(c * v)) / m
+    m, k, c = body[MASS], body[STIFFNESS], body[DAMPING]
+    value, size = own_acceleration(body, x, v), own_size(body, x, v)
     before, before_size = v, abs(v)
     for _ in range(order - 2):
         following, following_size = next_derivative(body, before, value), (abs(c) * size + k * before_size) / m

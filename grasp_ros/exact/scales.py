@@ -102,8 +102,8 @@ def reach_of_span(state: State, left: bool, right: bool, unit: float, span: floa
 
 
 @inlined
-def is_far(y: Array, w_l: float, w_r: float, unit: float, span: float, reach: float) -> bool:
-    """Whether a span is beyond `reach` in s / unit for certain: as in `reach_of_span`, with scales that bound G, G'."""
+def outlasts(y: Array, w_l: float, w_r: float, unit: float, span: float, reach: float) -> bool:
+    """Whether a span outlasts `reach` in s / unit for certain: as in `reach_of_span`, with scales that bound G, G'."""
     bend = w_r * w_r * abs(approach(y, LEFT)) + w_l * w_l * abs(approach(y, RIGHT))
     return span >= (2.0 * w_l * w_r + reach * unit * bend) * reach * unit
 
@@ -136,7 +136,7 @@ def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Ste
         w_r, rate_r = turning_rate(plant, state, RIGHT)
     fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
     unit = near_inverse(fastest) if fastest > 0.0 else 1.0
-    if is_far(state.y, w_l, w_r, unit, span, RADIUS * settings.first):
+    if outlasts(state.y, w_l, w_r, unit, span, RADIUS * settings.first):
         return Step(settings.order, settings.first, unit, left, right)
     order, first = order_for(settings, reach_of_span(state, left, right, unit, span))
     return Step(order, first, unit, left, right)

@@ -8,27 +8,28 @@ import numpy as np
 
 from grasp_ros.exact.bits import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.kinematics import velocity_lane
+from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
 from grasp_ros.exact.records import Array, Integers, Lanes, Plant, Settings, State, Step, Tables
 from grasp_ros.exact.series import ONE, TWO, expand_both, expand_one
 from grasp_ros.physics.layout import (
     CHECK,
-    DAMPING,
     EPS,
-    FORCE,
     LANES,
     LEFT,
-    MASS,
     OBJECT,
     RIGHT,
-    STIFFNESS,
     TIME,
     U_L,
     U_R,
+    V_L,
+    V_O,
+    V_R,
+    X_L,
+    X_O,
+    X_R,
     Z_L,
     Z_R,
-    Body,
     Pair,
     Work,
 )
@@ -101,16 +102,11 @@ def expand(tables: Tables, plant: Plant, step: Step) -> None:
 
 
 @inlined
-def pull(plant: Plant, y: Array, body: Body) -> float:
-    """Sum of the sizes of the terms of a body's equation, m/s^2."""
-    row, lane = plant.bodies[body], velocity_lane(body)
-    return (abs(row[FORCE]) + abs(row[STIFFNESS] * y[lane - 1]) + abs(row[DAMPING] * y[lane])) / row[MASS]
-
-
-@inlined
 def pulls(plant: Plant, y: Array) -> tuple[float, float, float]:
-    """`pull` of the left arm, the object and the right arm."""
-    return pull(plant, y, LEFT), pull(plant, y, OBJECT), pull(plant, y, RIGHT)
+    """Sizes of the terms of the equations of the left arm, the object and the right arm, m/s^2."""
+    bodies = plant.bodies
+    return (own_size(bodies[LEFT], y[X_L], y[V_L]), own_size(bodies[OBJECT], y[X_O], y[V_O]),
+            own_size(bodies[RIGHT], y[X_R], y[V_R]))
 
 
 @inlined
