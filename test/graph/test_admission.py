@@ -139,6 +139,9 @@ kinds = {"lyapunov": JointState, "left/parameters": JointState, "alive": String}
 publishers = [(node.create_publisher(kinds.get(topic, type(message)), topic, qos), message)
               for topic, message, qos in once + often]
 flood = node.create_publisher(WrenchStamped, "contact/left", 1000)
+input()
+while not all(publisher.get_subscription_count() for publisher in [publishers[0][0], publishers[6][0], flood]):
+    time.sleep(0.01)
 end = time.monotonic() + float(sys.argv[2])
 for number in range(10**9):
     if time.monotonic() > end:
@@ -152,13 +155,15 @@ for number in range(10**9):
 @pytest.mark.slow  # real processes
 def test_a_rogue_at_full_speed_on_every_other_topic_costs_no_tick(launch: Any, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(scene.load("case_09").to_yaml())
+    rogue = launch(sys.executable, "-c", ROGUE, str(tmp_path / "other.yaml"), "4", stdin=subprocess.PIPE)
     run = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=4", "-o", "run",
+        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=8", "-o", "run",
         cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
     file = tmp_path / "run" / "bag" / "bag.mcap"
     wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a graph at work")
-    launch(sys.executable, "-c", ROGUE, str(tmp_path / "other.yaml"), "4")
+    rogue.stdin.write("\n")
+    rogue.stdin.close()
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err
     assert "equal, bit for bit" in out

@@ -198,16 +198,17 @@ class GraspNode(Node):
         timer = self.wall_timer(PEER_SECONDS, poll)
 
     def linked(self, publisher: Publisher, sources: Sequence[Topic]) -> bool:
-        """Whether the nodes that publish the source topics all listen to this publisher.
+        """Whether a node that publishes it listens to this publisher, for each source topic.
 
         Matching is asynchronous and messages sent before it are lost. Names come from discovery, which is earlier
-        than matching; so every discovered subscription must also have been matched.
+        than matching; so every discovered subscription must also have been matched. Who publishes without listening
+        is a stranger, and may not keep those from starting who do.
         """
         readers = self.get_subscriptions_info_by_topic(publisher.topic_name)
         listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
         for source in sources:
             writers = self.get_publishers_info_by_topic(source.name)
-            if not writers or any((writer.node_namespace, writer.node_name) not in listening for writer in writers):
+            if not any((writer.node_namespace, writer.node_name) in listening for writer in writers):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
 
