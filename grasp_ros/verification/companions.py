@@ -10,7 +10,7 @@ import numpy as np
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import EPS, LEFT, MASS, OBJECT, RIGHT, Work
-from grasp_ros.physics.model import Array
+from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import Trajectory
@@ -22,6 +22,7 @@ UNITS = 4.0, 2.0, 0.5  # of length, time and mass
 PERIODS = 16, 64, 256  # control periods in runs that tend to continuous feedback
 LONGEST = 1e4  # s, of such runs: a control period has its limit
 NOISE, FAR = 1e-10, 0.2  # distances from it, relative, that say nothing
+FALLS = 0.5  # part of the distance that may be left at a sixteenth of the period
 FEW, SOME = 10, 100  # events and contact steps, beyond which a distance may grow by itself
 
 
@@ -64,33 +65,46 @@ def _equal(one: Array, other: Array) -> bool:
 def short_periods(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
     """Commands held ever shorter tend to continuous feedback: the distance falls with the period.
 
-    Over a time constant of the feedback at most, within which the longest period is short. The error is the distance at
-    the shortest period by the largest at a longer one, where they are neither rounding nor large: 1/16 in theory. At
-    one period an early and a late impact may cancel, so that one distance alone says nothing.
+    Over a time constant of the feedback at most, within which the longest period is short; where the distance does not
+    fall, over one of the fastest swing or impact, which a longer period may step over.
+    """
+    system = run.scene.system
+    if run.scene.sampled or system.external or not system.laws:
+        return
+    feedback = max(_loop_rate(law, system.bodies[side, MASS]) for side, law in system.laws.items())
+    left = _left_of_distance(run, product, feedback)
+    if left is not None and left > FALLS:
+        left = _left_of_distance(run, product, max(feedback, _fastest_rate(run)))
+    if left is not None:
+        yield "short periods", left
+
+
+def _left_of_distance(run: Trajectory, product: Product, rate: float) -> float | None:
+    """The distance at the shortest period by the largest at a longer one, over 1 / `rate` in s: 1/16 in theory.
+
+    None where they are rounding, or large. At one period an early and a late impact may cancel, so that one distance
+    alone says nothing.
     """
     scene = run.scene
-    system = scene.system
-    if scene.sampled or system.external or not system.laws:
-        return
-    constants = [_time_constant(law, system.bodies[side, MASS]) for side, law in system.laws.items()]
-    span = min(LONGEST, scene.duration, *constants)
-    base = int(span * NANOSECONDS / PERIODS[-1])
+    base = int(min(LONGEST, scene.duration, 1.0 / rate if rate > 0.0 else math.inf) * NANOSECONDS / PERIODS[-1])
     if base < 1:
-        return
+        return None
     seconds = base * PERIODS[-1] / NANOSECONDS
+
     def part(periods: int, sampled: bool) -> Trajectory:
         numbers = {"time.duration_s": seconds, "time.control_period_s": round(seconds / periods, 9)}
         return product.run(scene.changed(numbers), [0.0, seconds], sampled=sampled)
 
     continuous = part(PERIODS[-1], False)
     if len(continuous.event_table) > FEW or continuous.work[Work.CONTACT_STEPS] > SOME:
-        return
+        return None
     size = largest(continuous.state) + TINY
     *longer, last = (
         float(np.nanmax(np.abs(part(periods, True).state[-1] - continuous.state[-1]) / size)) for periods in PERIODS
     )
     if last > NOISE + _cancelled(continuous) / size[1] and longer[0] < FAR:
-        yield "short periods", last / max(longer)
+        return last / max(longer)
+    return None
 
 
 def _cancelled(run: Trajectory) -> float:
@@ -103,7 +117,19 @@ def _cancelled(run: Trajectory) -> float:
     return speed
 
 
-def _time_constant(law: ControlLaw, mass: float) -> float:
-    """1 / the fastest rate of a feedback, in s."""
-    rate = max(math.sqrt(abs(law.position_gain) / mass), abs(law.velocity_gain) / mass)
-    return 1.0 / rate if rate > 0.0 else math.inf
+def _loop_rate(law: ControlLaw, mass: float) -> float:
+    """The fastest rate of a feedback, in 1/s."""
+    return float(max(math.sqrt(abs(law.position_gain) / mass), abs(law.velocity_gain) / mass))
+
+
+def _fastest_rate(run: Trajectory) -> float:
+    """Of the bodies by themselves, and of the impacts as deep as the ends or the events bring them, in 1/s."""
+    system = run.scene.system
+    mass, stiffness, damping, _ = system.bodies[system.present].T
+    fastest = [np.sqrt(stiffness / mass).max(), (damping / mass).max()]
+    depths = np.nan_to_num(penetration(run.state)[::2]).max(axis=1)
+    for side in system.contacts:
+        (hertzian, loss), speed = system.pairs[side], np.abs(run.event_table[:, 4]).max(initial=0.0)
+        depth = max(depths[side], (1.25 * mass.max() * speed**2 / hertzian) ** 0.4)
+        fastest += [np.sqrt(1.5 * hertzian * np.sqrt(depth) / mass.min()), hertzian * loss * depth**1.5 / mass.min()]
+    return float(np.max(fastest))

@@ -18,7 +18,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Product, Unfinished
-from grasp_ros.verification.companions import mirror, short_periods, units
+from grasp_ros.verification.companions import FALLS, mirror, short_periods, units
 from grasp_ros.verification.motion import ledgers
 from grasp_ros.verification.replay import findings
 from grasp_ros.verification.restarts import digits, reversal, splitting
@@ -31,7 +31,6 @@ CHEAP = 3_000  # work beyond which the relations that need more runs are left ou
 OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
 SPLIT, SHORT = 4, 50  # every how many scenes a run is started anew, and compared with short control periods
-FALLS = 0.5  # part of the distance that may be left at a sixteenth of the period
 
 
 class Check(NamedTuple):

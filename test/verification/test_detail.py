@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,9 +13,9 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
-from grasp_ros.verification import fuzz, properties, restarts
+from grasp_ros.verification import fuzz, restarts
 from grasp_ros.verification.cases.case import Product
-from grasp_ros.verification.companions import mirror, short_periods, units
+from grasp_ros.verification.companions import FALLS, mirror, short_periods, units
 from grasp_ros.verification.motion import ledgers
 from grasp_ros.verification.properties import LIMIT, examine, look
 from grasp_ros.verification.replay import findings
@@ -203,9 +204,25 @@ def test_roundings_of_the_way_to_a_touch_are_no_errors_behind_it(name: str, part
     assert all(error <= LIMIT for _, error in splitting(close(first), part, Product()))
 
 
-def test_distances_that_cancel_at_one_period_say_nothing() -> None:
-    first = Product().run(fuzzed("early_impact_cancels_late_one"))
-    assert [error <= properties.FALLS for _, error in short_periods(first, Product())] == [True]
+@pytest.mark.parametrize("name", ["early_impact_cancels_late_one", "periods_longer_than_a_swing"])
+def test_distances_that_cancel_or_lie_between_swings_say_nothing(name: str) -> None:
+    first = Product().run(fuzzed(name), [0.0, fuzzed(name).duration])
+    assert [error <= FALLS for _, error in short_periods(first, Product())] == [True]
+
+
+class OtherGain(Product):
+    """Runs whose held commands are those of another law."""
+
+    def run(self, scene: Scene, times: Iterable[float] | None = None, sampled: bool = False) -> Trajectory:
+        key = "right_feedback.velocity_gain_Ns_per_m"
+        other = {key: 1.1 * scene.values["right_feedback"]["velocity_gain_Ns_per_m"]}
+        return super().run(scene.changed(other) if sampled else scene, times, sampled)
+
+
+def test_another_law_is_seen_at_short_periods(first: Trajectory) -> None:
+    stiff = fuzzed("periods_longer_than_a_swing")
+    for run in (first, Product().run(stiff, [0.0, stiff.duration])):
+        assert only(short_periods(run, OtherGain())) > FALLS
 
 
 def test_a_motion_that_died_out_before_the_first_output_may_stall() -> None:
