@@ -157,13 +157,18 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     h = accepted_length(tables, step, h, settings, out.work)
     left = pair_candidate(tables, plant, state, n, LEFT, h, out.work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
+    if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when):
+        return math.nan
+    s = min(h, left.when, right.when)
+    if s < h:
+        values_and_ways(c, n, s, at)
     slide = SlideCandidate(math.inf, Slide.FREE)
     if mode[OBJECT] != Slide.FREE:
-        slide = slide_in_contact(tables, plant, state, n, h, out.work)
-    if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when) or math.isnan(slide.when):
+        slide = slide_in_contact(tables, plant, state, n, s, out.work)
+    if math.isnan(slide.when):
         return math.nan
-    s = min(h, left.when, right.when, slide.when)
-    if s < h:
+    if slide.when < s:
+        s = slide.when
         values_and_ways(c, n, s, at)
     t = at[TIME]
     if t > span:

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from grasp_ros.exact.flight import fly
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import bound_by, rates_of
+from grasp_ros.exact.kinematics import bound_by, envelope_of_speed, envelope_step, rates_of
 from grasp_ros.exact.records import Array, Flights, Integers, Motion, PairFlight, Plant, Rates
 from grasp_ros.exact.roots import safe_step
 from grasp_ros.physics.layout import DISSIPATION, EPS, LEFT, OBJECT, U_L, Body, Transition, Work
@@ -47,26 +47,6 @@ class EventSeries(NamedTuple):
     fourth: float
     noise: float  # rounding of g
     doubt: float  # rounding of its second derivative
-
-
-@kernel
-def envelope_step(pair: PairFlight, at: Motion) -> float:
-    """Time for which the arm's swing cannot reach the object: 0 if it can now, inf if never.
-
-    Drag can only delay an object that approaches, but it also brakes one that moves away.
-    """
-    arm, body = pair.arm_rates, pair.body_rates
-    if arm.stiffness <= 0.0:
-        return 0.0
-    x_e = pair.x_e
-    swing = bound_by(arm, at.x - x_e, at.v, math.inf)
-    room = pair.sign * (at.x_o - x_e) - swing - 8.0 * EPS * (abs(at.x_o) + abs(x_e) + swing)
-    if not room > 0.0:
-        return 0.0
-    towards = -pair.sign * at.v_o
-    if body.damping > 0.0:
-        towards = max(towards, 0.0)
-    return safe_step(-room, towards, max(-pair.sign * body.force, 0.0))
 
 
 @kernel
@@ -218,6 +198,8 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
         step = certain_step(g, curvature, growth, step)
         if kind == Transition.TOUCH:
             step = max(step, envelope_step(pair, at))
+        if kind == Transition.REENTRY:
+            step = max(step, envelope_of_speed(pair, at, own.second, body.second))
         step = min(step, pair.horizon)
         if not step <= span - t or t > until:
             return math.nan if math.isnan(step) else math.inf

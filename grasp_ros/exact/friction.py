@@ -15,7 +15,7 @@ from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
 from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
-from grasp_ros.exact.roots import first_rise
+from grasp_ros.exact.roots import first_rise, value_and_rate
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -60,17 +60,29 @@ def apply_friction(plant: Plant, mode: Integers) -> None:
 
 
 @kernel
+def impact_noise(plant: Plant, side: Body, elastic: float, y: Array) -> float:
+    """Rounding of an impact; of 1 + p u', which may have cancelled, the terms count."""
+    front, back = rate_lanes(side)
+    return ROUNDINGS * (elastic * (1.0 + plant.pairs[side, DISSIPATION] * (abs(y[front]) + abs(y[back]))))
+
+
+@kernel
+def still_noise(plant: Plant) -> float:
+    """Rounding of what pushes an object at rest beside impacts, and of its friction."""
+    return ROUNDINGS * (abs(plant.given[OBJECT, FORCE]) + plant.coulomb)
+
+
+@kernel
 def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
     """The impact of one pair on an object at rest, and its roundings.
 
-    Of 1 + p u', which may have cancelled, the terms count. An arm that glides at u' = -1/p, where rounding hides its
-    force, is held there by as much as its own force.
+    An arm that glides at u' = -1/p, where rounding hides its force, is held there by as much as its own force.
     """
     x, v, sign = arm_of(state.y, side)
     body, loss = plant.bodies[side], plant.pairs[side, DISSIPATION]
     elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
     force = elastic * damping_factor(loss, approach(state.y, side))
-    noise = ROUNDINGS * (elastic * (1.0 + loss * (abs(v) + abs(state.y[V_O]))))
+    noise = impact_noise(plant, side, elastic, state.y)
     own = sign * (body[MASS] * own_acceleration(body, x, v))
     if abs(force) <= noise and 0.0 < own <= noise:
         return Push(own, ROUNDINGS * (body[MASS] * own_size(body, x, v)), noise)
@@ -92,7 +104,7 @@ def push_on_object(plant: Plant, state: State) -> Push:
             value += impact.value if side == LEFT else -impact.value
             rounding += impact.rounding
             noise += impact.noise
-    still = ROUNDINGS * (abs(given) + plant.coulomb)
+    still = still_noise(plant)
     return Push(value + given, rounding + still, noise + still)
 
 
@@ -151,23 +163,31 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
             product[j + k] += factor * second[k]
 
 
-@inlined
-def beyond(over: float, rounding: float) -> float:
-    """What a push is over its limit; within rounding so far below that it has to exceed it by more than that."""
-    return over - rounding if abs(over) <= rounding else over
+@kernel
+def overcome(f: Array, n: int, h: float, rounding: float, later: float, work: Integers) -> float:
+    """First s in (0, h] at which a push exceeds the friction by f(s), whose roundings are given at 0 and at h.
+
+    It has to exceed it by more than the smaller one; by that at 0, if it is within it there and uncertain at h.
+    """
+    hidden = abs(f[0]) <= rounding and value_and_rate(f, n, h)[0] <= later
+    f[0] -= rounding if hidden else min(rounding, later)
+    return EPS * EPS * h if f[0] > 0.0 else first_rise(f, n, h, 0.0, work)
 
 
 @kernel
-def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, rounding: float, work: Integers) -> SlideCandidate:
-    """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction."""
+def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[float, float], work: Integers
+                   ) -> SlideCandidate:
+    """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction.
+
+    `noise` is the rounding of what pushes it at 0 and at h.
+    """
     row, copy = tables.row, tables.start.f
     push = row[0] + plant.given[OBJECT, FORCE]
     for k in range(n + 1):
         copy[k] = -row[k]
-    row[0] = beyond(push - plant.coulomb, rounding)
-    to_right = first_rise(row, n, h, 0.0, work)
-    copy[0] = beyond(-push - plant.coulomb, rounding)
-    to_left = first_rise(copy, n, h, 0.0, work)
+    row[0], copy[0] = push - plant.coulomb, -push - plant.coulomb
+    to_right = overcome(row, n, h, noise[0], noise[1], work)
+    to_left = overcome(copy, n, h, noise[0], noise[1], work)
     if math.isnan(to_right) or math.isnan(to_left):
         return SlideCandidate(math.nan, Slide.STUCK)
     return SlideCandidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else SlideCandidate(to_left, Slide.LEFTWARD)
@@ -175,7 +195,7 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, rounding: flo
 
 @kernel
 def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
-    """First s in a Taylor step of length h at which an object under dry friction stops or slips.
+    """First s in a step of length h at which an object under dry friction stops or slips; h is in `tables.at`.
 
     An object that has just slipped is pushed by no more than rounding beyond its friction: the next order decides.
     """
@@ -190,4 +210,9 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
                 row[1] = 0.0
         return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
-    return slip_candidate(tables, plant, n, h, push_on_object(plant, state).noise, work)
+    noise, at = push_on_object(plant, state).noise, tables.at
+    later = still_noise(plant)
+    for side in (LEFT, RIGHT):
+        if state.mode[side] == Pair.CONTACT:
+            later += impact_noise(plant, side, elastic_force(plant.pairs[side, HERTZIAN], at[Z_L + side] ** 2), at)
+    return slip_candidate(tables, plant, n, h, (noise, later), work)

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Integers, Plant, Rates, State
+from grasp_ros.exact.records import Array, Integers, Motion, PairFlight, Plant, Rates, State
+from grasp_ros.exact.roots import safe_step
 from grasp_ros.physics.layout import (
     DAMPING,
+    EPS,
     FORCE,
     LEFT,
     MASS,
@@ -125,6 +127,39 @@ def bound_by(rates: Rates, q: float, q_rate: float, span: float) -> float:
     if rates.square_time < math.inf:
         linear = min(linear, math.sqrt(q * q + q_rate * q_rate * rates.square_time))
     return grown * linear
+
+
+@kernel
+def envelope_step(pair: PairFlight, at: Motion) -> float:
+    """Time for which the arm's swing cannot reach the object: 0 if it can now, inf if never.
+
+    Drag can only delay an object that approaches, but it also brakes one that moves away.
+    """
+    arm, body = pair.arm_rates, pair.body_rates
+    if arm.stiffness <= 0.0:
+        return 0.0
+    x_e = pair.x_e
+    swing = bound_by(arm, at.x - x_e, at.v, math.inf)
+    room = pair.sign * (at.x_o - x_e) - swing - 8.0 * EPS * (abs(at.x_o) + abs(x_e) + swing)
+    if not room > 0.0:
+        return 0.0
+    towards = -pair.sign * at.v_o
+    if body.damping > 0.0:
+        towards = max(towards, 0.0)
+    return safe_step(-room, towards, max(-pair.sign * body.force, 0.0))
+
+
+@inlined
+def envelope_of_speed(pair: PairFlight, at: Motion, a: float, a_o: float) -> float:
+    """Time for which the speed of the arm's swing cannot bring u' to -1/p beyond rounding, as `envelope_step`.
+
+    a, a_o are the accelerations. Drag only lessens that of an object.
+    """
+    if pair.arm_rates.stiffness <= 0.0 or pair.body_rates.damping < 0.0:
+        return 0.0
+    swing = bound_by(pair.arm_rates, at.v, a, math.inf)
+    room = pair.sign * at.v_o - swing - pair.inverse_p * (1.0 - 8.0 * EPS)
+    return safe_step(-room, max(-pair.sign * a_o, 0.0), 0.0) if room > 0.0 else 0.0
 
 
 @kernel

@@ -201,8 +201,7 @@ class GraspNode(Node):
         """Whether a node that publishes it listens to this publisher, for each source topic.
 
         Matching is asynchronous and messages sent before it are lost. Names come from discovery, which is earlier
-        than matching; so every discovered subscription must also have been matched. Who publishes without listening
-        is a stranger, and may not keep those from starting who do.
+        than matching; so every discovered subscription must also have been matched. A stranger may publish unheard.
         """
         readers = self.get_subscriptions_info_by_topic(publisher.topic_name)
         listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
