@@ -14,6 +14,7 @@ import numpy as np
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
+from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
 from grasp_ros.exact.roots import first_rise, value_and_rate
 from grasp_ros.physics.layout import (
@@ -164,14 +165,48 @@ def product(f: Array, a: int, b: int, out: int, n: int) -> None:
 
 
 @kernel
-def overcome(f: Array, n: int, h: float, rounding: float, later: float, work: Integers) -> float:
-    """First s in (0, h] at which a push exceeds the friction by f(s), whose roundings are given at 0 and at h.
+def noise_at(tables: Tables, plant: Plant, mode: Integers, n: int, s: float) -> float:
+    """Rounding of what pushes an object at rest at s in a Taylor step; the state there is left in `tables.at`."""
+    at = tables.at
+    values(tables.c, n, s, at)
+    noise = 0.0  # of both sides first, for mirror images
+    for side in (LEFT, RIGHT):
+        if mode[side] == Pair.CONTACT:
+            root = max(at[Z_L + side], 0.0)
+            noise += impact_noise(plant, side, elastic_force(plant.pairs[side, HERTZIAN], root * root), at)
+    return noise + still_noise(plant)
 
-    It has to exceed it by more than the smaller one; by that at 0, if it is within it there and uncertain at h.
+
+@inlined
+def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
+    """By how much what pushes the object at s, with the impacts `tables.row`, exceeds the friction, N."""
+    return abs(value_and_rate(tables.row, n, s)[0] + plant.given[OBJECT, FORCE]) - plant.coulomb
+
+
+@kernel
+def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> SlideCandidate:
+    """Since when a push exceeds the friction by more than twice its rounding, as it does at h."""
+    low, high = 0.0, h
+    while high - low > 4.0 * EPS * high:
+        middle = 0.5 * (low + high)
+        if excess(tables, plant, n, middle) > 2.0 * noise_at(tables, plant, mode, n, middle):
+            high = middle
+        else:
+            low = middle
+    push = value_and_rate(tables.row, n, high)[0] + plant.given[OBJECT, FORCE]
+    return SlideCandidate(high, Slide.RIGHTWARD if push > 0.0 else Slide.LEFTWARD)
+
+
+@kernel
+def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integers) -> float:
+    """First s in (0, h] at which a push exceeds the friction by f(s), and by more than roundings; those at 0 and at h.
+
+    Where that at 0 hides f, f has to exceed it twice: an object that slips must not stick at once.
     """
-    hidden = abs(f[0]) <= rounding and value_and_rate(f, n, h)[0] <= later
-    f[0] -= rounding if hidden else min(rounding, later)
-    return EPS * EPS * h if f[0] > 0.0 else first_rise(f, n, h, 0.0, work)
+    if f[0] > 2.0 * noise[0]:
+        return EPS * EPS * h
+    f[0] -= 2.0 * noise[0] if f[0] >= -2.0 * noise[0] else min(noise[0], noise[1])
+    return first_rise(f, n, h, 0.0, work)
 
 
 @kernel
@@ -186,8 +221,7 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
     for k in range(n + 1):
         copy[k] = -row[k]
     row[0], copy[0] = push - plant.coulomb, -push - plant.coulomb
-    to_right = overcome(row, n, h, noise[0], noise[1], work)
-    to_left = overcome(copy, n, h, noise[0], noise[1], work)
+    to_right, to_left = overcome(row, n, h, noise, work), overcome(copy, n, h, noise, work)
     if math.isnan(to_right) or math.isnan(to_left):
         return SlideCandidate(math.nan, Slide.STUCK)
     return SlideCandidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else SlideCandidate(to_left, Slide.LEFTWARD)
@@ -195,9 +229,9 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
 
 @kernel
 def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
-    """First s in a step of length h at which an object under dry friction stops or slips; h is in `tables.at`.
+    """First s in a Taylor step of length h at which an object under dry friction stops or slips; `tables.at` is lost.
 
-    An object that has just slipped is pushed by no more than rounding beyond its friction: the next order decides.
+    The next order decides of one that has just slipped, pushed by rounding. What hides a push may be far less at h.
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
@@ -210,9 +244,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
                 row[1] = 0.0
         return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
-    noise, at = push_on_object(plant, state).noise, tables.at
-    later = still_noise(plant)
-    for side in (LEFT, RIGHT):
-        if state.mode[side] == Pair.CONTACT:
-            later += impact_noise(plant, side, elastic_force(plant.pairs[side, HERTZIAN], at[Z_L + side] ** 2), at)
+    noise, later = push_on_object(plant, state).noise, noise_at(tables, plant, state.mode, n, h)
+    if abs(excess(tables, plant, n, 0.0)) <= 2.0 * noise and excess(tables, plant, n, h) > 2.0 * later:
+        return since_certain(tables, plant, state.mode, n, h)
     return slip_candidate(tables, plant, n, h, (noise, later), work)

@@ -117,8 +117,8 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
         row[j] = impact_at(f, LEFT, left, h, j) - impact_at(f, RIGHT, right, h, j)
     expand_row(tables)
     resolved = (left.stiff or left.hertzian == 0.0) and (right.stiff or right.hertzian == 0.0)  # e has its own digits
-    noise = push.rounding if resolved else push.noise
-    return slip_candidate(tables, plant, STAGES - 1, 1.0, (noise, noise), work)
+    rounding = push.rounding if resolved else push.noise
+    return slip_candidate(tables, plant, STAGES - 1, 1.0, (rounding, rounding), work)
 
 
 @kernel
