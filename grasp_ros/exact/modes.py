@@ -24,7 +24,7 @@ what pushes it but for the rounding of its terms (`push_on_object`); stuck it is
 
 * at the start: for pairs, object, and pairs again, as friction lets them; no events (`initial_modes`, `initial_slide`);
 * at events and between segments: for pairs at rest without force, which an event beside may press (`settle_resting`),
-  and an object that stops; if more than F pushes it, it turns around unrecorded;
+  for an object that stops, which turns around unrecorded if more than F pushes it, and for one that is stuck;
 * at ticks: for the object, and pairs that are LEAVING or about to begin from rest (`begin_interval`).
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
@@ -119,10 +119,7 @@ def initial_slide(plant: Plant, state: State) -> None:
 
 @kernel
 def begin_interval(plant: Plant, state: State, out: Output) -> None:
-    """Modes under the inputs of a new interval, which may be discontinuous here; a run that starts gets its first.
-
-    An interval that goes on after it has handed over its events keeps its modes.
-    """
+    """Modes under the inputs of a new interval, or the first of a run; one that handed over its events keeps them."""
     mode = state.mode
     lift_friction(plant)
     if mode[LEFT] == Pair.UNKNOWN:
@@ -133,18 +130,22 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
     if state.clock[0] > 0.0:
         apply_friction(plant, mode)
         return
-    before = mode[OBJECT]
-    initial_slide(plant, state)
-    if before == Slide.STUCK and mode[OBJECT] != Slide.STUCK:
-        record(state, OBJECT, Transition.SLIP, 0.0, 0.0, out)
-    elif before in (Slide.RIGHTWARD, Slide.LEFTWARD) and mode[OBJECT] == Slide.STUCK:
-        record(state, OBJECT, Transition.STICK, 0.0, 0.0, out)
+    settle_object(plant, state, out)
     for side in (LEFT, RIGHT):
         if mode[side] == Pair.LEAVING or (mode[side] == Pair.CONTACT and is_resting(state.y, side)):
             settle(state, side, mode_of(plant, state, side), out)
 
 
 # Rules between segments.
+
+
+@kernel
+def settle_object(plant: Plant, state: State, out: Output) -> None:
+    """Give the object its mode anew, and record it if it sticks or slips."""
+    stuck = state.mode[OBJECT] == Slide.STUCK
+    initial_slide(plant, state)
+    if stuck != (state.mode[OBJECT] == Slide.STUCK):
+        record(state, OBJECT, Transition.SLIP if stuck else Transition.STICK, 0.0, 0.0, out)
 
 
 @kernel
@@ -199,13 +200,15 @@ def leave_together(plant: Plant, state: State, settings: Settings) -> None:
 @inlined
 def make_transitions(plant: Plant, state: State, left: Candidate, right: Candidate, slide: SlideCandidate, end: float,
                      out: Output) -> None:
-    """Make all transitions within a few roundings of the end of a segment."""
+    """Make all transitions within a few roundings of the end; lost forces hide no more what pushes a stuck object."""
     if left.when <= end * TOGETHER:
         make_transition(plant, state, LEFT, left.what, out)
     if right.when <= end * TOGETHER:
         make_transition(plant, state, RIGHT, right.what, out)
     if slide.when <= end * TOGETHER:
         make_slide_transition(plant, state, slide.what, out)
+    elif state.mode[OBJECT] == Slide.STUCK and min(left.when, right.when) <= end * TOGETHER:
+        settle_object(plant, state, out)
 
 
 @kernel
@@ -236,15 +239,11 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, ou
 
 @kernel
 def make_slide_transition(plant: Plant, state: State, following: Slide, out: Output) -> None:
-    """The reset map of the object: it stops, or slips into the mode that follows; v_o = 0, and the record."""
-    mode = state.mode
-    stopped = mode[OBJECT] != Slide.STUCK
+    """The reset map of the object: it slips into the mode that follows, stops, or turns without a rest; v_o = 0."""
     state.y[V_O] = 0.0
-    if stopped:
-        initial_slide(plant, state)
-    else:
-        mode[OBJECT] = following
-        apply_friction(plant, mode)
-    if stopped and mode[OBJECT] != Slide.STUCK:  # it turns without a rest
+    if state.mode[OBJECT] != Slide.STUCK:
+        settle_object(plant, state, out)
         return
-    record(state, OBJECT, Transition.STICK if stopped else Transition.SLIP, 0.0, 0.0, out)
+    state.mode[OBJECT] = following
+    apply_friction(plant, state.mode)
+    record(state, OBJECT, Transition.SLIP, 0.0, 0.0, out)

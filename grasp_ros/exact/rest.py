@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.bits import exponent, power_of_two
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, bound, derivatives, other, reduced_mass, relative_motion
@@ -28,6 +29,7 @@ from grasp_ros.physics.layout import (
     Pair,
 )
 
+NOTHING = 2.0**-72  # of a way: below its roundings long before
 HIGHEST = 6  # derivative
 DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
 SHORT = 0.2  # of the time constants, well within those of `flight.SHORT`, where u keeps its own digits
@@ -66,11 +68,44 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     if u > 0.0:
         found = first_difference(plant, y, side, push, pace, 3)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
-    begins = 1.0
-    if d == 0.0:
-        begins = first_difference(plant, y, beside, 0.0, 0.0, HIGHEST).order
+    begins = Leaning(1.0, d) if d != 0.0 else first_difference(plant, y, beside, 0.0, 0.0, HIGHEST)
     found = first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
-    return found if found.order < 2.0 + 1.5 * begins else Leaning(2.0 + 1.5 * begins, math.inf)
+    if found.order < 2.0 + 1.5 * begins.order and not is_overtaken(plant, side, found, begins):
+        return found
+    return Leaning(2.0 + 1.5 * begins.order, math.inf)
+
+
+@kernel
+def is_overtaken(plant: Plant, side: Body, own: Leaning, begins: Leaning) -> bool:
+    """Whether a pair at rest is moved so much more by the force of the other pair that its own difference is nothing.
+
+    The other one begins with u = b t^m. When the first of both forces shows, its way has to be as much longer.
+    """
+    beside, m, b = other(side), begins.order, begins.value / math.gamma(begins.order + 1.0)
+    hertzian, loss = plant.pairs[beside, HERTZIAN], plant.pairs[beside, DISSIPATION]
+    if not 0.0 < b < math.inf:
+        return False
+    order = 2.0 + 1.5 * m
+    force = elastic_force(hertzian, b) * damping_factor(loss, b if m == 1.0 else 0.0)
+    way = force / (plant.bodies[OBJECT, MASS] * order * (order - 1.0))
+    t = min(time_of_impulse(reduced_mass(plant.bodies, beside) / hertzian, loss, m, b),
+            time_of_impulse(reduced_mass(plant.bodies, side) / plant.pairs[side, HERTZIAN],
+                            plant.pairs[side, DISSIPATION], order, way))
+    return abs(own.value) / math.gamma(own.order + 1.0) < NOTHING * way * t ** (order - own.order)
+
+
+@kernel
+def time_of_impulse(per_hertz: float, loss: float, order: float, a: float) -> float:
+    """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
+
+    H u^(5/2) (1 + p u') = mu u'^2, without the numbers; per_hertz is mu / H. It compares exponents, and integers of
+    them: other units give the same time.
+    """
+    twice, above = int(2.0 * order), exponent(a) + 1  # 2^above >= a
+    e = (4 * exponent(per_hertz * order * order) - 2 * above) // (twice + 8)
+    if loss > 0.0:
+        e = min(e, (4 * exponent(per_hertz * order / loss) - 6 * above) // (3 * twice + 4))
+    return power_of_two(e)
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.bits import exponent, near_inverse, power_of_two, power_of_two_root
+from grasp_ros.exact.bits import near_inverse, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
@@ -29,20 +29,6 @@ from grasp_ros.physics.layout import (
 RADIUS = 0.5  # of convergence of the series of a step, in its units: the least that is usual
 LEAST = 12  # order of a Taylor step
 STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
-
-
-@kernel
-def time_of_impulse(per_hertz: float, loss: float, order: int, a: float) -> float:
-    """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
-
-    H u^(5/2) (1 + p u') = mu u'^2, without the numbers; per_hertz is mu / H. It compares exponents, and integers of
-    them: other units give the same time.
-    """
-    n, above = float(order), exponent(a) + 1  # 2^above >= a
-    e = (4 * exponent(per_hertz * n * n) - 2 * above) // (2 * order + 8)
-    if loss > 0.0:
-        e = min(e, (2 * exponent(per_hertz * n / loss) - 3 * above) // (3 * order + 2))
-    return power_of_two(e)
 
 
 @kernel

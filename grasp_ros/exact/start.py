@@ -19,8 +19,7 @@ from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, Start, State, Tables
-from grasp_ros.exact.rest import NEVER, UNDECIDED, is_negligible, leaning
-from grasp_ros.exact.scales import time_of_impulse
+from grasp_ros.exact.rest import NEVER, UNDECIDED, is_negligible, leaning, time_of_impulse
 from grasp_ros.exact.start_series import NONE, POWERS, damped_leads, expand_start, first_of, force_of, leads, reach_of
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -92,11 +91,11 @@ def time_scale(plant: Plant, state: State, settings: Settings) -> float:
             if loss > 0.0:
                 scale = min(scale, power_of_two_root(per_hertz / (loss * u * math.sqrt(u)), 1))
         elif d > 0.0:
-            scale = min(scale, time_of_impulse(per_hertz, loss, 1, d))
+            scale = min(scale, time_of_impulse(per_hertz, loss, 1.0, d))
         else:
             order, value = leaning(plant, state, side)
             if value < math.inf:
-                scale = min(scale, time_of_impulse(per_hertz, loss, int(order), value / math.gamma(order + 1.0)))
+                scale = min(scale, time_of_impulse(per_hertz, loss, order, value / math.gamma(order + 1.0)))
     return scale
 
 
