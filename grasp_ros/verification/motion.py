@@ -145,7 +145,7 @@ def _bodies(detail: Detail, pairs: list[Impacts], momentum: Array, unit: Array, 
         impulse, doubt = detail.integral(pair.force[:, 1:-1])
         noise = _total(detail, pair.by_u) * pair.noise[:, 0] + _total(detail, pair.by_d) * pair.noise_d[:, 0]
         noise = noise + doubt + EPS * (impulse + pair.bounce[:, 0]) + _wander(detail, pair.force)
-        noise = noise + EPS * detail.pieces.end * pair.force[:, [0, -1]].max(axis=1) + pair.sudden
+        noise = noise + EPS * detail.pieces.end * pair.force.max(axis=1) + pair.sudden  # each time is rounded by itself
         sign = 1.0 if pair.side == LEFT else -1.0
         for body, direction in ((pair.side, sign), (OBJECT, -sign)):
             change[:, body] += direction * impulse
@@ -189,7 +189,8 @@ def _steps(detail: Detail, size: Sizes, noise: Array, acting: Array, smooth: NDA
     mean = 0.5 * (detail.v[:, 1:] + detail.v[:, :-1])
     beyond = np.abs(np.diff(detail.x, axis=1) - mean * step) - 0.5 * steepest * step**2
     fastest = np.abs(detail.v).max(axis=(1, 2))[:, None]
-    unit = EPS * size.x[:, 0] + EPS * detail.pieces.end[:, None] * fastest + noise * step.max(axis=1) + TINY
+    hidden = np.minimum(EPS * size.v[:, 0], np.abs(detail.v).max(axis=1))  # v of a swing that is over is its rounding
+    unit = EPS * size.x[:, 0] + EPS * detail.pieces.end[:, None] * fastest + (noise + hidden) * step.max(axis=1) + TINY
     error = np.where(smooth, beyond.max(axis=1) / unit, 0.0)[:, present].max(axis=1)
     return Ledger("position, output to output", error, np.asarray(smooth[:, present].any(axis=1)))
 
