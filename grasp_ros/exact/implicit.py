@@ -57,6 +57,7 @@ from grasp_ros.physics.layout import (
 LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
 PLACE, VELOCITY = 0, 1  # of a body in the state
 FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
+JUMP = 8.0  # times as much as the last coefficients weighs what is left of a relaxation at the begin
 
 
 @kernel
@@ -156,7 +157,10 @@ def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: App
         largest = max(largest, abs(f[nodes + j]))
     if pair.hertzian > 0.0 and not pair.rest + pair.share * f[nodes] > 0.0:  # it clamps before the first node
         return math.inf
-    last = write_lane(tables, U_L + side, pair.u, h, pair.rate * (pair.e - pair.offset))
+    begin = pair.rate * (pair.e - pair.offset)
+    last = write_lane(tables, U_L + side, pair.u, h, begin)
+    if pair.stiff:  # between the nodes the velocities swing about such a jump
+        last = max(last, JUMP * abs(row[0] - begin))
     if pair.hertzian == 0.0 or not pair.u > 0.0:
         return last / max(start.scale, abs(pair.e))
     v_end = start.v + f[V_NODES + STAGES - 1]

@@ -85,7 +85,8 @@ def sizes(detail: Detail) -> Sizes:
         touching |= (u >= 0.0).any(axis=1)
     near = np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None]
     v = _before_decay(detail, np.abs(detail.v).max(axis=1), touching)[:, None]
-    v = v + np.minimum(swing, gained) + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
+    way = _with_way(detail, v + np.minimum(swing, gained))
+    v = way + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
     return Sizes(np.maximum(own, near) + DIED_OUT / EPS, v + DIED_OUT / EPS)
 
 
