@@ -62,7 +62,7 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     push, pace = impact_beside(plant, state, side)
     u, d = y[U_L + beside], approach(y, beside)
     left = u / -d if d < 0.0 else math.inf  # s until it ends; at once, if no velocity that is a number comes of it
-    ends = left < math.inf and push * left == 0.0 and pace * left * left == 0.0
+    ends = (abs(push) + abs(pace) * left) * left == 0.0
     if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf or ends:
         return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
     if u > 0.0:

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from exact.bench import TOLERANCE, Bench, bench, bits
 
+from grasp_ros.exact.friction import apply_friction
 from grasp_ros.exact.kinematics import is_closed, is_resting, other, velocity_lane
 from grasp_ros.exact.modes import (
     LEFT_OUT,
@@ -27,7 +28,21 @@ from grasp_ros.exact.modes import (
     surface_side,
 )
 from grasp_ros.exact.records import Candidate, SlideCandidate
-from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, U_L, V_O, X_O, Body, Pair, Slide, Transition
+from grasp_ros.physics.layout import (
+    FORCE,
+    HERTZIAN,
+    LEFT,
+    MASS,
+    OBJECT,
+    RIGHT,
+    U_L,
+    V_O,
+    X_O,
+    Body,
+    Pair,
+    Slide,
+    Transition,
+)
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 NEVER = Candidate(math.inf, Transition.TOUCH)
@@ -128,6 +143,32 @@ def test_events_within_a_few_roundings_happen_together_and_others_do_not() -> No
     assert now(both(), later, math.inf, 1.0).events == [(OBJECT, Transition.STICK)]
     assert now(both(), math.inf, math.inf, soon).events == [(OBJECT, Transition.STICK)]
     assert now(both(), math.inf, math.inf, math.inf).events == []
+
+
+@SIDES
+@pytest.mark.parametrize("at", [1.0, 1.0 + 4e-15])
+@pytest.mark.parametrize("push", [4.0, 6.0, -6.0])
+def test_a_stuck_object_is_asked_again_when_a_pair_has_lost_its_force(side: Body, at: float, push: float) -> None:
+    """The rounding of 1e12 N has hidden what pushes it."""
+    b = bench(side, 1.0, -2.0, Pair.CONTACT, coulomb=5.0, slide=Slide.STUCK, object_push=push, push=-1.0)
+    b.plant.pairs[side, HERTZIAN] = 1e12
+    apply_friction(b.plant, b.state.mode)
+    crossed = Candidate(at, Transition.CLAMP)
+    left, right = (crossed, NEVER) if side == LEFT else (NEVER, crossed)
+    make_transitions(b.plant, b.state, left, right, NO_SLIDE, 1.0, b.out)
+    clamps = [(side, Transition.CLAMP)] if at == 1.0 else []
+    slips = abs(push) > 5.0 and clamps
+    assert b.events == clamps + ([(OBJECT, Transition.SLIP)] if slips else [])
+    assert b.slide is (toward(side, Slide.RIGHTWARD if push > 0.0 else Slide.LEFTWARD) if slips else Slide.STUCK)
+
+
+@SIDES
+def test_no_event_of_a_pair_asks_a_sliding_object(side: Body) -> None:
+    b = bench(side, 1.0, -2.0, Pair.CONTACT, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), push=-1.0)
+    crossed = Candidate(1.0, Transition.CLAMP)
+    left, right = (crossed, NEVER) if side == LEFT else (NEVER, crossed)
+    make_transitions(b.plant, b.state, left, right, NO_SLIDE, 1.0, b.out)
+    assert b.events == [(side, Transition.CLAMP)]
 
 
 # Consistent initialisation: the mode of a pair from its state.

@@ -22,6 +22,7 @@ from grasp_ros.exact.rest import (
     difference,
     glides,
     impact_beside,
+    is_overtaken,
     leaning,
     parting_time,
     time_of_impulse,
@@ -31,6 +32,7 @@ from grasp_ros.physics.layout import (
     DAMPING,
     EPS,
     FORCE,
+    HERTZIAN,
     LEFT,
     MASS,
     OBJECT,
@@ -230,6 +232,8 @@ def test_a_wall_hands_no_force_on(side: Body) -> None:
         ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
         ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (3.5, math.inf)),
         ({"common": 1.0, "stiffness": 2.0}, {"push": 0.5}, (4.0, -2.0)),
+        ({"push": -1e-40}, {"d": 0.3}, (3.5, math.inf)),  # the push beside is longer from 1e-27 s on
+        ({"push": 1e-40}, {"push": 1.0}, (5.0, math.inf)),
     ],
 )
 def test_beside_a_pair_that_begins_at_zero(
@@ -240,6 +244,36 @@ def test_beside_a_pair_that_begins_at_zero(
               push=own.get("push", 0.0) + common, object_push=common, beside_push=common - beside.get("push", 0.0),
               stiffness=own.get("stiffness", 0.0), object_speed=own.get("speed", 0.0))
     assert leaning(b.plant, b.state, side) == expected
+
+
+@SIDES
+@pytest.mark.parametrize("m", [1, 2, 3])
+@pytest.mark.parametrize("order", [2, 3])
+@pytest.mark.parametrize("loss", [0.0, 0.5])
+@pytest.mark.parametrize("soft", [1.0, 1e6])  # the force of one pair shows first, or that of the other
+def test_a_difference_that_the_push_beside_overtakes_is_none(
+    side: Body, m: int, order: int, loss: float, soft: float
+) -> None:
+    """Where the first of both forces shows, the way of the push is 2^72 times as long."""
+    b = bench(side, 0.0, 0.0, p=loss)
+    b.plant.pairs[side, HERTZIAN] = 1e4 / soft
+    beside, begins = other(side), Leaning(float(m), 0.3)
+    with mp.workdps(40):
+        hertzian, first = mpf(b.plant.pairs[beside, HERTZIAN]), mpf(0.3) / mp.factorial(m)
+        power = mpf(3 * m) / 2
+        force = hertzian * first ** mpf(1.5) * (1 + mpf(loss) * first * (m == 1))  # u' is nothing from rest
+        way = force / ((power + 1) * (power + 2))
+        t = mpf(min(
+            time_of_impulse(0.5 / b.plant.pairs[beside, HERTZIAN], loss, m, float(first)),
+            time_of_impulse(0.5 / b.plant.pairs[side, HERTZIAN], loss, float(power + 2), float(way)),
+        ))
+        limit = way * t ** (power + 2) / t**order * mp.factorial(order) / mpf(2) ** 72
+        for sign in (1, -1):
+            assert is_overtaken(b.plant, side, Leaning(float(order), float(0.999 * sign * limit)), begins)
+            assert not is_overtaken(b.plant, side, Leaning(float(order), float(1.001 * sign * limit)), begins)
+    assert not is_overtaken(b.plant, side, Leaning(2.0, 1e-300), Leaning(float(m), -0.3))
+    assert not is_overtaken(b.plant, side, Leaning(2.0, 1e-300), Leaning(NEVER, 0.0))
+    assert not is_overtaken(b.plant, side, Leaning(2.0, 1e-300), Leaning(2.0, math.inf))
 
 
 # How long the sign is certain.

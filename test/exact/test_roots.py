@@ -81,6 +81,16 @@ def test_within_its_noise_a_polynomial_counts_as_zero() -> None:
     assert first_rise(falls_short.copy(), 2, 2.0, 1e-8, work) == pytest.approx(1.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("value", "rate", "found"), [(2e-8, 1.0, True), (0.5e-8, 1.0, False), (2e-8, -1.0, False), (2e-8, 0.0, False)]
+)
+def test_what_has_risen_above_its_noise_before_is_not_lost(value: float, rate: float, found: bool) -> None:
+    """Steps that end earlier than it can be told from noise must not carry it on for ever."""
+    work = np.zeros(len(Work), dtype=np.int64)
+    s = first_rise(np.array([value, rate, 0.0]), 2, 1e-10, 1e-8, work)
+    assert (0.0 < s < 1e-40) if found else s == math.inf
+
+
 @pytest.mark.parametrize("s", [-0.7, 1e-3, 2.0])
 def test_a_shifted_polynomial_is_the_same_function(s: float) -> None:
     f = np.random.default_rng(7).normal(size=9)
