@@ -37,7 +37,7 @@ from grasp_ros.physics.layout import (
     Slide,
 )
 
-ROUNDINGS = 16.0 * EPS  # of the sum of the terms of a push: those of a force, and of a state that rests under it
+ROUNDINGS = 16.0 * EPS  # of the terms of what holds an object: of a force, and of a state that rests under it
 
 
 @kernel
@@ -62,23 +62,20 @@ def apply_friction(plant: Plant, mode: Integers) -> None:
 
 @kernel
 def impact_noise(plant: Plant, side: Body, elastic: float, y: Array) -> float:
-    """Rounding of an impact; of 1 + p u', which may have cancelled, the terms count."""
+    """Rounding of an impact, of its own terms alone; of 1 + p u', which may have cancelled, these count."""
     front, back = rate_lanes(side)
-    return ROUNDINGS * (elastic * (1.0 + plant.pairs[side, DISSIPATION] * (abs(y[front]) + abs(y[back]))))
+    return 0.5 * ROUNDINGS * (elastic * (1.0 + plant.pairs[side, DISSIPATION] * (abs(y[front]) + abs(y[back]))))
 
 
 @kernel
 def still_noise(plant: Plant) -> float:
-    """Rounding of what pushes an object at rest beside impacts, and of its friction."""
+    """Rounding of what else pushes an object at rest, and of its friction."""
     return ROUNDINGS * (abs(plant.given[OBJECT, FORCE]) + plant.coulomb)
 
 
 @kernel
 def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
-    """The impact of one pair on an object at rest, and its roundings.
-
-    An arm that glides at u' = -1/p, where rounding hides its force, is held there by as much as its own force.
-    """
+    """The impact of a pair on an object at rest; that of one that glides at u' = -1/p, hidden, is the arm's own force."""
     x, v, sign = arm_of(state.y, side)
     body, loss = plant.bodies[side], plant.pairs[side, DISSIPATION]
     elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
@@ -185,11 +182,11 @@ def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
 
 @kernel
 def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> SlideCandidate:
-    """Since when a push exceeds the friction by more than twice its rounding, as it does at h."""
+    """Since when a push exceeds the friction by more than its rounding, as it does at h."""
     low, high = 0.0, h
     while high - low > 4.0 * EPS * high:
         middle = 0.5 * (low + high)
-        if excess(tables, plant, n, middle) > 2.0 * noise_at(tables, plant, mode, n, middle):
+        if excess(tables, plant, n, middle) > noise_at(tables, plant, mode, n, middle):
             high = middle
         else:
             low = middle
@@ -199,13 +196,13 @@ def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float
 
 @kernel
 def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integers) -> float:
-    """First s in (0, h] at which a push exceeds the friction by f(s), and by more than roundings; those at 0 and at h.
+    """First s in (0, h] at which a push is beyond the friction by f(s), and that more than the rounding of f.
 
-    Where that at 0 hides f, f has to exceed it twice: an object that slips must not stick at once.
+    That at 0 counts, if it hides f there, otherwise the smaller one of those at 0 and at h.
     """
-    if f[0] > 2.0 * noise[0]:
+    if f[0] > noise[0]:
         return EPS * EPS * h
-    f[0] -= 2.0 * noise[0] if f[0] >= -2.0 * noise[0] else min(noise[0], noise[1])
+    f[0] -= noise[0] if f[0] >= -noise[0] else min(noise[0], noise[1])
     return first_rise(f, n, h, 0.0, work)
 
 
@@ -231,7 +228,8 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
 def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
     """First s in a Taylor step of length h at which an object under dry friction stops or slips; `tables.at` is lost.
 
-    The next order decides of one that has just slipped, pushed by rounding. What hides a push may be far less at h.
+    The next order decides of one that has just slipped, unless more than half of the rounding pushes it. What hides a
+    push may be far less at h.
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
@@ -240,11 +238,11 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
             row[k] = factor * c[LANES * k + V_O]
         if row[0] == 0.0:
             accelerating = c[LANES + TIME] * push_on_object(plant, state).noise / plant.bodies[OBJECT, MASS]
-            if abs(row[1]) <= accelerating:
+            if abs(row[1]) <= 0.5 * accelerating:
                 row[1] = 0.0
         return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
     noise, later = push_on_object(plant, state).noise, noise_at(tables, plant, state.mode, n, h)
-    if abs(excess(tables, plant, n, 0.0)) <= 2.0 * noise and excess(tables, plant, n, h) > 2.0 * later:
+    if abs(excess(tables, plant, n, 0.0)) <= noise and excess(tables, plant, n, h) > later:
         return since_certain(tables, plant, state.mode, n, h)
     return slip_candidate(tables, plant, n, h, (noise, later), work)

@@ -30,7 +30,7 @@ from grasp_ros.physics.layout import (
 )
 
 NOTHING = 2.0**-72  # of a way: below its roundings long before
-HIGHEST = 6  # derivative
+LOWEST, HIGHEST = 2, 6  # derivatives
 DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
 SHORT = 0.2  # of the time constants, well within those of `flight.SHORT`, where u keeps its own digits
 UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
@@ -64,15 +64,15 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     left = u / -d if d < 0.0 else math.inf  # s until it ends; at once, if no velocity that is a number comes of it
     ends = (abs(push) + abs(pace) * left) * left == 0.0
     if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf or ends:
-        return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
+        return first_difference(plant, y, side, 0.0, 0.0, LOWEST, HIGHEST)
     if u > 0.0:
-        found = first_difference(plant, y, side, push, pace, 3)
+        found = first_difference(plant, y, side, push, pace, LOWEST, 3)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
-    begins = Leaning(1.0, d) if d != 0.0 else first_difference(plant, y, beside, 0.0, 0.0, HIGHEST)
-    found = first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
-    if found.order < 2.0 + 1.5 * begins.order and not is_overtaken(plant, side, found, begins):
-        return found
-    return Leaning(2.0 + 1.5 * begins.order, math.inf)
+    begins = Leaning(1.0, d) if d != 0.0 else first_difference(plant, y, beside, 0.0, 0.0, LOWEST, HIGHEST)
+    found, pushed = first_difference(plant, y, side, 0.0, 0.0, LOWEST, HIGHEST), 2.0 + 1.5 * begins.order
+    while found.order < pushed and is_overtaken(plant, side, found, begins):
+        found = first_difference(plant, y, side, 0.0, 0.0, int(found.order) + 1, HIGHEST)
+    return found if found.order < pushed else Leaning(pushed, math.inf)
 
 
 @kernel
@@ -109,10 +109,11 @@ def time_of_impulse(per_hertz: float, loss: float, order: float, a: float) -> fl
 
 
 @kernel
-def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, highest: int) -> Leaning:
+def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, lowest: int, highest: int
+                     ) -> Leaning:
     """The first derivative of u beyond its rounding, with an acceleration of the object and its rate added; NEVER."""
     drag = plant.bodies[OBJECT, DAMPING] / plant.bodies[OBJECT, MASS]
-    for order in range(2, highest + 1):
+    for order in range(lowest, highest + 1):
         value, size = difference(plant, y, side, order)
         added = push if order == 2 else (pace - drag * push if order == 3 else 0.0)
         value += added
@@ -176,7 +177,7 @@ def glides(plant: Plant, state: State, side: Body) -> bool:
     """
     if state.mode[other(side)] in (Pair.CONTACT, Pair.CLAMPED):
         return False
-    return first_difference(plant, state.y, side, 0.0, 0.0, HIGHEST).order == NEVER
+    return first_difference(plant, state.y, side, 0.0, 0.0, LOWEST, HIGHEST).order == NEVER
 
 
 @inlined

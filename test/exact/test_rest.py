@@ -234,6 +234,7 @@ def test_a_wall_hands_no_force_on(side: Body) -> None:
         ({"common": 1.0, "stiffness": 2.0}, {"push": 0.5}, (4.0, -2.0)),
         ({"push": -1e-40}, {"d": 0.3}, (3.5, math.inf)),  # the push beside is longer from 1e-27 s on
         ({"push": 1e-40}, {"push": 1.0}, (5.0, math.inf)),
+        ({"push": 1e-40, "speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),  # but not than what follows
     ],
 )
 def test_beside_a_pair_that_begins_at_zero(
