@@ -75,7 +75,10 @@ def still_noise(plant: Plant) -> float:
 
 @kernel
 def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
-    """The impact of a pair on an object at rest; that of one that glides at u' = -1/p, hidden, is the arm's own force."""
+    """The impact of a pair on an object at rest.
+
+    Where an arm glides at u' = -1/p and rounding hides the force, it is the arm's own.
+    """
     x, v, sign = arm_of(state.y, side)
     body, loss = plant.bodies[side], plant.pairs[side, DISSIPATION]
     elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
