@@ -75,10 +75,7 @@ def still_noise(plant: Plant) -> float:
 
 @kernel
 def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
-    """The impact of a pair on an object at rest.
-
-    Where an arm glides at u' = -1/p and rounding hides the force, it is the arm's own.
-    """
+    """The impact of a pair on an object at rest; where rounding hides that of a glide at u' = -1/p, the arm's force."""
     x, v, sign = arm_of(state.y, side)
     body, loss = plant.bodies[side], plant.pairs[side, DISSIPATION]
     elastic = elastic_force(plant.pairs[side, HERTZIAN], state.y[U_L + side])
