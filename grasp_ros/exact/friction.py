@@ -14,7 +14,7 @@ import numpy as np
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
-from grasp_ros.exact.polynomial import values
+from grasp_ros.exact.polynomial import product, values
 from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
 from grasp_ros.exact.roots import first_rise, value_and_rate
 from grasp_ros.physics.layout import (
@@ -147,21 +147,6 @@ def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
 
 
 @kernel
-def product(f: Array, a: int, b: int, out: int, n: int) -> None:
-    """Cauchy product up to the order n of two series that begin at a and b in f, and not at `out`.
-
-    The terms of a coefficient are added in their order, but those of the others in between: no sum waits for the last.
-    """
-    first, second, product = f[a : a + n + 1], f[b : b + n + 1], f[out : out + n + 1]
-    for k in range(n + 1):
-        product[k] = 0.0
-    for j in range(n + 1):
-        factor = first[j]
-        for k in range(n + 1 - j):
-            product[j + k] += factor * second[k]
-
-
-@kernel
 def noise_at(tables: Tables, plant: Plant, mode: Integers, n: int, s: float) -> float:
     """Rounding of what pushes an object at rest at s in a Taylor step; the state there is left in `tables.at`."""
     at = tables.at
@@ -242,7 +227,14 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
                 row[1] = 0.0
         return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
-    noise, later = push_on_object(plant, state).noise, noise_at(tables, plant, state.mode, n, h)
-    if abs(excess(tables, plant, n, 0.0)) <= noise and excess(tables, plant, n, h) > later:
+    noise = push_on_object(plant, state).noise
+    begin, end = excess(tables, plant, n, 0.0), excess(tables, plant, n, h)
+    if begin < -noise:
+        found = slip_candidate(tables, plant, n, h, (0.0, 0.0), work)
+        if not found.when <= h or end > noise_at(tables, plant, state.mode, n, h):
+            return found
+        impact_series(tables, plant, state.mode, n)  # it is near the friction without exceeding it for certain
+    later = noise_at(tables, plant, state.mode, n, h)
+    if abs(begin) <= noise and end > later:
         return since_certain(tables, plant, state.mode, n, h)
     return slip_candidate(tables, plant, n, h, (noise, later), work)

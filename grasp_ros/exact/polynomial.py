@@ -1,4 +1,4 @@
-"""Tables of eight polynomials side by side: their values, their ranges, and the inverse of the time.
+"""Tables of eight polynomials side by side: their values, their ranges, and the inverse of the time; products of one.
 
 Coefficient k of a lane stands at LANES k + lane, so that one pass evaluates all lanes in vector instructions. Orders
 are even: the even and the odd powers are summed side by side, which halves the time until the result is there.
@@ -161,3 +161,18 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
             return following
         s = following
     return s
+
+
+@kernel
+def product(f: Array, a: int, b: int, out: int, n: int) -> None:
+    """Cauchy product up to the order n of two series that begin at a and b in f, and not at `out`.
+
+    The terms of a coefficient are added in their order, but those of the others in between: no sum waits for the last.
+    """
+    first, second, product = f[a : a + n + 1], f[b : b + n + 1], f[out : out + n + 1]
+    for k in range(n + 1):
+        product[k] = 0.0
+    for j in range(n + 1):
+        factor = first[j]
+        for k in range(n + 1 - j):
+            product[j + k] += factor * second[k]
