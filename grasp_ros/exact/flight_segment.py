@@ -113,16 +113,16 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
 
 @inlined
 def move(flights: Flights, state: State, t: float) -> None:
-    """Move the state on by t seconds, u with its own digits where the flight is short."""
+    """Move the state on by t s; u has its own digits where a flight is short and the places have no finer ones."""
     y = state.y
     u_l, u_r = y[U_L], y[U_R]
     y[X_L], y[V_L], away_l = fly(flights.left, t)
     y[X_R], y[V_R], away_r = fly(flights.right, t)
     y[X_O], y[V_O], away = fly(flights.object, t)
     write_penetrations(y)
-    if not math.isnan(away_l - away):
+    if not (math.isnan(away_l - away) or abs(y[X_L]) + abs(y[X_O]) < abs(u_l)):
         y[U_L] = u_l + (away_l - away)
-    if not math.isnan(away - away_r):
+    if not (math.isnan(away - away_r) or abs(y[X_O]) + abs(y[X_R]) < abs(u_r)):
         y[U_R] = u_r + (away - away_r)
     keep_resting(state)
 
