@@ -167,7 +167,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         slide = slide_in_contact(tables, plant, state, n, s, out.work)
     if math.isnan(slide.when):
         return math.nan
-    if slide.when <= s:
+    if slide.when <= s:  # the search for it has left another state in `at`
         s = slide.when
         values_and_ways(c, n, s, at)
     t = at[TIME]

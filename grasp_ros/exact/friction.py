@@ -169,7 +169,7 @@ def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
 def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> SlideCandidate:
     """Since when a push exceeds the friction by more than its rounding, as it does at h."""
     low, high = 0.0, h
-    while high - low > 4.0 * EPS * high:
+    while high - low > 4.0 * EPS * high and high > EPS * EPS * h:
         middle = 0.5 * (low + high)
         if excess(tables, plant, n, middle) > noise_at(tables, plant, mode, n, middle):
             high = middle
@@ -211,10 +211,10 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
 
 @kernel
 def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
-    """First s in a Taylor step of length h at which an object under dry friction stops or slips; `tables.at` is lost.
+    """First s in a Taylor step of length h at which an object under dry friction stops or slips.
 
-    The next order decides of one that has just slipped, unless more than half of the rounding pushes it. What hides a
-    push may be far less at h.
+    `tables.at` is at h, or lost. The next order decides of one that has just slipped, unless more than half of the
+    rounding pushes it. What hides a push may be far less at h.
     """
     slide, row, c = state.mode[OBJECT], tables.row, tables.c
     if slide != Slide.STUCK:
@@ -231,10 +231,13 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
     begin, end = excess(tables, plant, n, 0.0), excess(tables, plant, n, h)
     if begin < -noise:
         found = slip_candidate(tables, plant, n, h, (0.0, 0.0), work)
-        if not found.when <= h or end > noise_at(tables, plant, state.mode, n, h):
+        if not found.when <= h:  # most steps
+            return found
+    later = noise_at(tables, plant, state.mode, n, h)
+    if begin < -noise:
+        if end > later:
             return found
         impact_series(tables, plant, state.mode, n)  # it is near the friction without exceeding it for certain
-    later = noise_at(tables, plant, state.mode, n, h)
-    if abs(begin) <= noise and end > later:
+    elif begin <= noise and end > later:
         return since_certain(tables, plant, state.mode, n, h)
     return slip_candidate(tables, plant, n, h, (noise, later), work)

@@ -64,14 +64,14 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     left = u / -d if d < 0.0 else math.inf  # s until it ends; at once, if no velocity that is a number comes of it
     ends = (abs(push) + abs(pace) * left) * left == 0.0
     if state.mode[beside] != Pair.CONTACT or plant.bodies[OBJECT, MASS] == math.inf or ends:
-        return first_difference(plant, y, side, 0.0, 0.0, LOWEST, HIGHEST)
+        return own_difference(plant, y, side, LOWEST)
     if u > 0.0:
         found = first_difference(plant, y, side, push, pace, LOWEST, 3)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
-    begins = Leaning(1.0, d) if d != 0.0 else first_difference(plant, y, beside, 0.0, 0.0, LOWEST, HIGHEST)
-    found, pushed = first_difference(plant, y, side, 0.0, 0.0, LOWEST, HIGHEST), 2.0 + 1.5 * begins.order
+    begins = Leaning(1.0, d) if d != 0.0 else own_difference(plant, y, beside, LOWEST)
+    found, pushed = own_difference(plant, y, side, LOWEST), 2.0 + 1.5 * begins.order
     while found.order < pushed and is_overtaken(plant, side, found, begins):
-        found = first_difference(plant, y, side, 0.0, 0.0, int(found.order) + 1, HIGHEST)
+        found = own_difference(plant, y, side, int(found.order) + 1)
     return found if found.order < pushed else Leaning(pushed, math.inf)
 
 
@@ -120,6 +120,12 @@ def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: floa
         if abs(value) > DOUBT * (size + abs(added)):
             return Leaning(float(order), value)
     return Leaning(NEVER, 0.0)
+
+
+@kernel
+def own_difference(plant: Plant, y: Array, side: Body, lowest: int) -> Leaning:
+    """`first_difference` of arm and object by themselves, from an order on."""
+    return first_difference(plant, y, side, 0.0, 0.0, lowest, HIGHEST)
 
 
 @kernel
@@ -177,7 +183,7 @@ def glides(plant: Plant, state: State, side: Body) -> bool:
     """
     if state.mode[other(side)] in (Pair.CONTACT, Pair.CLAMPED):
         return False
-    return first_difference(plant, state.y, side, 0.0, 0.0, LOWEST, HIGHEST).order == NEVER
+    return own_difference(plant, state.y, side, LOWEST).order == NEVER
 
 
 @inlined

@@ -7,9 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import EPS, LEFT, MASS, OBJECT, RIGHT, Work
+from grasp_ros.physics.layout import EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, Work
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -71,7 +70,9 @@ def short_periods(run: Trajectory, product: Product) -> Iterator[tuple[str, floa
     system = run.scene.system
     if run.scene.sampled or system.external or not system.laws:
         return
-    feedback = max(_loop_rate(law, system.bodies[side, MASS]) for side, law in system.laws.items())
+    feedback = max(
+        _rate(system.bodies[side, MASS], law.position_gain, law.velocity_gain) for side, law in system.laws.items()
+    )
     left = _left_of_distance(run, product, feedback)
     if left is not None and left > FALLS:
         left = _left_of_distance(run, product, max(feedback, _fastest_rate(run)))
@@ -117,16 +118,16 @@ def _cancelled(run: Trajectory) -> float:
     return speed
 
 
-def _loop_rate(law: ControlLaw, mass: float) -> float:
-    """The fastest rate of a feedback, in 1/s."""
-    return float(max(math.sqrt(abs(law.position_gain) / mass), abs(law.velocity_gain) / mass))
+def _rate(mass: float, stiffness: float, damping: float) -> float:
+    """The fastest rate, in 1/s, of a mass with a spring and a damper, or a feedback in their place."""
+    return float(max(math.sqrt(abs(stiffness) / mass), abs(damping) / mass))
 
 
 def _fastest_rate(run: Trajectory) -> float:
     """Of the bodies by themselves, and of the impacts as deep as the ends or the events bring them, in 1/s."""
     system = run.scene.system
-    mass, stiffness, damping, _ = system.bodies[system.present].T
-    fastest = [np.sqrt(stiffness / mass).max(), (damping / mass).max()]
+    bodies = system.bodies[system.present]
+    mass, fastest = bodies[:, MASS], [_rate(*row) for row in bodies[:, :FORCE].tolist()]
     depths = np.nan_to_num(penetration(run.state)[::2]).max(axis=1)
     for side in system.contacts:
         (hertzian, loss), speed = system.pairs[side], np.abs(run.event_table[:, 4]).max(initial=0.0)

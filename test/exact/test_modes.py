@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from exact.bench import TOLERANCE, Bench, bench, bits
 
-from grasp_ros.exact.friction import apply_friction
+from grasp_ros.exact.friction import apply_friction, since_certain
 from grasp_ros.exact.kinematics import is_closed, is_resting, other, velocity_lane
 from grasp_ros.exact.modes import (
     LEFT_OUT,
@@ -27,10 +27,11 @@ from grasp_ros.exact.modes import (
     settle_resting,
     surface_side,
 )
-from grasp_ros.exact.records import Candidate, SlideCandidate
+from grasp_ros.exact.records import Candidate, SlideCandidate, Start, Tables
 from grasp_ros.physics.layout import (
     FORCE,
     HERTZIAN,
+    LANES,
     LEFT,
     MASS,
     OBJECT,
@@ -169,6 +170,21 @@ def test_no_event_of_a_pair_asks_a_sliding_object(side: Body) -> None:
     left, right = (crossed, NEVER) if side == LEFT else (NEVER, crossed)
     make_transitions(b.plant, b.state, left, right, NO_SLIDE, 1.0, b.out)
     assert b.events == [(side, Transition.CLAMP)]
+
+
+@SIDES
+@pytest.mark.parametrize(("begin", "expected"), [(0.0, 0.5), (6.0, 0.0)])
+def test_a_push_is_certain_since_it_exceeds_its_rounding_or_from_the_begin(
+    side: Body, begin: float, expected: float
+) -> None:
+    """6 N against 5 N, from the begin or from the middle of the step on; what another bit may tell at 0 has no end."""
+    b = bench(side, 1.0, -2.0, Pair.CLAMPED, coulomb=5.0, slide=Slide.STUCK)
+    row, empty = np.zeros(3), np.zeros(16)
+    row[0], row[1] = begin, 10.0 if begin == 0.0 else 0.0
+    tables = Tables(np.zeros(3 * LANES), empty, np.zeros(2 * LANES), empty, row, Start(empty, empty))
+    found = since_certain(tables, b.plant, b.state.mode, 2, 1.0)
+    assert found.what is Slide.RIGHTWARD
+    assert found.when == pytest.approx(expected, rel=1e-13, abs=1e-30)
 
 
 # Consistent initialisation: the mode of a pair from its state.

@@ -140,7 +140,8 @@ publishers = [(node.create_publisher(kinds.get(topic, type(message)), topic, qos
               for topic, message, qos in once + often]
 flood = node.create_publisher(WrenchStamped, "contact/left", 1000)
 input()
-while not all(publisher.get_subscription_count() for publisher in [publishers[0][0], publishers[6][0], flood]):
+heard = [publisher for publisher, _ in publishers if publisher.topic_name in ("/scene", "/lyapunov")]
+while not all(publisher.get_subscription_count() for publisher in [*heard, flood]):
     time.sleep(0.01)
 end = time.monotonic() + float(sys.argv[2])
 for number in range(10**9):
