@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import arm_of, reduced_mass
+from grasp_ros.exact.kinematics import approach, arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.layout import (
@@ -67,8 +67,13 @@ def apart(y: Array, side: Body) -> float:
 
 
 @kernel
-def jump(plant: Plant, y: Array, side: Body, way: float) -> float:
-    """What an arm gains or loses where it is put where object and u say, as at a touch, J of V."""
+def jump(plant: Plant, y: Array, side: Body, way: float, t: float) -> float:
+    """What an arm gains or loses where it is put where object and u say, J of V.
+
+    At a touch, where u = 0 is set, it goes by what a rounding of the time t in s has left of u, too.
+    """
+    if y[U_L + side] == 0.0:
+        way += EPS * t * abs(approach(y, side))
     body = plant.given[side]
     held = abs(body[FORCE]) + abs(body[STIFFNESS]) * (abs(arm_of(y, side)[0]) + way)
     return 2.0 * held * way
@@ -137,7 +142,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
-    rounding += jump(plant, state.y, LEFT, before.left) + jump(plant, state.y, RIGHT, before.right)
+    rounding += jump(plant, state.y, LEFT, before.left, t) + jump(plant, state.y, RIGHT, before.right, t)
     if rise > rounding:
         return Outcome.ENERGY_RISES
     rounding += 2.0 * settings.rate * t * size  # what dampers take at most

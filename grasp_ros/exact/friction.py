@@ -238,6 +238,8 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
         if end > later:
             return found
         impact_series(tables, plant, state.mode, n)  # it is near the friction without exceeding it for certain
-    elif begin <= noise and end > later:
-        return since_certain(tables, plant, state.mode, n, h)
-    return slip_candidate(tables, plant, n, h, (noise, later), work)
+    found = slip_candidate(tables, plant, n, h, (noise, later), work)
+    if -noise <= begin <= noise and (found.when <= h or end > later):
+        impact_series(tables, plant, state.mode, n)
+        return since_certain(tables, plant, state.mode, n, min(found.when, h))
+    return found

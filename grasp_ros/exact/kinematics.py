@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Integers, Motion, PairFlight, Plant, Rates, State
-from grasp_ros.exact.roots import safe_step
+from grasp_ros.exact.roots import LARGE, SMALL, safe_step
 from grasp_ros.physics.layout import (
     DAMPING,
     EPS,
@@ -125,7 +125,10 @@ def bound_by(rates: Rates, q: float, q_rate: float, span: float) -> float:
         return grown * abs(q)
     linear = abs(q) + abs(q_rate) * min(span, rates.response)
     if rates.square_time < math.inf:
-        linear = min(linear, math.sqrt(q * q + q_rate * q_rate * rates.square_time))
+        swing = math.sqrt(q * q + q_rate * q_rate * rates.square_time)
+        if not SMALL < swing < LARGE:  # squares have left the range of numbers
+            swing = math.hypot(q, q_rate * math.sqrt(rates.square_time))
+        linear = min(linear, swing)
     return grown * linear
 
 

@@ -18,9 +18,9 @@ A mode is frozen within a segment, which calls `make_transitions` at its end. An
 once, and never again from an exact zero. At an event, u = 0 and v_o = 0 are set exactly. Where a pair is on the edge of
 a mode, at u = 0 or u' = -1/p, one rule decides: the first derivative that differs from zero by more than its rounding
 (`mode_of`). At u = u' = 0 that is one of the orders 2 to 6 of u, with the force of the other pair (`rest.leaning`):
-pressed together it is CONTACT, which `start.start_segment` begins without leaving anything out; parted it is OPEN;
-where none differs it is RESTING, and arm and object move together. An object at rest sticks if friction can balance
-what pushes it but for the rounding of its terms (`push_on_object`); stuck it is a wall. This holds
+pressed together it is CONTACT, which `start.start_segment` begins, leaving out no more than rounding; parted it is
+OPEN; where none differs it is RESTING, and arm and object move together. An object at rest sticks if friction can
+balance what pushes it but for the rounding of its terms (`push_on_object`); stuck it is a wall. This holds
 
 * at the start: for pairs, object, and pairs again, as friction lets them; no events (`initial_modes`, `initial_slide`);
 * at events and between segments: for pairs at rest without force, which an event beside may press (`settle_resting`),
@@ -40,7 +40,7 @@ from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, rate_lanes, relative_motion, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, glides, impact_beside, is_negligible, leaning, turn_back
+from grasp_ros.exact.rest import NEVER, UNDECIDED, glides, impact_beside, is_negligible, leaning, turn_back
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EPS,
@@ -77,7 +77,7 @@ def mode_of(plant: Plant, state: State, side: Body) -> Pair:
     if u < 0.0 or d != 0.0:
         return Pair.CONTACT if u == 0.0 and d > 0.0 else Pair.OPEN
     order, value = leaning(plant, state, side)
-    if order == NEVER:
+    if order in (NEVER, UNDECIDED):
         return Pair.RESTING
     return Pair.CONTACT if value > 0.0 else Pair.OPEN
 

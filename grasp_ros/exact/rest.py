@@ -68,7 +68,7 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     if u > 0.0:
         found = first_difference(plant, y, side, push, pace, LOWEST, 3)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
-    begins = Leaning(1.0, d) if d != 0.0 else own_difference(plant, y, beside, LOWEST)
+    begins = own_motion(plant, y, beside)
     found, pushed = own_difference(plant, y, side, LOWEST), 2.0 + 1.5 * begins.order
     while found.order < pushed and is_overtaken(plant, side, found, begins):
         found = own_difference(plant, y, side, int(found.order) + 1)
@@ -126,6 +126,13 @@ def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: floa
 def own_difference(plant: Plant, y: Array, side: Body, lowest: int) -> Leaning:
     """`first_difference` of arm and object by themselves, from an order on."""
     return first_difference(plant, y, side, 0.0, 0.0, lowest, HIGHEST)
+
+
+@kernel
+def own_motion(plant: Plant, y: Array, side: Body) -> Leaning:
+    """The first derivative of u by which arm and object part or meet by themselves, that of order 1 included."""
+    d = approach(y, side)
+    return Leaning(1.0, d) if d != 0.0 else own_difference(plant, y, side, LOWEST)
 
 
 @kernel

@@ -133,8 +133,8 @@ def search(f: Array, n: int, h: float, noise: float, last: float, work: Integers
     near = max(noise, EPS * size)
     for _ in range(MAX_STEPS):
         work[Work.ROOT_ITERATIONS] += 1
-        if value < -near and rate > curvature * (h - s):
-            return root_of_rise(f, n, s, h, noise, work), FOUND, last
+        if value < -near and rate > curvature * (h - s):  # by half of the rate at least
+            return root_of_rise(f, n, s, min(h, s - 2.0 * value / rate), noise, work), FOUND, last
         step = safe_step(min(value, -near), rate, curvature)
         reach = 4.0 * max(step, last)
         if reach < h - s:  # a bound for the neighbourhood alone allows a longer step

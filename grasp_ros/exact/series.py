@@ -21,6 +21,7 @@ import math
 
 import numpy as np
 
+from grasp_ros.exact.bits import exponent, power_of_two
 from grasp_ros.exact.collocation import ROW, WORKSPACE
 from grasp_ros.exact.flight import FLIGHT_ORDER
 from grasp_ros.exact.fused import fma
@@ -49,6 +50,7 @@ from grasp_ros.physics.layout import (
 
 FACTORS, SECOND = 32, 16  # numbers of one order in the table of factors, and where its second factors begin
 CACHE_LINE = 64  # bytes
+LARGEST = 960  # binary exponent of a unit
 FIRST, UPPER, ONE, TWO = (np.int64(number) for number in (0, 8, 1, 2))  # typed, or `convolve` is compiled for each
 
 
@@ -119,6 +121,13 @@ def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: flo
 
 
 @inlined
+def scale_of(unit: float) -> float:
+    """The power of two of a unit; 1 for one so large that nothing moves but numbers at the end of their range."""
+    e = exponent(unit)
+    return power_of_two(e) if e <= LARGEST else 1.0
+
+
+@inlined
 def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
 
@@ -176,6 +185,9 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
 def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n: int) -> None:
     """Fill the Taylor table c from its order 0, with both sides in contact: G = w_l w_r. The series are in s / unit.
 
+    The power of two of the unit is a part of G here: in shallow contacts products of G alone with accelerations would
+    underflow.
+
     Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
     w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, H g (1 + p u').
     """
@@ -183,8 +195,11 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     hertz_r, loss_r = pairs[RIGHT, HERTZIAN], pairs[RIGHT, DISSIPATION]
     left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
     x_o, v_l, v_o, v_r, w_l, w_r = c[X_O], c[V_L], c[V_O], c[V_R], c[Z_L], c[Z_R]
-    b = (w_l * w_r, w_l, w_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * w_r),
-         hertz_r * ((w_r * w_r) * (w_r * w_r) * w_l))
+    scale = scale_of(unit)
+    unit /= scale
+    s_l, s_r = scale * w_l, scale * w_r
+    b = (w_l * s_r, s_l, s_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * s_r),
+         hertz_r * ((w_r * w_r) * (w_r * w_r) * s_l))
     w_end_l, w_end_r, u_end_l, u_end_r = w_l, w_r, w_l * w_l, w_r * w_r
     a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(np.uint64(n)):
@@ -192,21 +207,21 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, UPPER, ONE)
         u_l, u_r = fma(w_end_l, w_l, u_l), fma(w_end_r, w_r, u_r)
         q_l, q_r = fma(u_end_l, u_l, q_l), fma(u_end_r, u_r, q_r)
-        g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[8], w_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[9], w_l, g_r))
-        g = 0.5 * (fma(w_l, b[2], fma(a[4], w_r, ww)) + fma(w_r, b[1], fma(a[5], w_l, ww_mirrored)))
+        g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[8], s_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[9], s_l, g_r))
+        g = 0.5 * (fma(w_l, b[2], fma(a[4], s_r, ww)) + fma(w_r, b[1], fma(a[5], s_l, ww_mirrored)))
         one = 1.0 if k == 0 else 0.0
         a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
         d_l, d_r = v_l - v_o, v_o - v_r
         e_l, e_r = fma(loss_l, d_l, one), fma(loss_r, d_r, one)
         # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
         z_l, z_r = fma(e_l, b[3], fma(a[10], g_l, z_l)), fma(e_r, b[4], fma(a[11], g_r, z_r))
-        wd_l, wd_r = fma(d_l, b[2], fma(a[6], w_r, wd_l)), fma(d_r, b[1], fma(a[7], w_l, wd_r))
+        wd_l, wd_r = fma(d_l, b[2], fma(a[6], s_r, wd_l)), fma(d_r, b[1], fma(a[7], s_l, wd_r))
         gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
         gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
         put(f, FACTORS * k, v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r)
         put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r)
-        put(f, FACTORS * k + SECOND, g, g, g, g, w_r, w_l, w_r, w_l)
-        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, w_r, w_l, g_l, g_r)
+        put(f, FACTORS * k + SECOND, g, g, g, g, s_r, s_l, s_r, s_l)
+        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r)
         if k == 0:
             a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
             w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
@@ -214,6 +229,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         twice = 2.0 * step
         c[LANES * k + CHECK] = g
         w_l, w_r, x_o = step * wd_l, step * wd_r, twice * gv
+        s_l, s_r = scale * w_l, scale * w_r
         v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
         v_o = twice * fma(middle[0], z_l - z_r, go)
         put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)

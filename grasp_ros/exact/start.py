@@ -1,7 +1,7 @@
 """The begin of a contact that the regularised time cannot begin: both pairs at u = 0 at once, or one at rest there.
 
 Its series are those of `start_series`. The segment ends where one term of each quantity still decides its sign, so
-that nothing happens within it.
+that nothing happens within it, or where the other pair touches.
 """
 
 from __future__ import annotations
@@ -10,19 +10,43 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.bits import orders_to_one, power_of_two, power_of_two_root
+from grasp_ros.exact.bits import orders_to_one, power_of_two
 from grasp_ros.exact.clock import tick
 from grasp_ros.exact.friction import push_on_object
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, keep_resting, reduced_mass
+from grasp_ros.exact.kinematics import approach, keep_resting
+from grasp_ros.exact.modes import make_transitions, mode_of, settle
 from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
-from grasp_ros.exact.records import Array, Integers, Output, Plant, Settings, Start, State, Tables
-from grasp_ros.exact.rest import NEVER, UNDECIDED, is_negligible, leaning, time_of_impulse
-from grasp_ros.exact.start_series import NONE, POWERS, damped_leads, expand_start, first_of, force_of, leads, reach_of
+from grasp_ros.exact.records import (
+    Array,
+    Candidate,
+    Integers,
+    Output,
+    Plant,
+    Settings,
+    SlideCandidate,
+    Start,
+    State,
+    Tables,
+)
+from grasp_ros.exact.rest import is_negligible
+from grasp_ros.exact.roots import first_rise
+from grasp_ros.exact.start_scales import holding_time, own_power, power_of, time_scale
+from grasp_ros.exact.start_series import (
+    ALIKE,
+    NONE,
+    POWERS,
+    damped_leads,
+    expand_start,
+    first_of,
+    force_of,
+    leads,
+    reach_of,
+)
 from grasp_ros.physics.layout import (
-    DISSIPATION,
+    EPS,
     FORCE,
     HERTZIAN,
     LANES,
@@ -40,6 +64,7 @@ from grasp_ros.physics.layout import (
     Pair,
     Segment,
     Slide,
+    Transition,
     Work,
 )
 
@@ -58,67 +83,49 @@ def must_start(state: State) -> bool:
     return (left and (right or approach(y, LEFT) == 0.0)) or (right and approach(y, RIGHT) == 0.0)
 
 
-@kernel
-def power_of(plant: Plant, state: State, side: Body) -> int:
-    """a of a pair in contact, u = s^a U; -a of one that parts from rest; otherwise NONE."""
-    y, mode = state.y, state.mode[side]
-    if mode not in (Pair.CONTACT, Pair.OPEN):
-        return NONE
-    if y[U_L + side] != 0.0 or approach(y, side) != 0.0:
-        if mode == Pair.OPEN:
-            return NONE
-        return 0 if y[U_L + side] > 0.0 else POWERS
-    order, value = leaning(plant, state, side)
-    if order in (NEVER, UNDECIDED):
-        return NONE
-    return int(POWERS * order) if value > 0.0 else -int(POWERS * order)
+@inlined
+def comes_near(state: State, side: Body, power: int) -> bool:
+    """Whether an open pair may touch while the other one begins."""
+    return bool(state.mode[side] == Pair.OPEN and power == NONE)
 
 
 @kernel
-def time_scale(plant: Plant, state: State, settings: Settings) -> float:
-    """A power of two near the time T, in s, within which a contact shows: the force has turned or damped its pair."""
-    y = state.y
-    scale = 1.0 / settings.rate if settings.rate > 0.0 else math.inf
-    for side in (LEFT, RIGHT):
-        if state.mode[side] != Pair.CONTACT:
-            continue
-        u, d = y[U_L + side], approach(y, side)
-        per_hertz, loss = reduced_mass(plant.bodies, side) / plant.pairs[side, HERTZIAN], plant.pairs[side, DISSIPATION]
-        if u > 0.0:
-            scale = min(scale, power_of_two_root(per_hertz / math.sqrt(u), 2))
-            if d != 0.0:
-                scale = min(scale, power_of_two_root(u / abs(d), 1))
-            if loss > 0.0:
-                scale = min(scale, power_of_two_root(per_hertz / (loss * u * math.sqrt(u)), 1))
-        elif d > 0.0:
-            scale = min(scale, time_of_impulse(per_hertz, loss, 1.0, d))
-        else:
-            order, value = leaning(plant, state, side)
-            if value < math.inf:
-                scale = min(scale, time_of_impulse(per_hertz, loss, order, value / math.gamma(order + 1.0)))
-    return scale
+def touch_beside(tables: Tables, state: State, side: Body, power: int, n: int, h: float, work: Integers) -> Candidate:
+    """The touch of a pair in (0, h] while the other one begins."""
+    if not comes_near(state, side, power):
+        return Candidate(math.inf, Transition.TOUCH)
+    for k in range(n + 1):
+        tables.f[k] = tables.start.c[LANES * k + U_L + side]
+    return Candidate(first_rise(tables.f, n, h, EPS * abs(state.y[U_L + side]), work), Transition.TOUCH)
 
 
 @kernel
 def is_quiet(start: Start, plant: Plant, state: State, n: int, left: int, right: int, h: float) -> bool:
-    """Whether no event can happen in (0, h]: in each quantity one term decides the sign."""
+    """Whether no event of a pair can happen in (0, h]: in each quantity one term decides the sign."""
     c, mode = start.c, state.mode
     for side in (LEFT, RIGHT):
         lane, a = U_L + side, left if side == LEFT else right
-        if mode[side] in (Pair.RESTING, Pair.ABSENT):
+        if mode[side] in (Pair.RESTING, Pair.ABSENT) or comes_near(state, side, a):
             continue
         first = first_of(c, n, lane) if a < 0 else a
         if not leads(c, n, lane, first, h, a > 0):
             return False
         if (a == 0 or mode[side] == Pair.CLAMPED) and not damped_leads(c, plant, n, side, h):
             return False
-    if mode[OBJECT] == Slide.STUCK:
-        total = 0.0
-        for k in range(n - POWERS, -1, -1):  # of the last orders no force is known
-            total = total * h + plant.pairs[LEFT, HERTZIAN] * abs(force_of(start.f, n, k, LEFT, left))
-            total += plant.pairs[RIGHT, HERTZIAN] * abs(force_of(start.f, n, k, RIGHT, right))
-        return total <= plant.coulomb - abs(plant.given[OBJECT, FORCE])
-    return mode[OBJECT] == Slide.FREE or leads(c, n, V_O, first_of(c, n, V_O), h, False)
+    return True
+
+
+@kernel
+def keeps_sliding(start: Start, plant: Plant, state: State, n: int, left: int, right: int, h: float) -> bool:
+    """Whether no event of the object can happen in (0, h]: its velocity has one sign, or its friction holds it."""
+    if state.mode[OBJECT] != Slide.STUCK:
+        return state.mode[OBJECT] == Slide.FREE or leads(start.c, n, V_O, first_of(start.c, n, V_O), h, False)
+    push = change = 0.0
+    for k in range(n - POWERS, -1, -1):  # of the last orders no force is known
+        push = plant.pairs[LEFT, HERTZIAN] * force_of(start.f, n, k, LEFT, left)
+        push -= plant.pairs[RIGHT, HERTZIAN] * force_of(start.f, n, k, RIGHT, right)
+        change = (change + abs(push)) * h if k > 0 else change
+    return change <= plant.coulomb - abs(push + plant.given[OBJECT, FORCE])
 
 
 @kernel
@@ -147,36 +154,73 @@ def place(at: Array, mode: Integers) -> None:
 
 
 @kernel
-def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
-    """From u = 0 to where the regularised time goes on, or to the end of the span; returns the time in s."""
-    out.work[Work.CONTACT_STEPS] += 1
-    at, n = tables.at, ORDER
-    for side in (LEFT, RIGHT):
-        u, d = state.y[U_L + side], approach(state.y, side)
-        if state.mode[side] == Pair.CONTACT and d > 0.0 and is_negligible(plant, side, u, d, NOTHING):
-            state.y[U_L + side] = 0.0
-    left, right = power_of(plant, state, LEFT), power_of(plant, state, RIGHT)
-    scale, reach = scaled_series(tables, plant, state, settings, left, right)
-    whole = math.sqrt(math.sqrt(span / scale))
-    h = min(reach, whole)
+def quiet_length(tables: Tables, plant: Plant, state: State, n: int, left: int, right: int, longest: float) -> float:
+    """Length in s, at most `longest`, without an event but for a touch of the other pair.
+
+    Where a quantity is at its limit within rounding none is short enough.
+    """
+    h = longest
     for _ in range(HALVINGS):
-        if is_quiet(tables.start, plant, state, n, left, right, h):
-            break
+        if is_quiet(tables.start, plant, state, n, left, right, h) and keeps_sliding(
+                tables.start, plant, state, n, left, right, h):
+            return h
         h *= 0.5
-    t = span if h == whole else scale * ((h * h) * (h * h))
+    return h
+
+
+@inlined
+def deliver(tables: Tables, state: State, scale: float, t: float, n: int, out: Output) -> None:
+    """Write the states at the output times before the end t of the segment."""
     tau = due(state, out)
     while tau < t:
-        values(tables.start.c, n, math.sqrt(math.sqrt(tau / scale)), at)
-        place(at, state.mode)
-        write_row(out, out.filled[Filled.OUTPUTS], at)
+        values(tables.start.c, n, math.sqrt(math.sqrt(tau / scale)), tables.at)
+        place(tables.at, state.mode)
+        write_row(out, out.filled[Filled.OUTPUTS], tables.at)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
-    values(tables.start.c, n, h, at)
-    place(at, state.mode)
+
+
+@inlined
+def stand_at_zero(plant: Plant, state: State, side: Body) -> None:
+    """Set u = 0 of a pair that has just touched."""
+    u, d = state.y[U_L + side], approach(state.y, side)
+    if state.mode[side] == Pair.CONTACT and d > 0.0 and is_negligible(plant, side, u, d, NOTHING):
+        state.y[U_L + side] = 0.0
+
+
+@kernel
+def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
+    """From u = 0 to where the regularised time goes on, to a touch or the end of the span; its time in s or nan."""
+    out.work[Work.CONTACT_STEPS] += 1
+    n = ORDER
+    stand_at_zero(plant, state, LEFT)
+    stand_at_zero(plant, state, RIGHT)
+    left, right = power_of(plant, state, LEFT), power_of(plant, state, RIGHT)
+    scale, reach = scaled_series(tables, plant, state, settings, left, right)
+    held = holding_time(plant, state)
+    if held > scale * (reach * reach) * (reach * reach):
+        left, right = own_power(plant, state, LEFT), own_power(plant, state, RIGHT)
+        scale, reach = scaled_series(tables, plant, state, settings, left, right)
+        reach = min(reach, math.sqrt(math.sqrt(held / scale)))
+    whole = math.sqrt(math.sqrt(span / scale))
+    h = quiet_length(tables, plant, state, n, left, right, min(reach, whole))
+    touch_l = touch_beside(tables, state, LEFT, left, n, h, out.work)
+    touch_r = touch_beside(tables, state, RIGHT, right, n, h, out.work)
+    if math.isnan(touch_l.when) or math.isnan(touch_r.when):
+        return math.nan
+    h = min(h, touch_l.when, touch_r.when)
+    t = span if h == whole else scale * ((h * h) * (h * h))
+    deliver(tables, state, scale, t, n, out)
+    values(tables.start.c, n, h, tables.at)
+    place(tables.at, state.mode)
     for lane in range(LANES):
-        state.y[lane] = at[lane]
+        state.y[lane] = tables.at[lane]
     keep_resting(state)
     tick(state.clock, t)
     leave_step(tables, h, scale)
     notify(out, Segment.START, t)
+    make_transitions(plant, state, touch_l, touch_r, SlideCandidate(math.inf, Slide.FREE), h, out)
+    for side, power in ((LEFT, left), (RIGHT, right)):
+        if power == ALIKE:
+            settle(state, side, mode_of(plant, state, side), out)
     return t

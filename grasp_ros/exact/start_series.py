@@ -36,6 +36,7 @@ from grasp_ros.physics.layout import (
 )
 
 NONE = -1  # power of a pair that does not begin
+ALIKE = -1000  # of one whose arm and object move alike, beyond all orders
 POWERS = 4  # s^4 = t / T
 ROWS = 4  # of each pair in the table of factors: W, U W, 1 + p u', and the product of the last two
 DECIDES = 0.5  # of the leading term: what all others together may come to
@@ -87,8 +88,8 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
                  ) -> None:
     """Write the coefficients of all quantities of the state up to the order n.
 
-    `left`, `right`: a of the pairs; -a for one that parts from rest; NONE for one that does neither. `doubt`: rounding
-    of what pushes the object, N.
+    `left`, `right`: a of the pairs; -a for one that parts from rest, or moves as if without force; ALIKE or NONE for
+    one that does neither. `doubt`: rounding of what pushes the object, N.
     """
     c, f, pairs = start.c, start.f, plant.pairs
     c[:] = 0.0
@@ -166,10 +167,10 @@ def reach_of(c: Array, n: int, settings: Settings, tail: int) -> float:
 
 @kernel
 def leads(c: Array, n: int, lane: int, first: int, h: float, weighted: bool) -> bool:
-    """Whether the term `first` of a lane outweighs all later ones in (0, h]; weighted: also in its derivative."""
-    rest = 0.0
+    """Whether the term `first` of a lane outweighs all that oppose it in (0, h]; weighted: also in its derivative."""
+    rest, sign = 0.0, math.copysign(1.0, c[LANES * first + lane])
     for k in range(n, first, -1):
-        rest = rest * h + abs(c[LANES * k + lane]) * (k if weighted else 1)
+        rest = rest * h + max(-sign * c[LANES * k + lane], 0.0) * (k if weighted else 1)
     return rest * h <= DECIDES * abs(c[LANES * first + lane]) * (first if weighted else 1)
 
 

@@ -11,7 +11,7 @@ from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
 from grasp_ros.exact.records import Array, Integers, Lanes, Plant, Settings, State, Step, Tables
-from grasp_ros.exact.series import ONE, TWO, expand_both, expand_one
+from grasp_ros.exact.series import ONE, TWO, expand_both, expand_one, scale_of
 from grasp_ros.physics.layout import (
     CHECK,
     EPS,
@@ -37,7 +37,7 @@ from grasp_ros.physics.layout import (
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
 THREE, FOUR, FIVE = (np.int64(k) for k in range(3, TAIL + 1))  # typed, see `polynomial`
 SMALLEST = 1e-290  # of what moves
-STILL = 2.0**-300  # part of the fastest motion that is none
+STILL = 2.0**-400  # part of the fastest motion that is none
 BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
 MOST = 16  # binary orders by which a unit is changed at once
@@ -178,12 +178,14 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
 def is_exact(tables: Tables, step: Step, h: float, tolerance: float) -> bool:
     """Whether a step of length h neglects nothing: the values at its end, and the sizes on the way, are known.
 
-    G = w_l w_r, or u = w^2 with one side in contact, is expanded beside w: its defect at the end of the step consists
-    of neglected terms only.
+    G = w_l w_r, times the power of two of the unit, or u = w^2 with one side in contact, is expanded beside w: its
+    defect at the end of the step consists of neglected terms only.
     """
     c, at, size = tables.c, tables.at, tables.size
-    defect = abs(at[CHECK] - (at[Z_L] if step.left else at[Z_R]) * (at[Z_R] if step.right else at[Z_L]))
-    return defect <= (100.0 * tolerance + 100.0 * EPS) * (abs(c[CHECK]) + h * abs(c[LANES + CHECK]) + size[CHECK])
+    scale = scale_of(step.unit) if step.left and step.right else 1.0
+    product = (at[Z_L] if step.left else at[Z_R]) * (scale * (at[Z_R] if step.right else at[Z_L]))
+    allowed = (100.0 * tolerance + 100.0 * EPS) * (abs(c[CHECK]) + h * abs(c[LANES + CHECK]) + size[CHECK])
+    return abs(at[CHECK] - product) <= allowed
 
 
 @inlined

@@ -25,6 +25,7 @@ from grasp_ros.verification.roundings import (
     Sizes,
     accelerations,
     elapsed,
+    force_noise,
     impact_speed,
     impacts,
     sizes,
@@ -32,7 +33,7 @@ from grasp_ros.verification.roundings import (
 )
 from grasp_ros.verification.segments import INNER, Detail
 
-SMOOTH = 1e-6  # of its integral's size: an integrand whose two quadratures differ by more is not resolved
+SMOOTH = 1e-6  # of its integral's size: an integrand whose quadratures differ by more is not resolved
 
 
 class Ledger(NamedTuple):
@@ -56,7 +57,7 @@ def _wander(detail: Detail, values: Array) -> Array:
 
 
 def _resolved(detail: Detail, values: Array, noise: Array | float) -> NDArray[np.bool_]:
-    """Whether both quadratures agree on values (k, n + 2, ...)."""
+    """Whether all quadratures agree on values (k, n + 2, ...)."""
     _, doubt = detail.integral(values[:, 1:-1])
     return np.asarray(doubt <= SMOOTH * _total(detail, values) + noise)
 
@@ -88,6 +89,8 @@ def _ledgers(detail: Detail) -> Iterator[Ledger]:
     yield from _bodies(detail, pairs, momentum, unit, friction, (smooth, pushed), present)
     whole, doubt = momentum[:, present].sum(axis=1), unit[:, present].sum(axis=1)
     doubt = doubt + EPS * sum(pair.bounce[:, 0] for pair in pairs)
+    still = np.asarray((detail.v[..., OBJECT] == 0.0).all(axis=1))  # friction is what pushes it, with its rounding
+    doubt = doubt + np.where(still, force_noise(detail, pairs) * span[:, 0], 0.0)
     if pairs:
         yield Ledger("momentum", _beyond(whole, friction, doubt), everywhere)
     yield _energy(detail, size, pairs, everywhere & pushed)

@@ -85,7 +85,7 @@ def examine(scene: Scene, every: bool = True, max_work: int = MOST_WORK, compare
 
 def _end(run: Trajectory, product: Product) -> Check:
     """Whether a run may end like this: out of budget, or stalled where a motion has died out."""
-    error = float(run.status in (Status.STALLED, Status.ENERGY_RISES))
+    error = float(run.status in (Status.STALLED, Status.ENERGY_RISES, Status.ENERGY_FALLS, Status.PENETRATES))
     if run.status is Status.STALLED:
         error = float(_smallest_at_stall(run, product) > DIED_OUT)
     if run.status is Status.NOT_FINITE and not run.sampled:

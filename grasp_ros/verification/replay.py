@@ -79,10 +79,14 @@ def _recorded(detail: Detail, body: int) -> tuple[Array, list[Transition]]:
 
 
 def _spans(detail: Detail, body: int, modes: tuple[int, ...]) -> Iterator[tuple[tuple[int, ...], NDArray[np.bool_]]]:
-    """What a body's record says: possible modes, and the nodes (k, n + 2) at which they hold."""
+    """What a body's record says: possible modes, and the nodes (k, n + 2) at which they hold.
+
+    Each time is rounded by itself, so nothing is said about nodes no further from an event than that.
+    """
     times, kinds = _recorded(detail, body)
-    number = np.searchsorted(times, detail.t, side="right")
+    number, late = np.searchsorted(times, detail.t, side="right"), EPS * detail.t
     inside = (detail.t > detail.pieces.begin[:, None]) & (detail.t < detail.pieces.end[:, None])
+    inside &= np.searchsorted(times, detail.t - late) == np.searchsorted(times, detail.t + late, side="right")
     yield (BEFORE[kinds[0]] if kinds else modes), inside & (number == 0)
     after = np.array([-1, *(AFTER[kind] for kind in kinds)])[number]
     for mode in modes:

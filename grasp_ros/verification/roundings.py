@@ -12,7 +12,7 @@ from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
-from grasp_ros.verification.segments import FIRST, Detail
+from grasp_ros.verification.segments import FIRST, INNER, Detail
 
 STEP = 5.0  # time constants of a damper within a step in contact
 TINY = 1e-280  # against 0 / 0, and for what underflows
@@ -40,7 +40,7 @@ class Impacts(NamedTuple):
     noise: Array  # of u by rounding of the positions, m
     noise_d: Array  # of u', m/s
     bounce: Array  # (k, 1): mu times the speed of an impact of the segment's energy, kg m/s
-    sudden: Array  # (k,): of that, what the pair exchanges within a rounding of the time after a touch
+    sudden: Array  # (k,): of that, what the pair exchanges within a rounding of the time at a touch
 
 
 def walk(run: Trajectory, parts: int) -> float:
@@ -72,22 +72,25 @@ def rates(bodies: Array) -> Array:
 
 
 def sizes(detail: Detail) -> Sizes:
-    """Sizes of positions and velocities; v of a swing has the digits of its amplitude, that of a fall those it had."""
+    """Sizes of positions and velocities; v of a swing has the digits of its amplitude, that of a fall those it had.
+
+    In a contact an arm has the roundings of x_o, by which its spring drives it.
+    """
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
     own = _with_way(detail, largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rest = np.where(stiffness != 0.0, np.abs(force / stiffness), 0.0)
-    swing = np.where(stiffness != 0.0, rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own), np.inf)
-    gained = (np.abs(stiffness) * own + np.abs(force)) / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
     touching = np.zeros(len(own), dtype=bool)
     for side in detail.run.scene.system.contacts:
         u = (1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])
         touching |= (u >= 0.0).any(axis=1)
-    near = np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None]
+    own = np.maximum(own, np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rest = np.where(stiffness != 0.0, np.abs(force / stiffness), 0.0)
+    swing = np.where(stiffness != 0.0, rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own), np.inf)
+    gained = (np.abs(stiffness) * own + np.abs(force)) / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
     v = _before_decay(detail, np.abs(detail.v).max(axis=1), touching)[:, None]
     way = _with_way(detail, v + np.minimum(swing, gained))
     v = way + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
-    return Sizes(np.maximum(own, near) + DIED_OUT / EPS, v + DIED_OUT / EPS)
+    return Sizes(own + DIED_OUT / EPS, v + DIED_OUT / EPS)
 
 
 def _before_decay(detail: Detail, v: Array, touching: NDArray[np.bool_]) -> Array:
@@ -146,15 +149,16 @@ def impact_speed(detail: Detail, pairs: list[Impacts]) -> Array:
 
 
 def push_noise(detail: Detail, pairs: list[Impacts]) -> Array:
-    """Speed (k,) in m/s that the roundings of the impacts give to the object from the begin of its segment on.
-
-    Where 1 + p u' nearly vanishes they are far larger than those of the force.
-    """
-    noise = sum(((pair.by_u * pair.noise + pair.by_d * pair.noise_d).max(axis=1) for pair in pairs),
-                np.zeros(len(detail.x)))
+    """Speed (k,) in m/s that the roundings of the impacts give to the object from the begin of its segment on."""
     mass = detail.bodies[:, OBJECT, MASS]
-    found: Array = noise * elapsed(detail)[:, 0, 0] / np.where(mass > 0.0, mass, 1.0)
+    found: Array = force_noise(detail, pairs) * elapsed(detail)[:, 0, 0] / np.where(mass > 0.0, mass, 1.0)
     return found
+
+
+def force_noise(detail: Detail, pairs: list[Impacts]) -> Array:
+    """Roundings (k,) in N of the impacts on the object; where 1 + p u' nearly vanishes, far larger than the forces'."""
+    return sum(((pair.by_u * pair.noise + pair.by_d * pair.noise_d).max(axis=1) for pair in pairs),
+               np.zeros(len(detail.x)))
 
 
 def elapsed(detail: Detail) -> Array:
@@ -180,18 +184,18 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     noise = EPS * (size.x[..., side] + size.x[..., OBJECT])
     noise_d = EPS * (size.v[..., side] + size.v[..., OBJECT])
     deep, damped = np.maximum(u, 0.0), 1.0 + contact.dissipation * d
-    near = np.maximum(u + noise, 0.0)
-    by_u = 1.5 * contact.hertzian * np.sqrt(near) * (np.maximum(damped, 0.0) + contact.dissipation * noise_d)
-    by_d = np.where(damped >= -contact.dissipation * noise_d, contact.dissipation * contact.hertzian * near**1.5, 0.0)
+    near, doubt = np.maximum(u + noise, 0.0), contact.dissipation * noise_d + 2.0 * EPS  # of 1 + p u'
+    by_u = 1.5 * contact.hertzian * np.sqrt(near) * (np.maximum(damped, 0.0) + doubt)
+    by_d = np.where(damped >= -doubt, contact.dissipation * contact.hertzian * near**1.5, 0.0)
     released = contact.hertzian * deep**1.5 * -d
     loss = np.where(damped >= 0.0, contact.dissipation * contact.hertzian * deep**1.5 * d * d, released)
     masses = detail.bodies[:, side, MASS], detail.bodies[:, OBJECT, MASS]
     mu = masses[0] * masses[1] / (masses[0] + masses[1])
-    speed2 = (d * d + 2.0 * stored_energy(contact.hertzian, deep) / mu[:, None]).max(axis=1) * (u > 0.0).any(axis=1)
+    speed2 = (d * d + 2.0 * stored_energy(contact.hertzian, deep) / mu[:, None]).max(axis=1) * (near > 0.0).any(axis=1)
     bounce = mu[:, None] * np.sqrt(largest_in_segment(detail, speed2))[:, None]
     after = (detail.pieces.kind[1:] & FIRST > 0)[:, None]  # the state at an event has the roundings of the way to it
     bounce[1:] = np.where(after, np.maximum(bounce[1:], bounce[:-1]), bounce[1:])
     late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)
     reached = np.minimum(bounce[:, 0], late * impact_force(contact, late * fastest, fastest))
-    sudden = np.where(detail.pieces.kind & FIRST > 0, reached, 0.0)
+    sudden = np.where(detail.pieces.kind != INNER, reached, 0.0)
     return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce, sudden)

@@ -34,7 +34,7 @@ class Rule(NamedTuple):
 
     nodes: Array  # (4, n)
     weights: Array  # (4, n)
-    coarse: Array  # (4, n): of a rule of half the order on half the nodes
+    coarse: Array  # (2, 4, n): of two rules of half the order, each on every other node
 
 
 class Pieces(NamedTuple):
@@ -58,28 +58,31 @@ class Detail(NamedTuple):
     bodies: Array  # (k, 3, 4): m, K, C, f as they act in a piece, see `layout`
 
     def integral(self, values: Array) -> tuple[Array, Array]:
-        """Integrals (k, ...) over the pieces of values (k, n, ...) at the inner nodes, and the error's estimate."""
+        """Integrals (k, ...) over the pieces of values (k, n, ...) at the inner nodes, and the error's estimate.
+
+        That is the larger of two differences: where the nodes are too few for a motion one may vanish by chance.
+        """
+        fine, *coarse = (self._sum(table, values) for table in (self.rule.weights, *self.rule.coarse))
+        return fine, np.maximum(*(np.abs(fine - other) for other in coarse))
+
+    def _sum(self, table: Array, values: Array) -> Array:
         length = self.pieces.end - self.pieces.begin
-        fine, coarse = (
-            np.einsum("kn,kn...->k...", table[self.pieces.kind] * length[:, None], values)
-            for table in (self.rule.weights, self.rule.coarse)
-        )
-        return fine, np.abs(fine - coarse)
+        found: Array = np.einsum("kn,kn...->k...", table[self.pieces.kind] * length[:, None], values)
+        return found
 
 
 @cache
 def rule() -> Rule:
     """Gauss and Legendre in s, t = s at inner ends and ~ s^2 at the ends of a segment."""
     x, weight = np.polynomial.legendre.leggauss(NODES)
-    half = np.zeros(NODES)
-    moments = np.zeros((NODES + 1) // 2)
-    moments[0] = 2.0
-    half[::2] = np.linalg.solve(np.polynomial.legendre.legvander(x[::2], len(moments) - 1).T, moments)
+    half = np.zeros((2, NODES))
+    for which, nodes in zip(half, (x[::2], x[1::2]), strict=True):
+        moments = 2.0 * np.eye(1, len(nodes))[0]
+        which[np.isin(x, nodes)] = np.linalg.solve(np.polynomial.legendre.legvander(nodes, len(nodes) - 1).T, moments)
     s = 0.5 * (x + 1.0)
     maps = np.array([s, s * s, s * (2.0 - s), s * s * (3.0 - 2.0 * s)])
     slopes = np.array([np.ones_like(s), 2.0 * s, 2.0 - 2.0 * s, 6.0 * s * (1.0 - s)])
-    fine, coarse = (slopes * (0.5 * table) for table in (weight, half))
-    return Rule(maps, fine, coarse)
+    return Rule(maps, slopes * (0.5 * weight), slopes * (0.5 * half[:, None]))
 
 
 def pieces_of(run: Trajectory) -> Pieces:

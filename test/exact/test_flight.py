@@ -383,6 +383,13 @@ def test_the_bound_holds_and_is_not_idle(body: Body) -> None:
             assert limit <= 30.0 * largest
 
 
+@pytest.mark.parametrize("size", [2.0**-540, 2.0**-700, 2.0**-900, 2.0**600])
+def test_the_bound_of_a_swing_knows_no_size(size: float) -> None:
+    """Its squares leave the range of numbers."""
+    body = np.array([2.0, 3.0, 0.5, 0.0])
+    assert bound(body, size, 3.0 * size, 10.0) == pytest.approx(size * bound(body, 1.0, 3.0, 10.0), rel=1e-14, abs=0.0)
+
+
 def test_where_a_bound_says_far_the_search_needs_one_step_and_finds_nothing() -> None:
     """Random flights, half of them near the edge of the bound; sides, signs and sizes of all kinds."""
     draw = np.random.default_rng(12)

@@ -54,6 +54,14 @@ def test_first_rise_beside_a_double_root(eps: float) -> None:
     assert found == pytest.approx(0.5 - math.sqrt(eps), rel=0, abs=1e-15 / math.sqrt(eps) + 1e-15)
 
 
+@pytest.mark.parametrize("gap", [1e-100, 1e-200, 1e-290])
+def test_a_root_next_to_zero_keeps_its_digits_and_costs_nothing(gap: float) -> None:
+    work = np.zeros(len(Work), dtype=np.int64)
+    found = first_rise(np.array([-gap, 2.0, -0.5]), 2, 1.0, 0.0, work)
+    assert found == pytest.approx(0.5 * gap, rel=1e-15, abs=0.0)
+    assert work[Work.ROOT_ITERATIONS] < 10
+
+
 @pytest.mark.parametrize("zeros", range(1, 6))
 @pytest.mark.parametrize("h", [1e-200, 1.0, 1e200])
 def test_a_zero_at_the_start_that_rises_is_not_lost(zeros: int, h: float) -> None:

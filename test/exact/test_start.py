@@ -20,6 +20,7 @@ from grasp_ros.exact.modes import initial_modes
 from grasp_ros.exact.records import Array, Settings
 from grasp_ros.exact.series import new_tables
 from grasp_ros.exact.start import must_start, start_segment
+from grasp_ros.exact.start_scales import holding_time
 from grasp_ros.physics.layout import (
     HERTZIAN,
     LEFT,
@@ -228,6 +229,25 @@ def test_a_coarser_accuracy_goes_further(name: str) -> None:
     lengths = [segment(name, LEFT, tolerance)[2] for tolerance in (1e-16, 1e-12, 1e-8, 1e-4)]
     assert lengths == sorted(lengths)
     assert lengths[-1] > 3.0 * lengths[0]
+
+
+@SIDES
+@pytest.mark.parametrize("gap", [1e-9, 1e-130, 1e-240])
+def test_a_start_ends_where_the_other_pair_touches(gap: float, side: Body) -> None:
+    b = start(side, push=2.0, beside=(-gap, 0.5))
+    settings = Settings(1e-16, b.settings.order, 1e-16 ** (1.0 / (b.settings.order + 1)), b.settings.rate)
+    t = float(start_segment(new_tables(b.settings.order), b.plant, b.state, settings, 1e9, b.out))
+    assert t == pytest.approx(2.0 * gap, rel=1e-9, abs=0.0)
+    assert b.events == [(other(side), Transition.TOUCH)]
+    assert b.state.y[U_L + other(side)] == 0.0
+
+
+@SIDES
+def test_forces_are_left_out_only_where_all_begin_from_rest(side: Body) -> None:
+    resting, moving = start(side, push=2.0, beside=(0.0, 0.0), beside_push=-1.0), start(side, beside=(0.01, 0.0))
+    assert 0.0 < holding_time(resting.plant, resting.state) < 1e-4
+    assert holding_time(moving.plant, moving.state) == 0.0
+    assert holding_time(*start(side, push=2.0, coulomb=1e3, slide=Slide.STUCK)[:2]) == 0.0
 
 
 # Whole runs.

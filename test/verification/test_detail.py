@@ -69,9 +69,10 @@ def good(first: Trajectory) -> Detail:
 @pytest.mark.parametrize("kind", [INNER, FIRST, LAST, WHOLE])
 def test_the_quadrature_is_exact_for_what_a_piece_of_its_kind_holds(kind: int) -> None:
     table = rule()
-    t, weight, coarse = table.nodes[kind], table.weights[kind], table.coarse[kind]
+    t, weight, coarse = table.nodes[kind], table.weights[kind], table.coarse[:, kind]
     assert weight.sum() == pytest.approx(1.0, abs=1e-15)
-    assert coarse.sum() == pytest.approx(1.0, abs=1e-14)
+    assert coarse.sum(axis=1) == pytest.approx([1.0, 1.0], abs=1e-14)
+    assert coarse @ t == pytest.approx([0.5, 0.5], rel=1e-13)
     assert weight @ t**8 == pytest.approx(1.0 / 9.0, rel=1e-14)
     if kind & FIRST:
         assert weight @ t**1.5 == pytest.approx(0.4, rel=1e-14)
