@@ -8,6 +8,7 @@ from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
+from grasp_ros.exact.taylor_step import STILL
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -113,13 +114,17 @@ def other_losses(plant: Plant, state: State, size: float, t: float) -> float:
 
 @inlined
 def penetrates(state: State, side: Body, t: float) -> bool:
-    """Whether an open pair is closed by more than the roundings of a way of t s: a touch has been missed."""
+    """Whether an open pair is closed by more than the roundings of a way of t s: a touch has been missed.
+
+    What is STILL beside the fastest motion is not followed.
+    """
     u = state.y[U_L + side]
     if state.mode[side] != Pair.OPEN or u <= 0.0:
         return False
     x, v, _ = arm_of(state.y, side)
     way = abs(x) + abs(state.y[X_O]) + t * (abs(v) + abs(state.y[V_O]))
-    return u > ROUNDINGS * EPS * way + UNDERFLOW
+    fastest = abs(state.y[V_L]) + abs(state.y[V_O]) + abs(state.y[V_R])
+    return u > ROUNDINGS * EPS * way + STILL * t * fastest + UNDERFLOW
 
 
 @inlined

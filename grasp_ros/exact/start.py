@@ -197,8 +197,8 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
     stand_at_zero(plant, state, RIGHT)
     left, right = power_of(plant, state, LEFT), power_of(plant, state, RIGHT)
     scale, reach = scaled_series(tables, plant, state, settings, left, right)
-    held = holding_time(plant, state)
-    if held > scale * (reach * reach) * (reach * reach):
+    held = holding_time(plant, state, settings)
+    if held > 0.0 and (reach == math.inf or held > scale * (reach * reach) * (reach * reach)):
         left, right = own_power(plant, state, LEFT), own_power(plant, state, RIGHT)
         scale, reach = scaled_series(tables, plant, state, settings, left, right)
         reach = min(reach, math.sqrt(math.sqrt(held / scale)))

@@ -7,8 +7,8 @@ import math
 from grasp_ros.exact.bits import power_of_two, power_of_two_root
 from grasp_ros.exact.jit import kernel
 from grasp_ros.exact.kinematics import approach, is_resting, reduced_mass
-from grasp_ros.exact.records import Plant, Settings, State
-from grasp_ros.exact.rest import NEVER, UNDECIDED, leaning, own_motion, time_of_impulse
+from grasp_ros.exact.records import Array, Plant, Settings, State
+from grasp_ros.exact.rest import DOUBT, HIGHEST, NEVER, UNDECIDED, difference, leaning, own_motion, time_of_impulse
 from grasp_ros.exact.start_series import ALIKE, NONE, POWERS
 from grasp_ros.physics.layout import DISSIPATION, HERTZIAN, LEFT, RIGHT, U_L, Body, Pair
 
@@ -57,27 +57,40 @@ def time_scale(plant: Plant, state: State, settings: Settings) -> float:
 
 
 @kernel
-def holding_time(plant: Plant, state: State) -> float:
+def silent_time(plant: Plant, y: Array, side: Body) -> float:
+    """Time in s for which a pair that begins moves as if without force, by each derivative; 0 if it is too deep."""
+    per_hertz, loss = reduced_mass(plant.bodies, side) / plant.pairs[side, HERTZIAN], plant.pairs[side, DISSIPATION]
+    time, way = math.inf, 0.0
+    for order in range(1, HIGHEST + 1):
+        value, size = (approach(y, side), 0.0) if order == 1 else difference(plant, y, side, order)
+        if abs(value) > DOUBT * size:
+            first = time_of_impulse(per_hertz, loss, float(order), abs(value) / math.gamma(order + 1.0))
+            time = min(time, first * power_of_two(-math.ceil(HELD / (0.5 * order + 2.0))))
+    for order in range(1, HIGHEST + 1):
+        value = approach(y, side) if order == 1 else difference(plant, y, side, order)[0]
+        way = max(way, abs(value) / math.gamma(order + 1.0) * time**order)
+    return time if y[U_L + side] <= way else 0.0
+
+
+@kernel
+def holding_time(plant: Plant, state: State, settings: Settings) -> float:
     """Time in s for which all pairs in contact move as if without force, a part of `time_of_impulse`; 0 if not at all.
 
     Which force shows first may decide about the other pair long before any of them changes a velocity.
     """
+    if plant.coulomb > 0.0:
+        return 0.0
     longest = math.inf
     for side in (LEFT, RIGHT):
-        if state.mode[side] != Pair.CONTACT:
-            continue
-        order, value = own_motion(plant, state.y, side)
-        if order == NEVER and is_resting(state.y, side):
-            continue
-        if plant.coulomb > 0.0 or value <= 0.0:
-            return 0.0
-        per_hertz, a = reduced_mass(plant.bodies, side) / plant.pairs[side, HERTZIAN], value / math.gamma(order + 1.0)
-        time = time_of_impulse(per_hertz, plant.pairs[side, DISSIPATION], order, a)
-        time *= power_of_two(-math.ceil(HELD / (0.5 * order + 2.0)))
-        if state.y[U_L + side] > a * time**order:
-            return 0.0
-        longest = min(longest, time)
-    return longest if longest < math.inf else 0.0
+        if state.mode[side] == Pair.CONTACT:
+            order, value = own_motion(plant, state.y, side)
+            if order < NEVER and value > 0.0:
+                longest = min(longest, silent_time(plant, state.y, side))
+            elif order < NEVER or not is_resting(state.y, side):
+                return 0.0
+    if longest == math.inf:
+        return 0.0
+    return min(longest, 1.0 / settings.rate) if settings.rate > 0.0 else longest
 
 
 @kernel

@@ -167,10 +167,14 @@ def reach_of(c: Array, n: int, settings: Settings, tail: int) -> float:
 
 @kernel
 def leads(c: Array, n: int, lane: int, first: int, h: float, weighted: bool) -> bool:
-    """Whether the term `first` of a lane outweighs all that oppose it in (0, h]; weighted: also in its derivative."""
+    """Whether the term `first` of a lane outweighs all that oppose it in (0, h].
+
+    Weighted: all others, also in its derivative, because the root of a force is expanded about it.
+    """
     rest, sign = 0.0, math.copysign(1.0, c[LANES * first + lane])
     for k in range(n, first, -1):
-        rest = rest * h + max(-sign * c[LANES * k + lane], 0.0) * (k if weighted else 1)
+        term = c[LANES * k + lane]
+        rest = rest * h + (k * abs(term) if weighted else max(-sign * term, 0.0))
     return rest * h <= DECIDES * abs(c[LANES * first + lane]) * (first if weighted else 1)
 
 

@@ -37,11 +37,11 @@ from grasp_ros.physics.layout import (
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
 THREE, FOUR, FIVE = (np.int64(k) for k in range(3, TAIL + 1))  # typed, see `polynomial`
 SMALLEST = 1e-290  # of what moves
-STILL = 2.0**-400  # part of the fastest motion that is none
+STILL = 2.0**-500  # part of the fastest motion that is none
 BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
 MOST = 16  # binary orders by which a unit is changed at once
-MAX_UNITS = 200
+MAX_UNITS, MOST_FITS = 200, 4
 
 
 @inlined
@@ -151,10 +151,12 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
     """A step with its series, in its unit or in one that fits them, and its length in that unit, or nan.
 
     Most units do at once. Coefficients of a wrong one leave the range of numbers, so the next follows from the length;
-    where they vanish, the end of the span or a release ends the step.
+    where they vanish, the end of the span or a release ends the step. One that has been changed is changed until the
+    step is about 1, so that it is the same however far off it was.
     """
     pulled = pulls(plant, state.y)  # before the series: quotients after it would be waited for
-    for _ in range(MAX_UNITS):
+    fits = 0
+    for turn in range(MAX_UNITS):
         begin_series(tables, state)
         expand(tables, plant, step)
         h = 1.0
@@ -162,7 +164,8 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
             h = length(tables, pulled, step, settings, h)
             if BELOW < h < ABOVE or not 0.0 < h < math.inf:
                 break
-        if FAR_BELOW < h < FAR_ABOVE:
+        fits += FAR_BELOW < h < FAR_ABOVE
+        if fits > 0 and (turn == 0 or fits > MOST_FITS or orders_to_one(h, MOST) == 0):
             return step, h
         if h == math.inf:
             values(tables.c, step.order, 1.0, tables.at)
