@@ -113,18 +113,18 @@ def other_losses(plant: Plant, state: State, size: float, t: float) -> float:
 
 
 @inlined
-def penetrates(state: State, side: Body, t: float) -> bool:
-    """Whether an open pair is closed by more than the roundings of a way of t s: a touch has been missed.
+def penetrates(plant: Plant, state: State, side: Body, size: float, t: float) -> bool:
+    """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
 
-    What is STILL beside the fastest motion is not followed.
+    A body goes no faster than the energy `size` allows. What is STILL beside the fastest motion is not followed.
     """
     u = state.y[U_L + side]
     if state.mode[side] != Pair.OPEN or u <= 0.0:
         return False
-    x, v, _ = arm_of(state.y, side)
-    way = abs(x) + abs(state.y[X_O]) + t * (abs(v) + abs(state.y[V_O]))
-    fastest = abs(state.y[V_L]) + abs(state.y[V_O]) + abs(state.y[V_R])
-    return u > ROUNDINGS * EPS * way + STILL * t * fastest + UNDERFLOW
+    fastest = math.sqrt(size / plant.given[side, MASS]) + math.sqrt(size / plant.given[OBJECT, MASS])
+    way = abs(arm_of(state.y, side)[0]) + abs(state.y[X_O]) + t * fastest
+    still = STILL * t * (abs(state.y[V_L]) + abs(state.y[V_O]) + abs(state.y[V_R]))
+    return u > ROUNDINGS * EPS * way + still + UNDERFLOW
 
 
 @inlined
@@ -140,9 +140,9 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
         return Outcome.NOT_FINITE
     if math.isnan(t) or idle > MAX_IDLE:
         return Outcome.STALLED
-    if penetrates(state, LEFT, t) or penetrates(state, RIGHT, t):
-        return Outcome.PENETRATES
     rise, size = after.value - before.value, max(after.size, before.size)
+    if penetrates(plant, state, LEFT, size, t) or penetrates(plant, state, RIGHT, size, t):
+        return Outcome.PENETRATES
     rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + UNDERFLOW
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does

@@ -44,7 +44,8 @@ def findings(detail: Detail) -> Iterator[Finding]:
     pairs = impacts(detail, size)
     acting = _acceleration(detail, pairs)
     for pair in pairs:
-        beside = sum((other.bounce for other in pairs if other is not pair), np.zeros_like(pair.bounce))
+        others = [other for other in pairs if other is not pair]
+        beside = sum((EPS * other.bounce + other.sudden[:, None] for other in others), np.zeros_like(pair.bounce))
         unit = _units(detail, pair, beside, acting)
         yield from _pair_modes(detail, pair, unit)
         yield from _pair_events(detail, pair, unit)
@@ -66,9 +67,9 @@ def _acceleration(detail: Detail, pairs: list[Impacts]) -> Array:
 
 
 def _units(detail: Detail, pair: Impacts, beside: Array, acting: Array) -> Units:
-    """From sizes, times, and the impact beside it (k, 1) in kg m/s, which moves the object as well."""
+    """From sizes, times, and the rounding of the impact beside it (k, 1) in kg m/s, which moves the object as well."""
     late, mass = EPS * detail.t, detail.bodies[:, OBJECT, MASS][:, None]
-    d = pair.noise_d + EPS * beside / mass + late * (acting[..., pair.side] + acting[..., OBJECT])
+    d = pair.noise_d + beside / mass + late * (acting[..., pair.side] + acting[..., OBJECT])
     return Units(pair.noise + late * np.abs(pair.d) + TINY, d + TINY)
 
 

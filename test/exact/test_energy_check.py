@@ -1,0 +1,61 @@
+"""The guard behind every segment: what it stops, and what it must not stop."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from exact.bench import bench
+
+from grasp_ros.exact.energy_check import check_segment, energy_level
+from grasp_ros.exact.records import Level
+from grasp_ros.physics.layout import LEFT, RIGHT, U_L, Body, Outcome, Pair
+
+SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
+GRAZE = (0.6, 0.01)  # m/s, s: a body that comes so fast from so far and just reaches the other one
+
+
+def outcome(side: Body, u: float, mode: Pair, before: float = 0.0, t: float = 0.01) -> Outcome:
+    """What the guard says of a pair at u after t s; `before`: J of V that the segment began with."""
+    b = bench(side, u, 0.0, mode)
+    after = energy_level(b.plant, b.state, t)
+    begin = Level(after.value, max(after.size, before), 0.0, 0.0)
+    return Outcome(check_segment(b.plant, b.state, b.settings, begin, after, t, 0, False))
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "mode", "expected"), [
+    (1e-3, Pair.OPEN, Outcome.PENETRATES), (1e-12, Pair.OPEN, Outcome.PENETRATES), (-1e-3, Pair.OPEN, Outcome.GO_ON),
+    (1e-3, Pair.CONTACT, Outcome.GO_ON), (0.0, Pair.OPEN, Outcome.GO_ON),
+])
+def test_an_open_pair_that_is_closed_is_a_touch_that_was_missed(side: Body, u: float, mode: Pair, expected: Outcome
+                                                                ) -> None:
+    assert outcome(side, u, mode) is expected
+
+
+@SIDES
+def test_roundings_of_the_way_are_no_missed_touch(side: Body) -> None:
+    speed, t = GRAZE
+    assert outcome(side, 1e-18, Pair.OPEN, speed**2, t) is Outcome.GO_ON
+    assert outcome(side, 1e-12, Pair.OPEN, speed**2, t) is Outcome.PENETRATES
+
+
+@SIDES
+@pytest.mark.parametrize(("change", "expected"), [
+    (1e-9, Outcome.ENERGY_RISES), (-1e-9, Outcome.ENERGY_FALLS), (1e-16, Outcome.GO_ON), (-1e-16, Outcome.GO_ON)])
+def test_energy_comes_from_nowhere_and_goes_nowhere(side: Body, change: float, expected: Outcome) -> None:
+    b = bench(side, -0.1, 0.5, p=0.0)
+    after = energy_level(b.plant, b.state, 0.01)
+    begin = Level(after.value - change, after.size, 0.0, 0.0)
+    found = check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, False)
+    assert found == expected
+
+
+@SIDES
+def test_a_segment_without_an_end_or_with_a_number_that_is_none_is_stopped(side: Body) -> None:
+    b = bench(side, -0.1, 0.5)
+    level = energy_level(b.plant, b.state, 0.0)
+    assert check_segment(b.plant, b.state, b.settings, level, level, math.nan, 0, False) == Outcome.STALLED
+    assert check_segment(b.plant, b.state, b.settings, level, level, 0.0, 10_000, False) == Outcome.STALLED
+    b.state.y[U_L + side] = math.nan
+    assert check_segment(b.plant, b.state, b.settings, level, level, 0.01, 0, False) == Outcome.NOT_FINITE
