@@ -40,7 +40,7 @@ from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, rate_lanes, relative_motion, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, UNDECIDED, glides, impact_beside, is_negligible, leaning, turn_back
+from grasp_ros.exact.rest import NEVER, glides, impact_beside, is_negligible, leaning, turn_back
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EPS,
@@ -77,7 +77,7 @@ def mode_of(plant: Plant, state: State, side: Body) -> Pair:
     if u < 0.0 or d != 0.0:
         return Pair.CONTACT if u == 0.0 and d > 0.0 else Pair.OPEN
     order, value = leaning(plant, state, side)
-    if order in (NEVER, UNDECIDED):
+    if order == NEVER:
         return Pair.RESTING
     return Pair.CONTACT if value > 0.0 else Pair.OPEN
 
