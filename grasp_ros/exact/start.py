@@ -188,6 +188,13 @@ def stand_at_zero(plant: Plant, state: State, side: Body) -> None:
         state.y[U_L + side] = 0.0
 
 
+@inlined
+def open_if_parting(state: State, side: Body, power: int, out: Output) -> None:
+    """A pair that was pressed by no more than the other one has just lost, where that stands at u = 0, is open."""
+    if state.mode[side] == Pair.CONTACT and power < NONE:
+        settle(state, side, Pair.OPEN, out)
+
+
 @kernel
 def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """From u = 0 to where the regularised time goes on, to a touch or the end of the span; its time in s or nan."""
@@ -196,6 +203,8 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
     stand_at_zero(plant, state, LEFT)
     stand_at_zero(plant, state, RIGHT)
     left, right = power_of(plant, state, LEFT), power_of(plant, state, RIGHT)
+    open_if_parting(state, LEFT, left, out)
+    open_if_parting(state, RIGHT, right, out)
     scale, reach = scaled_series(tables, plant, state, settings, left, right)
     held = holding_time(plant, state, settings)
     if held > 0.0 and (reach == math.inf or held > scale * (reach * reach) * (reach * reach)):
