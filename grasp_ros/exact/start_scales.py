@@ -57,17 +57,25 @@ def time_scale(plant: Plant, state: State, settings: Settings) -> float:
 
 
 @kernel
+def own_derivative(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, float]:
+    """`rest.difference`, and u' of order 1, which is known without a sum."""
+    return (approach(y, side), 0.0) if order == 1 else difference(plant, y, side, order)
+
+
+@kernel
 def silent_time(plant: Plant, y: Array, side: Body) -> float:
     """Time in s for which a pair that begins moves as if without force, by each derivative; 0 if it is too deep."""
     per_hertz, loss = reduced_mass(plant.bodies, side) / plant.pairs[side, HERTZIAN], plant.pairs[side, DISSIPATION]
     time, way = math.inf, 0.0
     for order in range(1, HIGHEST + 1):
-        value, size = (approach(y, side), 0.0) if order == 1 else difference(plant, y, side, order)
+        value, size = own_derivative(plant, y, side, order)
         if abs(value) > DOUBT * size:
             first = time_of_impulse(per_hertz, loss, float(order), abs(value) / math.gamma(order + 1.0))
             time = min(time, first * power_of_two(-math.ceil(HELD / (0.5 * order + 2.0))))
+    if y[U_L + side] == 0.0:
+        return time
     for order in range(1, HIGHEST + 1):
-        value = approach(y, side) if order == 1 else difference(plant, y, side, order)[0]
+        value, _ = own_derivative(plant, y, side, order)
         way = max(way, abs(value) / math.gamma(order + 1.0) * time**order)
     return time if y[U_L + side] <= way else 0.0
 
