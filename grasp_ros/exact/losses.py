@@ -23,11 +23,13 @@ from grasp_ros.physics.layout import (
     DISSIPATION,
     FORCE,
     HERTZIAN,
+    LANES,
     LEFT,
     MASS,
     OBJECT,
     RIGHT,
     STIFFNESS,
+    TIME,
     U_L,
     V_O,
     X_O,
@@ -104,14 +106,13 @@ def penetration_at(sight: Sight, at: Array, side: Body) -> float:
 
 
 @inlined
-def pace(sight: Sight, at: Array, s: float) -> float:
+def pace(sight: Sight, s: float) -> float:
     """dt/ds of the variable of the polynomials, s."""
     if sight.kind == Segment.START:
         return 4.0 * sight.unit * s * s * s
-    total = 2.0 * sight.unit
-    for side in (LEFT, RIGHT):
-        if sight.mode[side] == Pair.CONTACT:
-            total *= max(at[U_L + side], 0.0)
+    total = 0.0
+    for k in range(sight.degree, 0, -1):
+        total = total * s + k * sight.c[LANES * k + TIME]
     return total
 
 
@@ -132,7 +133,7 @@ def step_losses(sight: Sight, seen: Array) -> None:
     for j in range(NODES.shape[0]):
         s = sight.s * NODES[j]
         values(sight.c, sight.degree, s, at)
-        share = sight.s * WEIGHTS[j] * pace(sight, at, s)
+        share = sight.s * WEIGHTS[j] * pace(sight, s)
         left += share * at[velocity_lane(LEFT)] ** 2
         right += share * at[velocity_lane(RIGHT)] ** 2
         middle += share * at[V_O] ** 2

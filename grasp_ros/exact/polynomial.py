@@ -12,11 +12,12 @@ import numpy as np
 
 from grasp_ros.exact.fused import fma
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Lanes, Step, Tables
-from grasp_ros.physics.layout import EPS, LANES, TIME, V_L, V_O, V_R, Z_L, Z_R
+from grasp_ros.exact.records import NEITHER, Array, Lanes, Step, Tables
+from grasp_ros.physics.layout import EPS, LANES, LEFT, TIME, V_L, V_O, V_R, Z_L, Z_R
 
 FIRST, SECOND = np.int64(0), np.int64(2)  # typed: numba would compile `lanes` and `sizes` once more for a literal
 INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would keep the next one waiting
+AGEING = 4.0 / 7.0  # d(ln G)/ds of a pair that grows like t^3.5
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
 
 
@@ -129,9 +130,9 @@ def lane_range(tables: Tables, lane: int, s: float) -> tuple[float, float]:
 def invert_time(tables: Tables, step: Step, tau: float, high: float, total: float) -> float:
     """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
 
-    dt = 2 G ds with G = w_l w_r of the sides in contact. Halley's iteration with bisection: its error is cubed each
-    time, or squared where u' is little more than rounding, so a correction of 1e-8 is the last one needed. It starts
-    from the parabola through both ends.
+    dt = 2 G ds with G = w_l w_r of the sides in contact, or u / u' of a pair that grows. Halley's iteration with
+    bisection: its error is cubed each time, or squared where u' is little more than rounding or a pair grows, so a
+    correction of 1e-8 is the last one needed. It starts from the parabola through both ends.
     """
     c, at, n, unit = tables.c, tables.at, step.order, step.unit
     slope = c[LANES + TIME]
@@ -149,9 +150,13 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
             high = s
         else:
             low = s
-        twice = 2.0 * w_l * w_r
+        g, turn = w_l * w_r, w_r * w_r * d_l + w_l * w_l * d_r
+        if step.growing != NEITHER:
+            w, d = (w_l, d_l) if step.growing == LEFT else (w_r, d_r)
+            g, turn = w * w / d, AGEING * (w * w / d)
+        twice = 2.0 * g
         newton = rest / (unit * twice)
-        bend = newton * unit * (w_r * w_r * d_l + w_l * w_l * d_r) / twice  # large where w has a root near
+        bend = newton * unit * turn / twice  # large where w has a root near
         following = s - newton / (1.0 - bend)
         if not low <= following <= high:
             following = 0.5 * (low + high)

@@ -95,7 +95,7 @@ class Tables(NamedTuple):
     """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
 
     The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
-    the begin of the step, and CHECK for the product w w or w_l w_r as far as it is expanded.
+    the begin of the step, and CHECK for w w, w_l w_r or the P of `growing`, as far as it is expanded.
     """
 
     c: Array  # (LANES (order + 1),)
@@ -106,6 +106,9 @@ class Tables(NamedTuple):
     start: Start
 
 
+NEITHER = -1  # in place of a side
+
+
 class Step(NamedTuple):
     """A Taylor step: what its series stand for."""
 
@@ -114,6 +117,7 @@ class Step(NamedTuple):
     unit: float  # of s, such that the radius of convergence is about 1
     left: bool  # whether the left pair is in contact
     right: bool
+    growing: int  # the side whose pair comes from rest beside the other one, see `growing`; or NEITHER
 
 
 class Regime(IntEnum):

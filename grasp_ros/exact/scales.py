@@ -7,8 +7,8 @@ import math
 from grasp_ros.exact.bits import near_inverse, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
-from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Step
+from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass, relative_motion
+from grasp_ros.exact.records import NEITHER, Array, Output, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -28,6 +28,9 @@ from grasp_ros.physics.layout import (
 
 RADIUS = 0.5  # of convergence of the series of a step, in its units: the least that is usual
 LEAST = 12  # order of a Taylor step
+KNOWN = 2.0**-30  # of the velocities: below it u' is too little of them for a quotient
+YOUNG, LATER = 0.25, 0.75  # parts of both pairs' time and of the other's age that the age of a pair that grows is below
+LEAST_GROWTH, MOST_GROWTH = 0.6, 0.9  # of 1 - 1/n, where u is like t^n: w_l w_r suits n = 1 and 2
 STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
 
 
@@ -108,11 +111,37 @@ def order_for(settings: Settings, reach: float) -> tuple[int, float]:
 
 
 @inlined
+def grows(plant: Plant, state: State, side: Body, fastest: float) -> bool:
+    """Whether a pair in contact comes from rest beside the other one, and is young; fastest: the rate of both in 1/s.
+
+    Its age is about u / u', and tells of its power of t by its rate: (u / u')' = 1 - u u'' / u'^2 = 1/n for t^n.
+    """
+    y, beside = state.y, other(side)
+    front, back = rate_lanes(side)
+    u, (d, a) = y[U_L + side], relative_motion(plant, y, side)
+    if not d > KNOWN * (abs(y[front]) + abs(y[back])):
+        return False
+    if u * fastest >= YOUNG * d or u * abs(approach(y, beside)) >= LATER * (d * y[U_L + beside]):
+        return False
+    growth = u * (a + impact_beside(plant, state, side)[0])
+    return bool(LEAST_GROWTH * (d * d) < growth < MOST_GROWTH * (d * d))
+
+
+@inlined
+def growing_side(plant: Plant, state: State, w_l: float, rate_l: float, w_r: float, rate_r: float) -> int:
+    """The side whose pair `grows`, or NEITHER, from the scales of both."""
+    fastest = max(rate_l * near_inverse(w_l), rate_r * near_inverse(w_r))
+    if grows(plant, state, LEFT, fastest):
+        return LEFT
+    return RIGHT if grows(plant, state, RIGHT, fastest) else NEITHER
+
+
+@inlined
 def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Step:
     """A step from here, in a unit of s in which its coefficients neither grow nor shrink by many decades.
 
     With both pairs in contact dt = 2 w_l w_r ds: each turns at its rate times the w of the other one. A step that a
-    span will end needs fewer orders.
+    span will end needs fewer orders. A pair that grows has a variable of its own, which counts in its ages.
     """
     left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
     w_l, rate_l, w_r, rate_r = 1.0, 0.0, 1.0, 0.0
@@ -120,12 +149,16 @@ def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Ste
         w_l, rate_l = turning_rate(plant, state, LEFT)
     if right:
         w_r, rate_r = turning_rate(plant, state, RIGHT)
+    if left and right:
+        growing = growing_side(plant, state, w_l, rate_l, w_r, rate_r)
+        if growing != NEITHER:
+            return Step(settings.order, settings.first, 1.0, left, right, growing)
     fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
     unit = near_inverse(fastest) if fastest > 0.0 else 1.0
     if outlasts(state.y, w_l, w_r, unit, span, RADIUS * settings.first):
-        return Step(settings.order, settings.first, unit, left, right)
+        return Step(settings.order, settings.first, unit, left, right, NEITHER)
     order, first = order_for(settings, reach_of_span(state, left, right, unit, span))
-    return Step(order, first, unit, left, right)
+    return Step(order, first, unit, left, right, NEITHER)
 
 
 @inlined

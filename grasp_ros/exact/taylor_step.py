@@ -7,10 +7,11 @@ import math
 import numpy as np
 
 from grasp_ros.exact.bits import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
+from grasp_ros.exact.growing import expand_growing
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.kinematics import own_size
+from grasp_ros.exact.kinematics import own_size, rate_lanes
 from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
-from grasp_ros.exact.records import Array, Integers, Lanes, Plant, Settings, State, Step, Tables
+from grasp_ros.exact.records import NEITHER, Array, Integers, Lanes, Plant, Settings, State, Step, Tables
 from grasp_ros.exact.series import ONE, TWO, expand_both, expand_one, scale_of
 from grasp_ros.physics.layout import (
     CHECK,
@@ -95,7 +96,9 @@ def begin_series(tables: Tables, state: State) -> None:
 @inlined
 def expand(tables: Tables, plant: Plant, step: Step) -> None:
     """The series of a step from its order 0."""
-    if step.left and step.right:
+    if step.growing != NEITHER:
+        expand_growing(tables.c, tables.f, plant.bodies, plant.pairs, step.growing, step.unit, step.order)
+    elif step.left and step.right:
         expand_both(tables.c, tables.f, plant.bodies, plant.pairs, step.unit, step.order)
     else:
         expand_one(tables.c, tables.f, plant.bodies, plant.pairs, LEFT if step.left else RIGHT, step.unit, step.order)
@@ -173,22 +176,32 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
             if apart or tables.at[TIME] >= span:
                 return step, 1.0
         unit = step.unit * power_of_two(orders_to_one(h, MOST))
-        step = Step(step.order, step.first, unit, step.left, step.right)
+        step = Step(step.order, step.first, unit, step.left, step.right, step.growing)
     return step, math.nan
+
+
+@inlined
+def expected_check(c: Array, at: Array, step: Step) -> tuple[float, float]:
+    """What the lane CHECK stands for, from the values of the other lanes, and the part of it that is their rounding."""
+    if step.growing != NEITHER:
+        front, back = rate_lanes(step.growing)
+        z, d = at[Z_L + step.growing], at[front] - at[back]
+        return z * z / d, EPS * (1.0 + (abs(c[front]) + abs(c[back])) / d)
+    scale = scale_of(step.unit) if step.left and step.right else 1.0
+    return (at[Z_L] if step.left else at[Z_R]) * (scale * (at[Z_R] if step.right else at[Z_L])), EPS
 
 
 @inlined
 def is_exact(tables: Tables, step: Step, h: float, tolerance: float) -> bool:
     """Whether a step of length h neglects nothing: the values at its end, and the sizes on the way, are known.
 
-    G = w_l w_r, times the power of two of the unit, or u = w^2 with one side in contact, is expanded beside w: its
-    defect at the end of the step consists of neglected terms only.
+    G = w_l w_r, times the power of two of the unit, u = w^2 with one side in contact, or P = u / u' of a pair that
+    grows is expanded beside w: its defect at the end of the step consists of neglected terms only.
     """
     c, at, size = tables.c, tables.at, tables.size
-    scale = scale_of(step.unit) if step.left and step.right else 1.0
-    product = (at[Z_L] if step.left else at[Z_R]) * (scale * (at[Z_R] if step.right else at[Z_L]))
-    allowed = (100.0 * tolerance + 100.0 * EPS) * (abs(c[CHECK]) + h * abs(c[LANES + CHECK]) + size[CHECK])
-    return abs(at[CHECK] - product) <= allowed
+    expected, rounding = expected_check(c, at, step)
+    allowed = 100.0 * (tolerance + rounding) * (abs(c[CHECK]) + h * abs(c[LANES + CHECK]) + size[CHECK])
+    return abs(at[CHECK] - expected) <= allowed
 
 
 @inlined
