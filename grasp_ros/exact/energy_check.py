@@ -22,6 +22,7 @@ from grasp_ros.physics.layout import (
     RIGHT,
     STIFFNESS,
     U_L,
+    U_R,
     V_L,
     V_O,
     V_R,
@@ -42,8 +43,8 @@ own_energy = kernel(body_energy)
 
 
 @kernel
-def level_of(body: Array, x: float, v: float, way: float, t: float) -> Level:
-    """Energy of a body (4,) at the end of a segment of t s.
+def level_of(body: Array, x: float, v: float, way: float, t: float) -> tuple[float, float]:
+    """Energy in J of V of a body (4,) at the end of a segment of t s, and the sum of the sizes of its terms.
 
     An arm that touches the object takes its place, with the roundings of a `way` in m. A force that carries the body
     away and a weak spring that brings it back leave small terms at both ends.
@@ -53,7 +54,7 @@ def level_of(body: Array, x: float, v: float, way: float, t: float) -> Level:
     if force != 0.0:
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
-    return Level(value, size, 0.0, 0.0)
+    return value, size
 
 
 @inlined
@@ -84,17 +85,17 @@ def jump(plant: Plant, y: Array, side: Body, way: float, t: float) -> float:
 def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
     y, given = state.y, plant.given
-    own = level_of(given[OBJECT], y[X_O], y[V_O], 0.0, t)
+    value, size = level_of(given[OBJECT], y[X_O], y[V_O], 0.0, t)
     way = abs(y[X_O]) + t * abs(y[V_O])
-    left = level_of(given[LEFT], y[X_L], y[V_L], way, t)
-    right = level_of(given[RIGHT], y[X_R], y[V_R], way, t)
+    left, size_l = level_of(given[LEFT], y[X_L], y[V_L], way, t)
+    right, size_r = level_of(given[RIGHT], y[X_R], y[V_R], way, t)
     impact = 0.0
     for side in (LEFT, RIGHT):
         u = y[U_L + side]
         if u > 0.0 and state.mode[side] != Pair.ABSENT:
             impact += 2.0 * stored_energy(plant.pairs[side, HERTZIAN], u)
-    return Level(left.value + right.value + own.value + impact, left.size + right.size + own.size + impact,
-                 apart(y, LEFT), apart(y, RIGHT))
+    return Level(left + right + value + impact, size_l + size_r + size + impact, apart(y, LEFT), apart(y, RIGHT),
+                 y[U_L], y[U_R])
 
 
 @kernel
@@ -113,13 +114,14 @@ def other_losses(plant: Plant, state: State, size: float, t: float) -> float:
 
 
 @inlined
-def penetrates(plant: Plant, state: State, side: Body, size: float, t: float) -> bool:
+def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
     """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
 
-    A body goes no faster than the energy `size` allows. What is STILL beside the fastest motion is not followed.
+    A body goes no faster than the energy `size` allows. What is STILL beside the fastest motion is not followed. What u
+    was `before`, roundings of a longer way may have left.
     """
     u = state.y[U_L + side]
-    if state.mode[side] != Pair.OPEN or u <= 0.0:
+    if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):
         return False
     fastest = math.sqrt(size / plant.given[side, MASS]) + math.sqrt(size / plant.given[OBJECT, MASS])
     way = abs(arm_of(state.y, side)[0]) + abs(state.y[X_O]) + t * fastest
@@ -141,7 +143,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     if math.isnan(t) or idle > MAX_IDLE:
         return Outcome.STALLED
     rise, size = after.value - before.value, max(after.size, before.size)
-    if penetrates(plant, state, LEFT, size, t) or penetrates(plant, state, RIGHT, size, t):
+    if penetrates(plant, state, LEFT, before.u_l, size, t) or penetrates(plant, state, RIGHT, before.u_r, size, t):
         return Outcome.PENETRATES
     rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + UNDERFLOW
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0

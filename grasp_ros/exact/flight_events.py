@@ -23,7 +23,7 @@ from grasp_ros.exact.records import Array, Flights, Integers, Motion, PairFlight
 from grasp_ros.exact.roots import safe_step
 from grasp_ros.physics.layout import DISSIPATION, EPS, LEFT, OBJECT, U_L, Body, Transition, Work
 
-MAX_ITERATIONS = 10_000_000
+MAX_ITERATIONS = 100_000  # after which a flight goes on from where the search is
 MAX_NEWTON, MAX_REFINEMENTS = 20, 200
 SMALLEST = 1e-250  # of a rate: products of what is smaller have lost their digits
 
@@ -171,7 +171,7 @@ def root_between(kind: Transition, pair: PairFlight, low: float, high: float, g:
 
 @kernel
 def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: float, until: float, work: Integers
-               ) -> float:
+               ) -> tuple[float, float]:
     """First time in (t, span] at which u rises or falls through 0, or u' rises through -1/p; inf if there is none.
 
     Parameters
@@ -182,6 +182,12 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
         Where the search begins.
     until : float, s
         What comes later need not be found.
+
+    Returns
+    -------
+    float, float
+        That time, and the one up to which the search has come if it was too long, or else inf: what swings for ever
+        within a rounding of a touch would keep it for as long as the flight is.
     """
     step = 0.0
     for _ in range(MAX_ITERATIONS):
@@ -190,11 +196,11 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
         own, body = derivatives_of(pair.arm_rates, at.x, at.v), derivatives_of(pair.body_rates, at.x_o, at.v_o)
         g = event_series(kind, pair, at, own, body)
         if g.value >= -g.noise and g.rate > 0.0:
-            return t
+            return t, math.inf
         curvature, growth = event_bounds(kind, pair, own, body, left)
         reach = reach_of_root(g, growth, left)
         if reach > 0.0:
-            return root_between(kind, pair, t, t + reach, g, growth, work)
+            return root_between(kind, pair, t, t + reach, g, growth, work), math.inf
         step = certain_step(g, curvature, growth, step)
         if kind == Transition.TOUCH:
             step = max(step, envelope_step(pair, at))
@@ -202,12 +208,12 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
             step = max(step, envelope_of_speed(pair, at, own.second, body.second))
         step = min(step, pair.horizon)
         if not step <= span - t or t > until:
-            return math.nan if math.isnan(step) else math.inf
+            return (math.nan if math.isnan(step) else math.inf), math.inf
         if step <= EPS * t or step == 0.0:
-            return t
+            return t, math.inf
         t += step
         at = motion_at(pair, t)
-    return math.nan
+    return math.inf, t
 
 
 @kernel

@@ -63,14 +63,17 @@ def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
 
 @kernel
 def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, span: float, until: float, work: Integers
-                   ) -> Candidate:
-    """First event of one pair in a flight of at most `span` seconds, unless it is later than `until`."""
+                   ) -> tuple[Candidate, float]:
+    """First event of one pair in a flight of at most `span` seconds, unless it is later than `until`.
+
+    And the time up to which it is known, as `first_root` says.
+    """
     mode, y = state.mode[side], state.y
     if mode in (Pair.RESTING, Pair.ABSENT):
-        return Candidate(math.inf, Transition.TOUCH)
+        return Candidate(math.inf, Transition.TOUCH), math.inf
     if mode == Pair.OPEN and is_far(plant, y, side, span):
         work[Work.ROOT_ITERATIONS] += 1
-        return Candidate(math.inf, Transition.TOUCH)
+        return Candidate(math.inf, Transition.TOUCH), math.inf
     pair = pair_in_flight(plant, y, flights, side)
     t, d = 0.0, approach(y, side)
     at = Motion(pair.arm_flight.x, pair.arm_flight.v, pair.body_flight.x, pair.body_flight.v, pair.u, d, abs(pair.u))
@@ -78,16 +81,18 @@ def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, spa
         if pair.u == 0.0 and d == 0.0:
             t = parting_time(plant, state, side, span)
             if t >= span:
-                return Candidate(math.inf, Transition.TOUCH)
+                return Candidate(math.inf, Transition.TOUCH), math.inf
             at = motion_at(pair, t)
-        return Candidate(first_root(Transition.TOUCH, pair, t, at, span, until, work), Transition.TOUCH)
+        touched, known = first_root(Transition.TOUCH, pair, t, at, span, until, work)
+        return Candidate(touched, Transition.TOUCH), known
     latest = math.inf if mode == Pair.CLAMPED else until  # which pair comes first must not set the next search's span
-    released = first_root(Transition.RELEASE, pair, 0.0, at, span, latest, work)
+    released, known = first_root(Transition.RELEASE, pair, 0.0, at, span, latest, work)
     if mode == Pair.CLAMPED:
-        back = first_root(Transition.REENTRY, pair, 0.0, at, min(span, released), until, work)
+        back, also = first_root(Transition.REENTRY, pair, 0.0, at, min(span, released), until, work)
+        known = min(known, also)
         if not back >= released:
-            return Candidate(back, Transition.REENTRY)
-    return Candidate(released, Transition.RELEASE)
+            return Candidate(back, Transition.REENTRY), known
+    return Candidate(released, Transition.RELEASE), known
 
 
 @inlined
@@ -129,15 +134,15 @@ def move(flights: Flights, state: State, t: float) -> None:
 
 @inlined
 def flight_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
-    """Fly to the first event, make its transitions, or to the end of the span; returns the time in s, nan: failed."""
+    """Fly to the first event, make its transitions, or to where none is before; returns the time in s, nan: failed."""
     out.work[Work.FLIGHTS] += 1
     flights = flights_of(plant, state.y)
-    left = pair_candidate(plant, state, flights, LEFT, span, math.inf, out.work)
-    right = pair_candidate(plant, state, flights, RIGHT, span, TOGETHER * left.when, out.work)
+    left, known_l = pair_candidate(plant, state, flights, LEFT, span, math.inf, out.work)
+    right, known_r = pair_candidate(plant, state, flights, RIGHT, span, TOGETHER * left.when, out.work)
     if math.isnan(left.when) or math.isnan(right.when):
         return math.nan
     slide = slide_in_flight(plant, state)
-    t = min(span, left.when, right.when, slide.when)
+    t = min(span, left.when, right.when, slide.when, known_l, known_r)
     deliver(tables, plant, state, settings, flights, t, out)
     move(flights, state, t)
     tick(state.clock, t)

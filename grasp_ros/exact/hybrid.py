@@ -68,7 +68,7 @@ def advance(
     out = Output(grid, rows, events, filled, work)
     if lengths.shape[0] == 0:
         return answer_end(state, loop)
-    end, idle, before, enters = 0.0, 0, Level(0.0, 0.0, 0.0, 0.0), True
+    end, idle, before, enters = 0.0, 0, Level(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), True
     while True:
         if enters:
             if not open_interval(plant, state, own, loop, filled):

@@ -227,9 +227,11 @@ class Leaning(NamedTuple):
 
 
 class Level(NamedTuple):
-    """An energy, and what its digits are relative to."""
+    """An energy, and what its digits are relative to; and what a segment finds of both pairs."""
 
     value: float  # J of V
     size: float  # J, sum of the sizes of its terms
     left: float  # m between the place of an arm and where object and u say that it is
     right: float
+    u_l: float  # m
+    u_r: float

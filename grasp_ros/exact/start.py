@@ -1,7 +1,7 @@
 """The begin of a contact that the regularised time cannot begin: both pairs at u = 0 at once, or one at rest there.
 
 Its series are those of `start_series`. The segment ends where one term of each quantity still decides its sign, so
-that nothing happens within it, or where the other pair touches.
+that nothing happens within it, or where the other pair touches or parts.
 """
 
 from __future__ import annotations
@@ -84,19 +84,25 @@ def must_start(state: State) -> bool:
 
 
 @inlined
-def comes_near(state: State, side: Body, power: int) -> bool:
-    """Whether an open pair may touch while the other one begins."""
-    return bool(state.mode[side] == Pair.OPEN and power == NONE)
+def passes_zero(state: State, side: Body, power: int) -> bool:
+    """Whether a pair may touch, or part: none that its own force begins to press, and none that moves alike."""
+    mode = state.mode[side]
+    if mode == Pair.CONTACT:
+        return bool(power <= 0 and power != NONE and power != ALIKE)
+    return bool(mode in (Pair.CLAMPED, Pair.LEAVING) or (mode == Pair.OPEN and power != ALIKE))
 
 
 @kernel
-def touch_beside(tables: Tables, state: State, side: Body, power: int, n: int, h: float, work: Integers) -> Candidate:
-    """The touch of a pair in (0, h] while the other one begins."""
-    if not comes_near(state, side, power):
-        return Candidate(math.inf, Transition.TOUCH)
+def event_beside(tables: Tables, state: State, side: Body, power: int, n: int, h: float, work: Integers) -> Candidate:
+    """The touch or the release of a pair in (0, h]."""
+    is_open = state.mode[side] == Pair.OPEN
+    kind = Transition.TOUCH if is_open else Transition.RELEASE
+    if not passes_zero(state, side, power):
+        return Candidate(math.inf, kind)
     for k in range(n + 1):
-        tables.f[k] = tables.start.c[LANES * k + U_L + side]
-    return Candidate(first_rise(tables.f, n, h, EPS * abs(state.y[U_L + side]), work), Transition.TOUCH)
+        u = tables.start.c[LANES * k + U_L + side]
+        tables.f[k] = u if is_open else -u
+    return Candidate(first_rise(tables.f, n, h, EPS * abs(state.y[U_L + side]), work), kind)
 
 
 @kernel
@@ -105,10 +111,10 @@ def is_quiet(start: Start, plant: Plant, state: State, n: int, left: int, right:
     c, mode = start.c, state.mode
     for side in (LEFT, RIGHT):
         lane, a = U_L + side, left if side == LEFT else right
-        if mode[side] in (Pair.RESTING, Pair.ABSENT) or comes_near(state, side, a):
+        if mode[side] in (Pair.RESTING, Pair.ABSENT):
             continue
         first = first_of(c, n, lane) if a < 0 else a
-        if not leads(c, n, lane, first, h, a > 0):
+        if not (passes_zero(state, side, a) or leads(c, n, lane, first, h, a > 0)):
             return False
         if (a == 0 or mode[side] == Pair.CLAMPED) and not damped_leads(c, plant, n, side, h):
             return False
@@ -155,7 +161,7 @@ def place(at: Array, mode: Integers) -> None:
 
 @kernel
 def quiet_length(tables: Tables, plant: Plant, state: State, n: int, left: int, right: int, longest: float) -> float:
-    """Length in s, at most `longest`, without an event but for a touch of the other pair.
+    """Length in s, at most `longest`, without an event but for those of `event_beside`.
 
     Where a quantity is at its limit within rounding none is short enough.
     """
@@ -164,7 +170,7 @@ def quiet_length(tables: Tables, plant: Plant, state: State, n: int, left: int, 
         if is_quiet(tables.start, plant, state, n, left, right, h) and keeps_sliding(
                 tables.start, plant, state, n, left, right, h):
             return h
-        h *= 0.5
+        h = 0.5 * h if h <= FITS else max(math.sqrt(h), FITS)  # series that end have no reach
     return h
 
 
@@ -197,7 +203,7 @@ def open_if_parting(state: State, side: Body, power: int, out: Output) -> None:
 
 @kernel
 def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
-    """From u = 0 to where the regularised time goes on, to a touch or the end of the span; its time in s or nan."""
+    """From u = 0 to where the regularised time goes on, an event beside or the end of a span; its time in s, or nan."""
     out.work[Work.CONTACT_STEPS] += 1
     n = ORDER
     stand_at_zero(plant, state, LEFT)
@@ -213,11 +219,11 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
         reach = min(reach, math.sqrt(math.sqrt(held / scale)))
     whole = math.sqrt(math.sqrt(span / scale))
     h = quiet_length(tables, plant, state, n, left, right, min(reach, whole))
-    touch_l = touch_beside(tables, state, LEFT, left, n, h, out.work)
-    touch_r = touch_beside(tables, state, RIGHT, right, n, h, out.work)
-    if math.isnan(touch_l.when) or math.isnan(touch_r.when):
+    beside_l = event_beside(tables, state, LEFT, left, n, h, out.work)
+    beside_r = event_beside(tables, state, RIGHT, right, n, h, out.work)
+    if math.isnan(beside_l.when) or math.isnan(beside_r.when):
         return math.nan
-    h = min(h, touch_l.when, touch_r.when)
+    h = min(h, beside_l.when, beside_r.when)
     t = span if h == whole else scale * ((h * h) * (h * h))
     deliver(tables, state, scale, t, n, out)
     values(tables.start.c, n, h, tables.at)
@@ -228,7 +234,7 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
     tick(state.clock, t)
     leave_step(tables, h, scale)
     notify(out, Segment.START, t)
-    make_transitions(plant, state, touch_l, touch_r, SlideCandidate(math.inf, Slide.FREE), h, out)
+    make_transitions(plant, state, beside_l, beside_r, SlideCandidate(math.inf, Slide.FREE), h, out)
     for side, power in ((LEFT, left), (RIGHT, right)):
         if power == ALIKE:
             settle(state, side, mode_of(plant, state, side), out)

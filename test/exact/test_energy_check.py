@@ -15,11 +15,11 @@ SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 GRAZE = (0.6, 0.01)  # m/s, s: a body that comes so fast from so far and just reaches the other one
 
 
-def outcome(side: Body, u: float, mode: Pair, before: float = 0.0, t: float = 0.01) -> Outcome:
-    """What the guard says of a pair at u after t s; `before`: J of V that the segment began with."""
+def outcome(side: Body, u: float, mode: Pair, before: float = 0.0, t: float = 0.01, u_before: float = -1.0) -> Outcome:
+    """What the guard says of a pair at u after t s; `before`: J of V that the segment began with, at `u_before`."""
     b = bench(side, u, 0.0, mode)
     after = energy_level(b.plant, b.state, t)
-    begin = Level(after.value, max(after.size, before), 0.0, 0.0)
+    begin = Level(after.value, max(after.size, before), 0.0, 0.0, u_before, u_before)
     return Outcome(check_segment(b.plant, b.state, b.settings, begin, after, t, 0, False))
 
 
@@ -41,12 +41,19 @@ def test_roundings_of_the_way_are_no_missed_touch(side: Body) -> None:
 
 
 @SIDES
+def test_what_a_longer_way_has_left_of_u_is_no_touch_that_a_short_segment_missed(side: Body) -> None:
+    u, t = 1.68e-17, 1e-17
+    assert outcome(side, u, Pair.OPEN, t=t) is Outcome.PENETRATES
+    assert outcome(side, u, Pair.OPEN, t=t, u_before=u) is Outcome.GO_ON
+
+
+@SIDES
 @pytest.mark.parametrize(("change", "expected"), [
     (1e-9, Outcome.ENERGY_RISES), (-1e-9, Outcome.ENERGY_FALLS), (1e-16, Outcome.GO_ON), (-1e-16, Outcome.GO_ON)])
 def test_energy_comes_from_nowhere_and_goes_nowhere(side: Body, change: float, expected: Outcome) -> None:
     b = bench(side, -0.1, 0.5, p=0.0)
     after = energy_level(b.plant, b.state, 0.01)
-    begin = Level(after.value - change, after.size, 0.0, 0.0)
+    begin = Level(after.value - change, after.size, 0.0, 0.0, -0.1, -0.1)
     found = check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, False)
     assert found == expected
 
