@@ -31,7 +31,7 @@ from grasp_ros.exact.records import (
     Tables,
 )
 from grasp_ros.exact.roots import first_rise
-from grasp_ros.exact.scales import new_step
+from grasp_ros.exact.scales import new_step, within_decay
 from grasp_ros.exact.taylor_step import accepted_length, fitted_step
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -152,6 +152,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     """One Taylor step to its first event, whose transitions it makes, or to the end of the span; its time, or nan."""
     out.work[Work.CONTACT_STEPS] += 1
     c, at, y, mode = tables.c, tables.at, state.y, state.mode
+    span = within_decay(plant, span)
     step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
     n = step.order
     h = accepted_length(tables, step, h, settings, out.work)

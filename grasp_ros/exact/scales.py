@@ -31,6 +31,7 @@ LEAST = 12  # order of a Taylor step
 KNOWN = 2.0**-30  # of the velocities: below it u' is too little of them for a quotient
 YOUNG, LATER = 0.25, 0.75  # parts of both pairs' time and of the other's age that the age of a pair that grows is below
 LEAST_GROWTH, MOST_GROWTH = 0.6, 0.9  # of 1 - 1/n, where u is like t^n: w_l w_r suits n = 1 and 2
+DECAYS = 5.0  # time constants of a damper in a step
 STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
 
 
@@ -95,6 +96,16 @@ def outlasts(y: Array, w_l: float, w_r: float, unit: float, span: float, reach: 
     """Whether a span outlasts `reach` in s / unit for certain: as in `reach_of_span`, with scales that bound G, G'."""
     bend = w_r * w_r * abs(approach(y, LEFT)) + w_l * w_l * abs(approach(y, RIGHT))
     return span >= (2.0 * w_l * w_r + reach * unit * bend) * reach * unit
+
+
+@inlined
+def within_decay(plant: Plant, span: float) -> float:
+    """A span in s, or the part of it in which a damper leaves enough of a velocity for its series to have digits."""
+    for body in (LEFT, OBJECT, RIGHT):
+        damping, mass = plant.bodies[body, DAMPING], plant.bodies[body, MASS]
+        if damping * span > DECAYS * mass:
+            span = DECAYS * mass / damping
+    return span
 
 
 @inlined

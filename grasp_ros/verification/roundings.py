@@ -6,15 +6,14 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, Work
+from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, STIFFNESS, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.segments import FIRST, INNER, Detail
 
-STEP = 5.0  # time constants of a damper within a step in contact
+STEP = 5.0  # time constants of what damps within a step in contact
 TINY = 1e-280  # against 0 / 0, and for what underflows
 UNDERFLOW = 1e-100  # m or m/s: motions below lose digits in squares and powers 5/2, in other units others
 DIED_OUT = 1e-150  # m or m/s: nothing is said about the digits of such motions
@@ -78,34 +77,35 @@ def sizes(detail: Detail) -> Sizes:
     """
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
     own = _with_way(detail, largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True)))
-    touching = np.zeros(len(own), dtype=bool)
+    touching, taken = np.zeros(len(own), dtype=bool), detail.bodies[..., DAMPING].copy()
     for side in detail.run.scene.system.contacts:
-        u = (1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])
-        touching |= (u >= 0.0).any(axis=1)
+        hertzian, loss = detail.run.scene.system.pairs[side]
+        u = ((1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])).max(axis=1)
+        touching |= u >= 0.0
+        taken[:, [side, OBJECT]] += (loss * hertzian * np.maximum(u, 0.0) ** 1.5)[:, None]
     own = np.maximum(own, np.where(touching[:, None], own[..., OBJECT], 0.0)[..., None])
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(stiffness != 0.0, np.abs(force / stiffness), 0.0)
     swing = np.where(stiffness != 0.0, rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own), np.inf)
     gained = (np.abs(stiffness) * own + np.abs(force)) / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
-    v = _before_decay(detail, np.abs(detail.v).max(axis=1), touching)[:, None]
+    v = _before_decay(detail, np.abs(detail.v).max(axis=1), np.where(touching[:, None], taken, 0.0))[:, None]
     way = _with_way(detail, v + np.minimum(swing, gained))
     v = way + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
     return Sizes(own + DIED_OUT / EPS, v + DIED_OUT / EPS)
 
 
-def _before_decay(detail: Detail, v: Array, touching: NDArray[np.bool_]) -> Array:
+def _before_decay(detail: Detail, v: Array, taken: Array) -> Array:
     """Speeds (k, 3), those of damped bodies in a contact no less than some time constants ago, in the same segment.
 
-    A series in time goes so far in one step, with the roundings of its begin.
+    A series in time goes so far in one step, with the roundings of its begin. `taken`: N s/m, (k, 3), by dampers and
+    by the dissipation of what is pressed.
     """
-    pieces, found = detail.pieces, v.copy()
-    passed = elapsed(detail)[:, 0, 0]
-    for body in (LEFT, RIGHT, OBJECT):
-        damping, mass = detail.bodies[:, body, DAMPING], detail.bodies[:, body, MASS]
-        for k in np.flatnonzero(touching & (damping * passed > mass)).tolist():
-            since = pieces.begin[k] - STEP * mass[k] / damping[k]
-            earlier = slice(np.searchsorted(pieces.end, since), k + 1)
-            found[k, body] = (v[earlier, body] * (pieces.segment[earlier] == pieces.segment[k])).max()
+    pieces, mass, found = detail.pieces, detail.bodies[..., MASS], v.copy()
+    passed = elapsed(detail)[:, 0]
+    for k, body in np.argwhere(taken * passed > mass).tolist():
+        since = pieces.begin[k] - STEP * mass[k, body] / taken[k, body]
+        earlier = slice(np.searchsorted(pieces.end, since), k + 1)
+        found[k, body] = (v[earlier, body] * (pieces.segment[earlier] == pieces.segment[k])).max()
     return found
 
 
