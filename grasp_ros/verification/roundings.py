@@ -191,11 +191,12 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     loss = np.where(damped >= 0.0, contact.dissipation * contact.hertzian * deep**1.5 * d * d, released)
     masses = detail.bodies[:, side, MASS], detail.bodies[:, OBJECT, MASS]
     mu = masses[0] * masses[1] / (masses[0] + masses[1])
-    speed2 = (d * d + 2.0 * stored_energy(contact.hertzian, deep) / mu[:, None]).max(axis=1) * (near > 0.0).any(axis=1)
+    late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)
+    touches = (u + noise).max(axis=1) > -late * fastest
+    speed2 = (d * d + 2.0 * stored_energy(contact.hertzian, deep) / mu[:, None]).max(axis=1) * touches
     bounce = mu[:, None] * np.sqrt(largest_in_segment(detail, speed2))[:, None]
     after = (detail.pieces.kind[1:] & FIRST > 0)[:, None]  # the state at an event has the roundings of the way to it
     bounce[1:] = np.where(after, np.maximum(bounce[1:], bounce[:-1]), bounce[1:])
-    late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)
     reached = np.minimum(bounce[:, 0], late * impact_force(contact, late * fastest, fastest))
     sudden = np.where(detail.pieces.kind != INNER, reached, 0.0)
     return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce, sudden)
