@@ -8,6 +8,7 @@ from grasp_ros.exact.kinematics import arm_of
 from grasp_ros.exact.records import Array, Flight, Placing, Plant, Regime, Tables
 from grasp_ros.physics.layout import (
     DAMPING,
+    EPS,
     LANES,
     LEFT,
     MASS,
@@ -25,6 +26,7 @@ from grasp_ros.physics.layout import (
     Body,
 )
 
+STRAYED = 16.0  # roundings of places
 FAR = 4.0  # times as far from 0 as the arm: there u is no better known than the place of the arm
 
 
@@ -78,20 +80,23 @@ def place_beside(at: Array, how: tuple[Placing, Placing], free: tuple[Flight, Fl
 
 
 @inlined
-def gap_shows(row: Array, how: Placing, t: float, x_before: float, x: float, x_o: float) -> bool:
+def gap_shows(row: Array, how: Placing, t: float, x_before: float, x: float, x_o: float, u: float) -> bool:
     """Whether places tell u of an arm better than a series, or no worse.
 
-    They do where a damper has made the series coarse, and it is far from the object or has come far.
+    They do where a damper has made the series coarse, and it is far from the object, has come far, or what many steps
+    have left in u shows in the places.
     """
     if how != Placing.BY_FLIGHT:
         return how == Placing.BY_WAY
-    return bool(row[DAMPING] * t > row[MASS] and 2.0 * max(abs(x - x_o), abs(x - x_before)) >= max(abs(x), abs(x_o)))
+    gap, size = abs(x - x_o), max(abs(x), abs(x_o))
+    told = 2.0 * max(gap, abs(x - x_before)) >= size or abs(gap - abs(u)) > STRAYED * EPS * size
+    return bool(row[DAMPING] * t > row[MASS] and told)
 
 
 @inlined
 def part_beside(plant: Plant, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float, y: Array) -> None:
     """Let u of arms follow their places after t s where these show it, or roundings of the series add up in it."""
-    if gap_shows(plant.bodies[LEFT], how[0], t, free[0].x, y[X_L], y[X_O]):
+    if gap_shows(plant.bodies[LEFT], how[0], t, free[0].x, y[X_L], y[X_O], y[U_L]):
         y[U_L] = y[X_L] - y[X_O]
-    if gap_shows(plant.bodies[RIGHT], how[1], t, free[1].x, y[X_R], y[X_O]):
+    if gap_shows(plant.bodies[RIGHT], how[1], t, free[1].x, y[X_R], y[X_O], y[U_R]):
         y[U_R] = y[X_O] - y[X_R]

@@ -26,6 +26,8 @@ from grasp_ros.physics.layout import (
     Pair,
 )
 
+SHALLOW = 1e-180  # J; powers of less may underflow, and are taken in a unit of length of 2^-400 m
+LONGER, WIDER = 2.0**400, 2.0**200  # by which u and w count more of it
 RADIUS = 0.5  # of convergence of the series of a step, in its units: the least that is usual
 LEAST = 12  # order of a Taylor step
 KNOWN = 2.0**-30  # of the velocities: below it u' is too little of them for a quotient
@@ -55,7 +57,11 @@ def new_settings(tolerance: float, order: int, given: Array) -> Settings:
 def impact_scales(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float]:
     """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards)."""
     energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
-    return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
+    if energy > SHALLOW:
+        return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
+    energy = 0.5 * mu * (d * LONGER) * (d * LONGER) + stored_energy(hertzian / WIDER, u * LONGER)
+    w = power_of_two_root(2.5 * energy / (hertzian / WIDER), 5)
+    return w / WIDER, power_of_two_root(2.0 * energy / mu, 2) / LONGER
 
 
 @inlined

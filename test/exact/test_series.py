@@ -338,6 +338,15 @@ def test_scales_are_those_of_a_hertz_impact() -> None:
         assert math.frexp(w)[0] == math.frexp(v)[0] == 0.5  # powers of two: scaling a scene costs no rounding
 
 
+@pytest.mark.parametrize("orders", [-100, 100, 250, 300])
+def test_scales_of_shallow_impacts_do_not_underflow(orders: int) -> None:
+    """O7: a length that is shorter by a power of 4 leaves all digits, also where its powers are no numbers."""
+    for u, d in ((0.3, 2.0), (0.3, 0.0), (0.0, 2.0)):
+        w, v = impact_scales(100.0, 0.75, u, d)
+        root, length = math.ldexp(1.0, -orders), math.ldexp(1.0, -2 * orders)
+        assert impact_scales(100.0 / root, 0.75, u * length, d * length) == (w * root, v * length)
+
+
 @pytest.mark.parametrize("name", START)
 def test_time_is_inverted_to_rounding(name: str) -> None:
     unit, n = 0.25, 30
