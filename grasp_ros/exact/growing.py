@@ -11,7 +11,7 @@ s is the logarithm of z. Powers of t are exponential functions of it, whose seri
 from __future__ import annotations
 
 from grasp_ros.exact.fused import fma
-from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.jit import kernel
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.series import FACTORS, FIRST, ONE, SECOND, UPPER, accelerations, convolve, per_mass, put
@@ -38,13 +38,13 @@ Four = tuple[float, float, float, float]
 Five = tuple[float, float, float, float, float]
 
 
-@inlined
+@kernel
 def ends(total: float, a: float, b_0: float, a_0: float, b: float) -> float:
     """A sum of `convolve` with its outer terms; a_0 is 0 in order 0, where they are one."""
     return fma(a, b_0, fma(a_0, b, total))
 
 
-@inlined
+@kernel
 def next_motion(c: Array, k: int, twice: float, masses: Three, moved: Five, impacts: Two, z: Two) -> Four:
     """Store the coefficients k of all lanes; returns those of x_o, v_l, v_o, v_r.
 
