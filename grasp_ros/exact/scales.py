@@ -53,15 +53,21 @@ def new_settings(tolerance: float, order: int, given: Array) -> Settings:
     return Settings(tolerance, order, math.exp(math.log(tolerance) / (order + 1)), rate_bound(given))
 
 
+@kernel
+def scales_of_energy(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float, float]:
+    """Energy of an impact, and the scales of sqrt(u) and u' that follow from it."""
+    energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
+    return energy, power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
+
+
 @inlined
 def impact_scales(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float]:
     """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards)."""
-    energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
+    energy, w, v = scales_of_energy(hertzian, mu, u, d)
     if energy > SHALLOW:
-        return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
-    energy = 0.5 * mu * (d * LONGER) * (d * LONGER) + stored_energy(hertzian / WIDER, u * LONGER)
-    w = power_of_two_root(2.5 * energy / (hertzian / WIDER), 5)
-    return w / WIDER, power_of_two_root(2.0 * energy / mu, 2) / LONGER
+        return w, v
+    _, w, v = scales_of_energy(hertzian / WIDER, mu, u * LONGER, d * LONGER)
+    return w / WIDER, v / LONGER
 
 
 @inlined

@@ -138,8 +138,6 @@ def picard(name: str, n: int) -> dict[int, list[Any]]:
         clock = times(z[Z_L] if left else one, z[Z_R] if right else one)
         if grown != NEITHER:
             clock = over(times(z[Z_L + grown], z[Z_L + grown]), (d_l, d_r)[grown])
-        if grown != NEITHER:
-            clock = over(times(z[Z_L + grown], z[Z_L + grown]), (d_l, d_r)[grown])
         u_l = times(z[Z_L], z[Z_L]) if left else z[Z_L]
         u_r = times(z[Z_R], z[Z_R]) if right else z[Z_R]
         force = [zero, zero]

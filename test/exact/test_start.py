@@ -236,8 +236,7 @@ def test_a_coarser_accuracy_goes_further(name: str) -> None:
 @pytest.mark.parametrize("gap", [1e-9, 1e-130, 1e-240])
 def test_a_start_ends_where_the_other_pair_touches(gap: float, side: Body) -> None:
     b = start(side, push=2.0, beside=(-gap, 0.5))
-    settings = Settings(1e-16, b.settings.order, 1e-16 ** (1.0 / (b.settings.order + 1)), b.settings.rate)
-    t = float(start_segment(new_tables(b.settings.order), b.plant, b.state, settings, 1e9, b.out))
+    t = start_for(b, 1e9)
     assert t == pytest.approx(2.0 * gap, rel=1e-9, abs=0.0)
     assert b.events == [(other(side), Transition.TOUCH)]
     assert b.state.y[U_L + other(side)] == 0.0
@@ -248,8 +247,7 @@ def test_a_start_ends_where_the_other_pair_touches(gap: float, side: Body) -> No
 def test_a_start_ends_where_the_other_pair_parts(depth: float, side: Body) -> None:
     b = start(side, push=2.0, beside=(depth, -9.0))
     assert b.mode(other(side)) is Pair.CLAMPED
-    settings = Settings(1e-16, b.settings.order, 1e-16 ** (1.0 / (b.settings.order + 1)), b.settings.rate)
-    t = float(start_segment(new_tables(b.settings.order), b.plant, b.state, settings, 1e9, b.out))
+    t = start_for(b, 1e9)
     assert t == pytest.approx(depth / 9.0, rel=1e-6, abs=0.0)
     assert b.events == [(other(side), Transition.RELEASE)]
     assert b.state.y[U_L + other(side)] == 0.0
