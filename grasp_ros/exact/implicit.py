@@ -10,36 +10,31 @@ import math
 
 import numpy as np
 
+from grasp_ros.exact.arm_motion import acceleration, by_forces, damp
 from grasp_ros.exact.collocation import (
     E_NODES,
-    MATRIX,
     SUMS,
     V_NODES,
     Approach,
     Begin,
     collocate,
-    impact_at,
     motion_of,
-    penetration_at,
 )
-from grasp_ros.exact.elimination import eliminate
-from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.jit import kernel
 from grasp_ros.exact.kinematics import approach, reduced_mass
-from grasp_ros.exact.radau import DERIVATIVE, FIRST, INTEGRAL, NODES, STAGES, TO_LEGENDRE, TO_POWERS, times
-from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Tables
+from grasp_ros.exact.radau import DERIVATIVE, FIRST, STAGES, TO_LEGENDRE, TO_POWERS, times
+from grasp_ros.exact.records import Output, Plant, Settings, State, Tables
 from grasp_ros.exact.scales import STIFF, relaxation, slow_relaxation
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
     DISSIPATION,
     EPS,
-    FORCE,
     HERTZIAN,
     LANES,
     LEFT,
     MASS,
     RIGHT,
-    STIFFNESS,
     TIME,
     U_L,
     V_L,
@@ -57,6 +52,7 @@ from grasp_ros.physics.layout import (
 LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
 PLACE, VELOCITY = 0, 1  # of a body in the state
 FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
+ROUNDINGS = 32.0  # times what is allowed: so much error may be rounding of what a step gains, and go with its length
 JUMP = 8.0  # times as much as the last coefficients weighs what is left of a relaxation at the begin
 
 
@@ -107,49 +103,16 @@ def write_lane(tables: Tables, lane: int, begin: float, h: float, rate: float) -
     return max(last, abs(tables.row[0] - rate))
 
 
-@inlined
-def acceleration(f: Array, body: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
-    """Acceleration of an arm at a node, m/s^2; where the pair is not stiff, without that of its damper.
-
-    It follows from the forces, so that a slow arm keeps digits that v_o and u' do not have; where the pair is stiff,
-    it is the impact force that has none.
-    """
-    h, nodes = start.h, E_NODES + side * STAGES
-    if pair.stiff:
-        return (times(DERIVATIVE, j, f, V_NODES, 0.0) + pair.sign * (
-            pair.rate * times(DERIVATIVE, j, f, nodes, pair.e))) / h
-    x_o = start.x + h * (NODES[j] * start.v + times(INTEGRAL, j, f, V_NODES, 0.0))
-    x = x_o + pair.sign * penetration_at(f, side, pair, h, j)
-    return (body[FORCE] - body[STIFFNESS] * x - pair.sign * impact_at(f, side, pair, h, j)) / body[MASS]
-
-
 @kernel
-def damp(tables: Tables, rate: float, v: float, h: float) -> None:
-    """Add -rate v to the accelerations at the nodes, in `tables.row`; v begins at `v` and is their integral.
-
-    The equations are never singular: the matrix of an even number of stages has no real eigenvalues.
-    """
-    f, row = tables.f, tables.row
-    for j in range(STAGES):
-        at = MATRIX + j * (STAGES + 1)
-        for i in range(STAGES):
-            f[at + i] = rate * h * INTEGRAL[j, i]
-        f[at + j] += 1.0
-        f[at + STAGES] = row[j] - rate * v
-    eliminate(f, MATRIX, STAGES + 1)
-    for j in range(STAGES):
-        row[j] = f[MATRIX + j * (STAGES + 1) + STAGES]
-
-
-@kernel
-def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, start: Begin) -> float:
+def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, other: Approach, start: Begin
+               ) -> float:
     """Write the lanes of an arm from the nodes; returns the error of u', relative to what is allowed of 1."""
     f, row, h, body = tables.f, tables.row, start.h, plant.bodies[side]
     nodes, largest = E_NODES + side * STAGES, 0.0
     v = V_L if side == LEFT else V_R
     for j in range(STAGES):
-        row[j] = acceleration(f, body, side, pair, start, j)
-    if body[DAMPING] != 0.0 and not pair.stiff:
+        row[j] = acceleration(f, plant.bodies, side, pair, other, start, j)
+    if body[DAMPING] != 0.0 and by_forces(plant.bodies, side, pair, other, h):
         damp(tables, body[DAMPING] / body[MASS], state.y[v], h)
     write_lane(tables, v, state.y[v], h, 0.0)
     for j in range(STAGES):
@@ -182,8 +145,8 @@ def write_lanes(tables: Tables, plant: Plant, state: State, left: Approach, righ
     for j in range(STAGES):
         row[j] = start.v + f[V_NODES + j]
     error = write_lane(tables, np.int64(X_O), start.x, h, start.v) / start.scale
-    error = max(error, write_side(tables, plant, state, LEFT, left, start))
-    return max(error, write_side(tables, plant, state, RIGHT, right, start))
+    error = max(error, write_side(tables, plant, state, LEFT, left, right, start))
+    return max(error, write_side(tables, plant, state, RIGHT, right, left, start))
 
 
 @kernel
@@ -234,10 +197,13 @@ def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings
             return h
         out.work[Work.REJECTED_STEPS] += 1
         shorter = h * min(max(0.7 * error ** (-1.0 / (STAGES - 1)), 0.1), 0.7)
-        if error > 0.03 * before or (error == math.inf and h < longest):
-            if not slower * shorter > LENGTH:  # not the length of the step, but a relaxation that is not over
+        if error > 0.03 * before or (error == math.inf and h < longest):  # not what the polynomials neglect
+            if error < ROUNDINGS:
+                shorter = 0.5 * h / error
+            elif slower * shorter > LENGTH:
+                shorter = LENGTH / slower
+            else:
                 break
-            shorter = LENGTH / slower
         before, h = min(before, error), shorter
     wait(out, 0.5 * math.log(min(max(error, 1.0), 1e20)))
     return 0.0
