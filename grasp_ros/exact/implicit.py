@@ -122,15 +122,17 @@ def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: App
         return math.inf
     begin = pair.rate * (pair.e - pair.offset)
     last = write_lane(tables, U_L + side, pair.u, h, begin)
-    if pair.stiff:  # between the nodes the velocities swing about such a jump
-        last = max(last, JUMP * abs(row[0] - begin))
     if pair.hertzian == 0.0 or not pair.u > 0.0:
         return last / max(start.scale, abs(pair.e))
     v_end = start.v + f[V_NODES + STAGES - 1]
     d_end = pair.rate * (f[nodes + STAGES - 1] - pair.offset)
-    moving = max(abs(start.v), abs(state.y[v]), abs(v_end), abs(v_end + pair.sign * d_end))
-    relative = max(moving, 1024.0 * pair.rate * largest) if pair.stiff else moving
-    return last / max(min(relative, pair.u / h), 0.25 * moving)
+    moving, creeping = max(abs(start.v), abs(state.y[v])), 1024.0 * pair.rate * largest if pair.stiff else 0.0
+    first = max(moving, creeping)
+    moving = max(moving, abs(v_end), abs(v_end + pair.sign * d_end))
+    scale = max(min(max(moving, creeping), pair.u / h), 0.25 * moving)
+    if pair.stiff:  # between the nodes the velocities swing about such a jump, which is seen while they are small
+        last = max(last, JUMP * abs(row[0] - begin) * max(1.0, scale / first))
+    return last / scale
 
 
 @kernel

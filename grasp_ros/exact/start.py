@@ -139,15 +139,16 @@ def keeps_sliding(start: Start, plant: Plant, state: State, n: int, left: int, r
 def scaled_series(tables: Tables, plant: Plant, state: State, settings: Settings, left: int, right: int
                   ) -> tuple[float, float]:
     """Expand in a time scale that fits; returns it, and how far the series reach in s."""
-    scale = time_scale(plant, state, settings)
+    scale, orders = time_scale(plant, state, settings), 0
     n, tail = ORDER, 2 * POWERS + max(left, right, 0) // 2
     reach, doubt = 0.0, push_on_object(plant, state).noise
     for _ in range(MAX_SCALES):
+        scale *= power_of_two(POWERS * orders)
         expand_start(tables.start, plant, state.y, n, left, right, scale, doubt)
         reach = reach_of(tables.start.c, n, settings, tail)
         if 1.0 / FITS < reach < FITS or reach == math.inf:
             break
-        scale *= power_of_two(POWERS * orders_to_one(reach, MOST))
+        orders = orders_to_one(reach, MOST)
     return scale, reach
 
 
