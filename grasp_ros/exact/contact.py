@@ -152,7 +152,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     """One Taylor step to its first event, whose transitions it makes, or to the end of the span; its time, or nan."""
     out.work[Work.CONTACT_STEPS] += 1
     c, at, y, mode = tables.c, tables.at, state.y, state.mode
-    span = within_decay(plant, span)
+    span = within_decay(plant, mode, span)
     step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
     n = step.order
     h = accepted_length(tables, step, h, settings, out.work)

@@ -99,17 +99,23 @@ def energy_level(plant: Plant, state: State, t: float) -> Level:
 
 
 @kernel
-def other_losses(plant: Plant, state: State, size: float, t: float) -> float:
-    """Bound, in J of V, on what friction and impacts take in t s from motions that have the energy `size`."""
-    loss = 0.0
-    if plant.coulomb > 0.0:
-        loss += 2.0 * plant.coulomb * t * math.sqrt(size / plant.given[OBJECT, MASS])
+def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: float) -> float:
+    """Bound, in J of V, on what is taken in t s from motions that have the energy `size`.
+
+    A damper takes c v^2, friction F |v|, and a pair in contact p H u^1.5 u'^2; one without force loses what it stored.
+    """
+    rate = 0.0
+    for body in (LEFT, OBJECT, RIGHT):
+        rate = max(rate, plant.given[body, DAMPING] / plant.given[body, MASS])
+    loss = 2.0 * rate * t * size + 2.0 * plant.coulomb * t * math.sqrt(size / plant.given[OBJECT, MASS])
     for side in (LEFT, RIGHT):
-        pair = plant.pairs[side]
-        if pair[DISSIPATION] > 0.0 and state.mode[side] != Pair.ABSENT:
+        mode, u = (modes[0], before.u_l) if side == LEFT else (modes[1], before.u_r)
+        hertzian, u = plant.pairs[side, HERTZIAN], max(u, 0.0)
+        if mode == Pair.CONTACT:
             d = math.sqrt(size / reduced_mass(plant.given, side))
-            u = max(state.y[U_L + side], 0.0) + d * t
-            loss += 2.0 * pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u) * d * d * t
+            loss += 2.0 * plant.pairs[side, DISSIPATION] * elastic_force(hertzian, u + d * t) * d * d * t
+        elif mode in (Pair.CLAMPED, Pair.LEAVING):
+            loss += 2.0 * stored_energy(hertzian, u)
     return loss
 
 
@@ -131,12 +137,11 @@ def penetrates(plant: Plant, state: State, side: Body, before: float, size: floa
 
 @inlined
 def check_segment(plant: Plant, state: State, settings: Settings, before: Level, after: Level, t: float, idle: int,
-                  clamped: bool) -> Outcome:
-    """Whether a segment of t s can be believed.
+                  modes: tuple[int, int]) -> Outcome:
+    """Whether a segment of t s, which began with both pairs in `modes`, can be believed.
 
     It must be finite, not stalled, without a touch that was missed, and its energy may neither rise nor fall by more
-    than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come; where a pair was
-    clamped its stored energy goes.
+    than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come.
     """
     if not math.isfinite(state.y.sum()):
         return Outcome.NOT_FINITE
@@ -152,7 +157,4 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     rounding += jump(plant, state.y, LEFT, before.left, t) + jump(plant, state.y, RIGHT, before.right, t)
     if rise > rounding:
         return Outcome.ENERGY_RISES
-    rounding += 2.0 * settings.rate * t * size  # what dampers take at most
-    if clamped or -rise <= rounding or -rise <= rounding + other_losses(plant, state, size, t):
-        return Outcome.GO_ON
-    return Outcome.ENERGY_FALLS
+    return Outcome.ENERGY_FALLS if -rise > rounding + losses(plant, before, modes, size, t) else Outcome.GO_ON

@@ -11,7 +11,6 @@ from grasp_ros.exact.contact import contact_segment
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
 from grasp_ros.exact.jit import door
-from grasp_ros.exact.kinematics import is_clamped
 from grasp_ros.exact.loop import answer_end, close_interval, enter_interval, open_interval
 from grasp_ros.exact.modes import leave_together, settle_resting
 from grasp_ros.exact.outputs import may_go_on, write_reached
@@ -85,7 +84,7 @@ def advance(
             return outcome
         settle_resting(plant, state, out)
         leave_together(plant, state, settings)
-        clamped = is_clamped(state.mode)
+        modes = (state.mode[LEFT], state.mode[RIGHT])
         if must_start(state):
             t = start_segment(tables, plant, state, settings, span, out)
         elif state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
@@ -96,7 +95,7 @@ def advance(
             t = flight_segment(tables, plant, state, settings, span, out)
         idle = 0 if t > 0.0 else idle + 1
         after = energy_level(plant, state, t)
-        outcome = check_segment(plant, state, settings, before, after, t, idle, clamped)
+        outcome = check_segment(plant, state, settings, before, after, t, idle, modes)
         if outcome != Outcome.GO_ON:
             out.filled[Filled.OUTPUTS] = reached
             return outcome

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Integers, Motion, PairFlight, Plant, Rates, State
+from grasp_ros.exact.records import Array, Motion, PairFlight, Plant, Rates, State
 from grasp_ros.exact.roots import LARGE, SMALL, safe_step
 from grasp_ros.physics.layout import (
     DAMPING,
+    DISSIPATION,
     EPS,
     FORCE,
     LEFT,
@@ -195,10 +197,12 @@ def is_closed(mode: Pair) -> bool:
     return mode in (Pair.CONTACT, Pair.CLAMPED, Pair.LEAVING)
 
 
-@inlined
-def is_clamped(mode: Integers) -> bool:
-    """Whether a pair is closed without force, so that its stored energy goes."""
-    return mode[LEFT] in (Pair.CLAMPED, Pair.LEAVING) or mode[RIGHT] in (Pair.CLAMPED, Pair.LEAVING)
+@kernel
+def surface_factor(plant: Plant, y: Array, side: Body) -> float:
+    """1 + p u' of a pair; 0 within its rounding."""
+    loss, (front, back) = plant.pairs[side, DISSIPATION], rate_lanes(side)
+    factor = damping_factor(loss, y[front] - y[back])
+    return factor if abs(factor) > 4.0 * EPS * (1.0 + loss * (abs(y[front]) + abs(y[back]))) else 0.0
 
 
 @inlined

@@ -35,14 +35,13 @@ object at rest slips by it; so does a pair whose force dies out at u' = -1/p, of
 from __future__ import annotations
 
 from grasp_ros.exact.friction import apply_friction, lift_friction, push_on_object
-from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, is_closed, is_resting, rate_lanes, relative_motion, velocity_lane
+from grasp_ros.exact.kinematics import approach, is_closed, is_resting, relative_motion, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, glides, impact_beside, is_negligible, leaning, turn_back
+from grasp_ros.exact.rest import NEVER, is_negligible, leaning, turn_back
+from grasp_ros.exact.surface import glides, surface_side
 from grasp_ros.physics.layout import (
-    DISSIPATION,
     EPS,
     HERTZIAN,
     LEFT,
@@ -80,17 +79,6 @@ def mode_of(plant: Plant, state: State, side: Body) -> Pair:
     if order == NEVER:
         return Pair.RESTING
     return Pair.CONTACT if value > 0.0 else Pair.OPEN
-
-
-@kernel
-def surface_side(plant: Plant, state: State, side: Body) -> float:
-    """1 + p u', which is positive in contact; within its rounding, where no force acts, the u'' that moves it."""
-    y, loss = state.y, plant.pairs[side, DISSIPATION]
-    front, back = rate_lanes(side)
-    factor = damping_factor(loss, y[front] - y[back])
-    if abs(factor) > 4.0 * EPS * (1.0 + loss * (abs(y[front]) + abs(y[back]))):
-        return factor
-    return relative_motion(plant, y, side)[1] + impact_beside(plant, state, side)[0]
 
 
 @kernel

@@ -12,7 +12,16 @@ import math
 from grasp_ros.exact.bits import exponent, power_of_two
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, arm_of, bound, derivatives, other, reduced_mass, relative_motion
+from grasp_ros.exact.kinematics import (
+    approach,
+    arm_of,
+    bound,
+    derivatives,
+    other,
+    reduced_mass,
+    relative_motion,
+    surface_factor,
+)
 from grasp_ros.exact.records import Array, Leaning, Plant, State
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -45,7 +54,7 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
         return 0.0, 0.0
     hertzian, loss, mass = plant.pairs[beside, HERTZIAN], plant.pairs[beside, DISSIPATION], plant.bodies[OBJECT, MASS]
     d, a = relative_motion(plant, state.y, beside)
-    elastic, factor = elastic_force(hertzian, u), damping_factor(loss, d)
+    elastic, factor = elastic_force(hertzian, u), surface_factor(plant, state.y, beside)
     a -= elastic * factor / reduced_mass(plant.bodies, beside)
     pace = 1.5 * hertzian * math.sqrt(u) * d * factor + elastic * loss * a
     return elastic * factor / mass, pace / mass
@@ -180,17 +189,6 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
     if plant.bodies[OBJECT, MASS] == math.inf and force > DOUBT * plant.coulomb:
         return False
     return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
-
-
-@kernel
-def glides(plant: Plant, state: State, side: Body) -> bool:
-    """Whether nothing moves a pair off u' = -1/p: its own motion never differs, and the other pair will not push.
-
-    One that is clamped may, and in a symmetric grasp both must be treated alike at one instant.
-    """
-    if state.mode[other(side)] in (Pair.CONTACT, Pair.CLAMPED):
-        return False
-    return own_difference(plant, state.y, side, LOWEST).order == NEVER
 
 
 @inlined

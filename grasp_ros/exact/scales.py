@@ -8,7 +8,7 @@ from grasp_ros.exact.bits import near_inverse, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass, relative_motion
-from grasp_ros.exact.records import NEITHER, Array, Output, Plant, Settings, State, Step
+from grasp_ros.exact.records import NEITHER, Array, Integers, Output, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -111,11 +111,14 @@ def outlasts(y: Array, w_l: float, w_r: float, unit: float, span: float, reach: 
 
 
 @inlined
-def within_decay(plant: Plant, span: float) -> float:
-    """A span in s, or the part of it in which a damper leaves enough of a velocity for its series to have digits."""
+def within_decay(plant: Plant, mode: Integers, span: float) -> float:
+    """A span in s, or the part of it in which a damper leaves enough of a velocity for its series to have digits.
+
+    An arm that touches nothing flies.
+    """
     for body in (LEFT, OBJECT, RIGHT):
         damping, mass = plant.bodies[body, DAMPING], plant.bodies[body, MASS]
-        if damping * span > DECAYS * mass:
+        if damping * span > DECAYS * mass and (body == OBJECT or mode[body] == Pair.CONTACT):
             span = DECAYS * mass / damping
     return span
 

@@ -18,7 +18,7 @@ from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.friction import push_on_object, slide_in_contact, slip_candidate
 from grasp_ros.exact.implicit import expand_row, implicit_step, wait
 from grasp_ros.exact.jit import door, inlined, kernel
-from grasp_ros.exact.kinematics import is_clamped, keep_resting
+from grasp_ros.exact.kinematics import keep_resting
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due
@@ -182,14 +182,14 @@ def creep(
     settings = new_settings(tolerance, row.shape[0] - 1, given)
     out = Output(grid, rows, events, filled, work)
     reached = out.filled[Filled.OUTPUTS]
-    before, clamped = energy_level(plant, state, 0.0), is_clamped(mode)
+    before, modes = energy_level(plant, state, 0.0), (mode[LEFT], mode[RIGHT])
     h = implicit_step(tables, plant, state, settings, until(state.clock, end), out)
     if h == 0.0:
         return Outcome.GO_ON
     t = squeezed_segment(tables, plant, state, h, out)
     if t == 0.0:
         return Outcome.GO_ON
-    outcome = check_segment(plant, state, settings, before, energy_level(plant, state, t), t, 0, clamped)
+    outcome = check_segment(plant, state, settings, before, energy_level(plant, state, t), t, 0, modes)
     if outcome != Outcome.GO_ON:
         out.filled[Filled.OUTPUTS] = reached
     return outcome

@@ -9,9 +9,11 @@ from exact.bench import bench
 
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.records import Level
-from grasp_ros.physics.layout import LEFT, RIGHT, U_L, Body, Outcome, Pair
+from grasp_ros.physics.impact_law import stored_energy
+from grasp_ros.physics.layout import DAMPING, LEFT, RIGHT, U_L, Body, Outcome, Pair
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
+OPEN = (Pair.OPEN, Pair.OPEN)
 GRAZE = (0.6, 0.01)  # m/s, s: a body that comes so fast from so far and just reaches the other one
 
 
@@ -20,7 +22,7 @@ def outcome(side: Body, u: float, mode: Pair, before: float = 0.0, t: float = 0.
     b = bench(side, u, 0.0, mode)
     after = energy_level(b.plant, b.state, t)
     begin = Level(after.value, max(after.size, before), 0.0, 0.0, u_before, u_before)
-    return Outcome(check_segment(b.plant, b.state, b.settings, begin, after, t, 0, False))
+    return Outcome(check_segment(b.plant, b.state, b.settings, begin, after, t, 0, OPEN))
 
 
 @SIDES
@@ -54,15 +56,59 @@ def test_energy_comes_from_nowhere_and_goes_nowhere(side: Body, change: float, e
     b = bench(side, -0.1, 0.5, p=0.0)
     after = energy_level(b.plant, b.state, 0.01)
     begin = Level(after.value - change, after.size, 0.0, 0.0, -0.1, -0.1)
-    found = check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, False)
+    found = check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, OPEN)
     assert found == expected
+
+
+@SIDES
+@pytest.mark.parametrize(("loss", "t", "mode", "options", "expected"), [
+    (0.01, 0.25, Pair.OPEN, {"stiffness": 10.0}, Outcome.ENERGY_FALLS),  # a spring keeps what it takes
+    (0.01, 0.1, Pair.OPEN, {"p": 0.5}, Outcome.ENERGY_FALLS),  # nothing is dissipated 0.1 m apart
+    (0.01, 0.1, Pair.RESTING, {"p": 0.5}, Outcome.ENERGY_FALLS),
+    (0.01, 0.1, Pair.CONTACT, {"p": 0.5}, Outcome.GO_ON),
+    (0.01, 0.1, Pair.CONTACT, {"p": 0.0}, Outcome.ENERGY_FALLS),
+    (0.5, 0.1, Pair.OPEN, {"coulomb": 10.0}, Outcome.GO_ON),
+    (0.5, 0.1, Pair.OPEN, {"coulomb": 1e-3}, Outcome.ENERGY_FALLS),
+])
+def test_energy_falls_by_no_more_than_what_can_take_it(
+    side: Body, loss: float, t: float, mode: Pair, options: dict[str, float], expected: Outcome
+) -> None:
+    b = bench(side, -0.1, 0.5, mode, **{"p": 0.0, **options})  # type: ignore[arg-type]
+    after = energy_level(b.plant, b.state, t)
+    begin = Level(after.value + loss, after.size + loss, 0.0, 0.0, -0.1, -0.1)
+    modes = (Pair(int(b.state.mode[LEFT])), Pair(int(b.state.mode[RIGHT])))
+    assert check_segment(b.plant, b.state, b.settings, begin, after, t, 0, modes) == expected
+
+
+@SIDES
+@pytest.mark.parametrize(("part", "expected"), [(0.9, Outcome.GO_ON), (2.1, Outcome.ENERGY_FALLS)])
+def test_a_damper_takes_no_more_than_its_rate(side: Body, part: float, expected: Outcome) -> None:
+    t, rate = 0.01, 3.0
+    b = bench(side, -0.1, 0.5, p=0.0)
+    b.plant.given[side, DAMPING] = b.plant.bodies[side, DAMPING] = rate
+    after = energy_level(b.plant, b.state, t)
+    before = after.value / (1.0 - 2.0 * part * rate * t)
+    begin = Level(before, before, 0.0, 0.0, -0.1, -0.1)
+    assert check_segment(b.plant, b.state, b.settings, begin, after, t, 0, OPEN) == expected
+
+
+@SIDES
+@pytest.mark.parametrize("mode", [Pair.CLAMPED, Pair.LEAVING])
+def test_a_pair_without_force_loses_what_it_stored_and_no_more(side: Body, mode: Pair) -> None:
+    b = bench(side, 0.01, -3.0, mode)
+    after, stored = energy_level(b.plant, b.state, 0.01), 2.0 * stored_energy(1e4, 0.02)
+    modes = (mode, Pair.OPEN) if side == LEFT else (Pair.OPEN, mode)
+    u = (0.02, -1.0) if side == LEFT else (-1.0, 0.02)
+    for lost, expected in ((0.9 * stored, Outcome.GO_ON), (1.1 * stored, Outcome.ENERGY_FALLS)):
+        begin = Level(after.value + lost, after.size + lost, 0.0, 0.0, *u)
+        assert check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, modes) == expected
 
 
 @SIDES
 def test_a_segment_without_an_end_or_with_a_number_that_is_none_is_stopped(side: Body) -> None:
     b = bench(side, -0.1, 0.5)
     level = energy_level(b.plant, b.state, 0.0)
-    assert check_segment(b.plant, b.state, b.settings, level, level, math.nan, 0, False) == Outcome.STALLED
-    assert check_segment(b.plant, b.state, b.settings, level, level, 0.0, 10_000, False) == Outcome.STALLED
+    assert check_segment(b.plant, b.state, b.settings, level, level, math.nan, 0, OPEN) == Outcome.STALLED
+    assert check_segment(b.plant, b.state, b.settings, level, level, 0.0, 10_000, OPEN) == Outcome.STALLED
     b.state.y[U_L + side] = math.nan
-    assert check_segment(b.plant, b.state, b.settings, level, level, 0.01, 0, False) == Outcome.NOT_FINITE
+    assert check_segment(b.plant, b.state, b.settings, level, level, 0.01, 0, OPEN) == Outcome.NOT_FINITE

@@ -20,7 +20,6 @@ from grasp_ros.exact.rest import (
     UNDECIDED,
     certain_time,
     difference,
-    glides,
     impact_beside,
     is_overtaken,
     leaning,
@@ -387,18 +386,6 @@ def test_the_time_of_the_impulse_is_a_power_of_two_that_follows_the_units(order:
     other_units = time_of_impulse(second**2 * math.sqrt(metre) / hertzian, loss * second / metre, order,
                                   a * metre / second**order)
     assert other_units == t * second
-
-
-@SIDES
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [({}, True), ({"beside_mode": Pair.LEAVING}, True), ({"beside_mode": Pair.CLAMPED, "beside": (0.01, -9.0)}, False),
-     ({"beside_mode": Pair.CONTACT}, False), ({"push": 1.0}, False), ({"push": 1.0, "object_push": 1.0}, True),
-     ({"stiffness": 1e-3}, False)],
-)
-def test_a_pair_glides_where_nothing_moves_it(side: Body, options: dict[str, Any], expected: bool) -> None:
-    b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)
-    assert glides(b.plant, b.state, side) is expected
 
 
 @SIDES
