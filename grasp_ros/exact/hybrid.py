@@ -12,7 +12,7 @@ from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
 from grasp_ros.exact.jit import door
 from grasp_ros.exact.loop import answer_end, close_interval, enter_interval, open_interval
-from grasp_ros.exact.modes import leave_together, settle_resting
+from grasp_ros.exact.modes import let_leave, settle_resting
 from grasp_ros.exact.outputs import may_go_on, write_reached
 from grasp_ros.exact.records import Array, Integers, Level, Loop, Output, Plant, Start, State, Tables
 from grasp_ros.exact.scales import is_squeezed, new_settings
@@ -83,7 +83,7 @@ def advance(
         if outcome != Outcome.GO_ON:
             return outcome
         settle_resting(plant, state, out)
-        leave_together(plant, state, settings)
+        let_leave(plant, state, settings)
         modes = (state.mode[LEFT], state.mode[RIGHT])
         if must_start(state):
             t = start_segment(tables, plant, state, settings, span, out)

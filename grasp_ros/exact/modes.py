@@ -29,7 +29,7 @@ balance what pushes it but for the rounding of its terms (`push_on_object`); stu
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
 one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse, unless an
-object at rest slips by it; so does a pair whose force dies out at u' = -1/p, off which nothing else moves it.
+object at rest slips by it; so does a pair whose force has died out at u' = -1/p, off which nothing moves it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from grasp_ros.exact.kinematics import approach, is_closed, is_resting, relative
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
 from grasp_ros.exact.rest import NEVER, is_negligible, leaning, turn_back
-from grasp_ros.exact.surface import glides, surface_side
+from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
 from grasp_ros.physics.layout import (
     EPS,
     HERTZIAN,
@@ -119,9 +119,17 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
         apply_friction(plant, mode)
         return
     settle_object(plant, state, out)
-    for side in (LEFT, RIGHT):
-        if mode[side] == Pair.LEAVING or (mode[side] == Pair.CONTACT and is_resting(state.y, side)):
-            settle(state, side, mode_of(plant, state, side), out)
+    left, right = mode_at_tick(plant, state, LEFT), mode_at_tick(plant, state, RIGHT)
+    settle(state, LEFT, left, out)
+    settle(state, RIGHT, right, out)
+
+
+@inlined
+def mode_at_tick(plant: Plant, state: State, side: Body) -> Pair:
+    """Mode of a pair under new inputs: anew, if it is about to begin from rest, or leaves and something moves it."""
+    mode = state.mode[side]
+    leaves = mode == Pair.LEAVING and not has_glided(plant, state, side, DRIFT)
+    return mode_of(plant, state, side) if leaves or (mode == Pair.CONTACT and is_resting(state.y, side)) else mode
 
 
 # Rules between segments.
@@ -168,9 +176,10 @@ def settle_resting(plant: Plant, state: State, out: Output) -> None:
 
 
 @inlined
-def leave_together(plant: Plant, state: State, settings: Settings) -> None:
-    """Take both pairs off a release at one instant, where the product w_l w_r stops the regularised time."""
+def let_leave(plant: Plant, state: State, settings: Settings) -> None:
+    """Take pairs off that glide, and both off a release at one instant, where w_l w_r stops the regularised time."""
     mode, y = state.mode, state.y
+    leave_gliding(plant, state)
     slipping = mode[OBJECT] in (Slide.RIGHTWARD, Slide.LEFTWARD) and y[V_O] == 0.0  # by their force alone
     if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT or slipping:
         return
@@ -189,22 +198,25 @@ def leave_together(plant: Plant, state: State, settings: Settings) -> None:
 def make_transitions(plant: Plant, state: State, left: Candidate, right: Candidate, slide: SlideCandidate, end: float,
                      out: Output) -> None:
     """Make all transitions within a few roundings of the end; lost forces hide no more what pushes a stuck object."""
-    if left.when <= end * TOGETHER:
-        make_transition(plant, state, LEFT, left.what, out)
-    if right.when <= end * TOGETHER:
-        make_transition(plant, state, RIGHT, right.what, out)
-    if slide.when <= end * TOGETHER:
+    last = end * TOGETHER
+    leaves_l = left.when <= last and left.what == Transition.CLAMP and glides(plant, state, LEFT)
+    leaves_r = right.when <= last and right.what == Transition.CLAMP and glides(plant, state, RIGHT)
+    if left.when <= last:
+        make_transition(plant, state, LEFT, left.what, leaves_l, out)
+    if right.when <= last:
+        make_transition(plant, state, RIGHT, right.what, leaves_r, out)
+    if slide.when <= last:
         make_slide_transition(plant, state, slide.what, out)
-    elif state.mode[OBJECT] == Slide.STUCK and min(left.when, right.when) <= end * TOGETHER:
+    elif state.mode[OBJECT] == Slide.STUCK and min(left.when, right.when) <= last:
         settle_object(plant, state, out)
 
 
 @kernel
-def make_transition(plant: Plant, state: State, side: Body, kind: Transition, out: Output) -> None:
+def make_transition(plant: Plant, state: State, side: Body, kind: Transition, leaves: bool, out: Output) -> None:
     """The reset map of a pair: its next mode, u = 0 at a touch and a release, and the record of the event.
 
     A touch whose u' has been lost to rounding finds a pair at rest: it is `settle_resting` that decides. What looks
-    like a CLAMP of a pair that glides at u' = -1/p, which it never passes, is rounding: it is LEAVING.
+    like a CLAMP of a pair that glides at u' = -1/p, which it never passes, is rounding: it `leaves` without an event.
     """
     y, mode, d = state.y, state.mode, approach(state.y, side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
@@ -213,7 +225,7 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, ou
     if kind == Transition.TOUCH and d <= 0.0:
         y[velocity_lane(side)] = y[V_O]
         return
-    if kind == Transition.CLAMP and glides(plant, state, side):
+    if leaves:
         mode[side] = Pair.LEAVING
         return
     if kind == Transition.TOUCH:

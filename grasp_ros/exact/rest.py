@@ -40,6 +40,7 @@ from grasp_ros.physics.layout import (
 
 NOTHING = 2.0**-72  # of a way: below its roundings long before
 LOWEST, HIGHEST = 2, 6  # derivatives
+ROUNDINGS = 4.0  # of 1 + p u'
 DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
 SHORT = 0.2  # of the time constants, well within those of `flight.SHORT`, where u keeps its own digits
 UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
@@ -54,7 +55,7 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
         return 0.0, 0.0
     hertzian, loss, mass = plant.pairs[beside, HERTZIAN], plant.pairs[beside, DISSIPATION], plant.bodies[OBJECT, MASS]
     d, a = relative_motion(plant, state.y, beside)
-    elastic, factor = elastic_force(hertzian, u), surface_factor(plant, state.y, beside)
+    elastic, factor = elastic_force(hertzian, u), surface_factor(plant, state.y, beside, ROUNDINGS)
     a -= elastic * factor / reduced_mass(plant.bodies, beside)
     pace = 1.5 * hertzian * math.sqrt(u) * d * factor + elastic * loss * a
     return elastic * factor / mass, pace / mass

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from grasp_ros.exact.jit import kernel
+from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import other, surface_factor
 from grasp_ros.exact.records import Plant, State
-from grasp_ros.exact.rest import HIGHEST, LOWEST, NEVER, first_difference, impact_beside, own_difference
-from grasp_ros.physics.layout import Body, Pair
+from grasp_ros.exact.rest import HIGHEST, LOWEST, NEVER, ROUNDINGS, first_difference, impact_beside, own_difference
+from grasp_ros.physics.layout import LEFT, RIGHT, Body, Pair
+
+DRIFT = 1024.0  # roundings of u' that flights may leave in it
 
 
 @kernel
 def surface_side(plant: Plant, state: State, side: Body) -> float:
     """1 + p u', which is positive in contact; within its rounding, where no force acts, what moves u' first; or 0."""
-    factor = surface_factor(plant, state.y, side)
+    factor = surface_factor(plant, state.y, side, ROUNDINGS)
     if factor != 0.0:
         return float(factor)
     push, pace = impact_beside(plant, state, side)
@@ -35,6 +37,24 @@ def glides(plant: Plant, state: State, side: Body) -> bool:
     beside = other(side)
     if not stays(plant, state, side):
         return False
-    if state.mode[beside] == Pair.CONTACT and surface_factor(plant, state.y, beside) != 0.0:
+    if state.mode[beside] == Pair.CONTACT and surface_factor(plant, state.y, beside, ROUNDINGS) != 0.0:
         return False
     return state.mode[beside] not in (Pair.CONTACT, Pair.CLAMPED) or stays(plant, state, beside)
+
+
+@kernel
+def has_glided(plant: Plant, state: State, side: Body, roundings: float) -> bool:
+    """Whether a pair is at u' = -1/p but for some roundings, and nothing moves it off."""
+    return surface_factor(plant, state.y, side, roundings) == 0.0 and bool(glides(plant, state, side))
+
+
+@inlined
+def leave_gliding(plant: Plant, state: State) -> None:
+    """Take pairs in contact whose force has died out at u' = -1/p, off which nothing moves them."""
+    mode = state.mode
+    left = mode[LEFT] == Pair.CONTACT and has_glided(plant, state, LEFT, ROUNDINGS)
+    right = mode[RIGHT] == Pair.CONTACT and has_glided(plant, state, RIGHT, ROUNDINGS)
+    if left:
+        mode[LEFT] = Pair.LEAVING
+    if right:
+        mode[RIGHT] = Pair.LEAVING

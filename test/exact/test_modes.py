@@ -19,7 +19,7 @@ from grasp_ros.exact.modes import (
     begin_interval,
     initial_modes,
     initial_slide,
-    leave_together,
+    let_leave,
     make_slide_transition,
     make_transition,
     make_transitions,
@@ -72,7 +72,7 @@ def toward(side: Body, slide: Slide) -> Slide:
 )
 def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float, d: float, u_after: float) -> None:
     b = bench(side, u, d, before, beside=(0.2, 0.1), beside_mode=Pair.CONTACT)
-    make_transition(b.plant, b.state, side, kind, b.out)
+    make_transition(b.plant, b.state, side, kind, False, b.out)
     assert b.mode(side) is after
     assert bits(b.state.y[U_L + side]) == bits(u_after)
     assert b.events == [(side, kind)]
@@ -83,19 +83,36 @@ def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float
     assert b.state.y[U_L + other(side)] == 0.2
 
 
+def clamp(b: Bench, side: Body) -> None:
+    """What follows when u' of a pair comes to -1/p."""
+    crossing, none = Candidate(1.0, Transition.CLAMP), Candidate(math.inf, Transition.TOUCH)
+    left, right = (crossing, none) if side == LEFT else (none, crossing)
+    make_transitions(b.plant, b.state, left, right, NO_SLIDE, 1.0, b.out)
+
+
 @SIDES
 @pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.ABSENT])
 def test_a_pair_that_glides_on_the_surface_leaves_without_an_event(side: Body, beside_mode: Pair) -> None:
     b = bench(side, 0.01, -2.0, Pair.CONTACT, beside_mode=beside_mode)
-    make_transition(b.plant, b.state, side, Transition.CLAMP, b.out)
+    clamp(b, side)
     assert (b.mode(side), b.events) == (Pair.LEAVING, [])
+
+
+@SIDES
+def test_pairs_that_glide_leave_alike(side: Body) -> None:
+    """Of two crossings at one instant the first must not decide about the second."""
+    b = bench(side, 0.01, -2.0, Pair.CONTACT, beside=(0.01, -2.0 - 1e-14), beside_mode=Pair.CONTACT)
+    crossing = Candidate(1.0, Transition.CLAMP)
+    make_transitions(b.plant, b.state, crossing, crossing, NO_SLIDE, 1.0, b.out)
+    assert (b.mode(side), b.mode(other(side))) == (Pair.CLAMPED, Pair.LEAVING)
+    assert b.events == [(side, Transition.CLAMP)]
 
 
 @SIDES
 @pytest.mark.parametrize("options", [{"push": -1.0}, {"push": 1e-9}, {"stiffness": 1e-3}, {"object_push": 1.0}])
 def test_a_pair_that_something_moves_clamps(side: Body, options: dict[str, float]) -> None:
     b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)  # type: ignore[arg-type]
-    make_transition(b.plant, b.state, side, Transition.CLAMP, b.out)
+    clamp(b, side)
     assert (b.mode(side), b.events) == (Pair.CLAMPED, [(side, Transition.CLAMP)])
 
 
@@ -107,7 +124,7 @@ def test_a_pair_that_something_moves_clamps(side: Body, options: dict[str, float
 )
 def test_a_touch_turns_back_a_pair_that_leaves(side: Body, kind: Transition, beside_mode: Pair, after: Pair) -> None:
     b = bench(side, 0.0, 0.3, beside=(0.01, -2.0), beside_mode=beside_mode)
-    make_transition(b.plant, b.state, side, kind, b.out)
+    make_transition(b.plant, b.state, side, kind, False, b.out)
     assert (b.mode(other(side)), b.events) == (after, [(side, kind)])
 
 
@@ -115,7 +132,7 @@ def test_a_touch_turns_back_a_pair_that_leaves(side: Body, kind: Transition, bes
 @pytest.mark.parametrize("d", [0.0, -1e-9])
 def test_a_touch_whose_speed_is_lost_to_rounding_makes_a_pair_at_rest(side: Body, d: float) -> None:
     b = bench(side, 1e-17, d, object_speed=0.3, push=1.0)
-    make_transition(b.plant, b.state, side, Transition.TOUCH, b.out)
+    make_transition(b.plant, b.state, side, Transition.TOUCH, False, b.out)
     assert b.mode(side) is Pair.OPEN
     assert is_resting(b.state.y, side)
     assert abs(b.state.y[V_O]) == 0.3
@@ -492,7 +509,7 @@ def test_an_open_pair_in_motion_does_not_wait(side: Body) -> None:
 def test_pairs_that_approach_do_not_leave(side: Body) -> None:
     both = (1e-20, 1e-9)
     b = bench(side, *both, Pair.CONTACT, beside=both, beside_mode=Pair.CONTACT, push=-100.0, beside_push=100.0)
-    leave_together(b.plant, b.state, b.settings)
+    let_leave(b.plant, b.state, b.settings)
     assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, Pair.CONTACT)
 
 
@@ -580,7 +597,7 @@ def test_a_resting_pair_is_pressed_by_a_resting_one(side: Body) -> None:
 
 
 def depth(d: float) -> float:
-    """u of the pair on the bench at which the impulse that is left is what `leave_together` may leave out, m."""
+    """u of the pair on the bench at which the impulse that is left is what `let_leave` may leave out, m."""
     return float((LEFT_OUT * TOLERANCE * 0.5 * d * d / (1e4 * (1.0 + 0.5 * d))) ** 0.4)
 
 
@@ -588,10 +605,10 @@ STAY, LEAVING = ((mode, mode) for mode in (Pair.CONTACT, Pair.LEAVING))
 
 
 def together(side: Body, u: float, d: float, beside: tuple[float, float], **options: Any) -> tuple[Pair, Pair]:
-    """Both pairs in contact, u in units of `depth`: their modes behind `leave_together`."""
+    """Both pairs in contact, u in units of `depth`: their modes behind `let_leave`."""
     far = (beside[0] * depth(abs(beside[1])), beside[1])
     b = bench(side, u * depth(abs(d)), d, Pair.CONTACT, beside=far, beside_mode=Pair.CONTACT, **options)
-    leave_together(b.plant, b.state, b.settings)
+    let_leave(b.plant, b.state, b.settings)
     assert b.events == []
     return b.mode(side), b.mode(other(side))
 
@@ -637,5 +654,5 @@ def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
 @pytest.mark.parametrize("beside_mode", [Pair.OPEN, Pair.LEAVING, Pair.RESTING, Pair.CLAMPED, Pair.ABSENT])
 def test_one_pair_alone_does_not_leave_without_its_force(side: Body, beside_mode: Pair) -> None:
     b = bench(side, 0.1 * depth(0.3), -0.3, Pair.CONTACT, beside=(0.1 * depth(0.3), -0.3), beside_mode=beside_mode)
-    leave_together(b.plant, b.state, b.settings)
+    let_leave(b.plant, b.state, b.settings)
     assert (b.mode(side), b.mode(other(side))) == (Pair.CONTACT, beside_mode)
