@@ -36,10 +36,10 @@ from __future__ import annotations
 
 from grasp_ros.exact.friction import apply_friction, lift_friction, push_on_object
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, is_closed, is_resting, relative_motion, velocity_lane
+from grasp_ros.exact.kinematics import approach, is_closed, is_resting, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, is_negligible, leaning, turn_back
+from grasp_ros.exact.rest import NEVER, is_negligible, leaning, parts, turn_back
 from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
 from grasp_ros.physics.layout import (
     EPS,
@@ -58,7 +58,6 @@ from grasp_ros.physics.layout import (
 
 TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together
 LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
-TURNS = 20.0  # 2 u |u''| beside u'^2 is what u' changes on the way to u = 0
 
 
 # Consistent initialisation: modes from the state.
@@ -184,9 +183,8 @@ def let_leave(plant: Plant, state: State, settings: Settings) -> None:
     if mode[LEFT] != Pair.CONTACT or mode[RIGHT] != Pair.CONTACT or slipping:
         return
     for side in (LEFT, RIGHT):
-        u, (d, a) = y[U_L + side], relative_motion(plant, y, side)
-        leaves = d < 0.0 and TURNS * (u / -d) * abs(a) < -d  # in this order, because squares underflow
-        if not (leaves and is_negligible(plant, side, u, d, LEFT_OUT * settings.tolerance)):
+        u, d = y[U_L + side], approach(y, side)
+        if not (parts(plant, y, side) and is_negligible(plant, side, u, d, LEFT_OUT * settings.tolerance)):
             return
     mode[LEFT] = mode[RIGHT] = Pair.LEAVING
 

@@ -39,6 +39,7 @@ from grasp_ros.physics.layout import (
 )
 
 NOTHING = 2.0**-72  # of a way: below its roundings long before
+TURNS = 20.0  # times what u' may change on the way to u = 0
 LOWEST, HIGHEST = 2, 6  # derivatives
 ROUNDINGS = 4.0  # of 1 + p u'
 DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
@@ -190,6 +191,17 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
     if plant.bodies[OBJECT, MASS] == math.inf and force > DOUBT * plant.coulomb:
         return False
     return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
+
+
+@kernel
+def parts(plant: Plant, y: Array, side: Body) -> bool:
+    """Whether a pair separates, and nothing but its force can turn it back before u = 0."""
+    d = approach(y, side)
+    if not d < 0.0:
+        return False
+    t = y[U_L + side] / -d
+    a, jerk = abs(difference(plant, y, side, 2)[0]), abs(difference(plant, y, side, 3)[0])
+    return TURNS * max(t * a, 0.5 * t * (t * jerk)) < -d  # in this order, because squares underflow
 
 
 @inlined

@@ -114,10 +114,16 @@ def power_lost(system: System, state: Array) -> Losses:
     return Losses(dampers, feedback, impacts, friction)
 
 
-def edges_of(run: Trajectory, longest: float = LONGEST) -> Array:
-    """Ends of the stretches of a motion in which everything is smooth: events, and cuts of the long flights, in s."""
+def edges_of(run: Trajectory, longest: float) -> Array:
+    """Ends of the stretches of a motion in which everything is smooth: events, and cuts of the long flights, in s.
+
+    Empty if there are more stretches than MOST.
+    """
     events = np.unique(np.concatenate([[0.0], run.event_table[:, 0], run.t[-1:]]))
-    cuts = [np.linspace(a, b, int(np.ceil((b - a) / longest)) + 1)[1:] for a, b in pairwise(events.tolist())]
+    parts = np.ceil(np.diff(events) / longest)
+    if parts.sum() > MOST:
+        return np.zeros(0)
+    cuts = [np.linspace(a, b, int(n) + 1)[1:] for (a, b), n in zip(pairwise(events.tolist()), parts, strict=True)]
     return np.concatenate([[0.0], *cuts])
 
 
@@ -131,7 +137,7 @@ def running_losses(run: Trajectory, longest: float = LONGEST) -> tuple[Array, Lo
     """
     system, edges = run.scene.system, edges_of(run, longest)
     located = run.method == EXACT and run.status is Status.DONE and not (run.sampled or system.external)
-    if not located or len(edges) > MOST:
+    if not (located and len(edges)):
         lost = power_lost(system, run.state)
         steps = np.diff(run.t)
         sums = [np.concatenate([[0.0], np.cumsum(0.5 * steps * (rate[1:] + rate[:-1]))]) for rate in lost]

@@ -36,8 +36,11 @@ from grasp_ros.verification.segments import INNER, Detail
 SMOOTH = 1e-6  # of its integral's size: an integrand whose quadratures differ by more is not resolved
 
 
+ALL = 0.04  # of the size of an integral that is not resolved: with 100 units it may be off by four times its size
+
+
 class Ledger(NamedTuple):
-    """Errors of a balance in all pieces, in units of rounding."""
+    """Errors of a balance in all pieces, in units of rounding, and of what quadratures miss that resolve nothing."""
 
     name: str
     error: Array  # (k,)
@@ -80,24 +83,25 @@ def _ledgers(detail: Detail) -> Iterator[Ledger]:
     pushed = np.ones(len(span), dtype=bool)
     for pair in pairs:
         pushed &= _resolved(detail, pair.force, TINY + _total(detail, pair.by_u * pair.noise))
-    momentum, unit = _momentum(detail, size)
+    momentum, unit, held = _momentum(detail, size)
     friction = _friction(detail, pairs)
     everywhere = np.asarray(smooth[:, present].all(axis=1))
     noise = EPS * impact_speed(detail, pairs)
     yield _positions(detail, size, noise, smooth, present)
     yield _steps(detail, size, noise, accelerations(detail, pairs), smooth, present)
-    yield from _bodies(detail, pairs, momentum, unit, friction, (smooth, pushed), present)
+    yield from _bodies(detail, pairs, (momentum, unit, held), friction, (smooth, pushed), present)
     whole, doubt = momentum[:, present].sum(axis=1), unit[:, present].sum(axis=1)
     doubt = doubt + EPS * sum(pair.bounce[:, 0] for pair in pairs)
     still = np.asarray((detail.v[..., OBJECT] == 0.0).all(axis=1))  # friction is what pushes it, with its rounding
     doubt = doubt + np.where(still, force_noise(detail, pairs) * span[:, 0], 0.0)
     if pairs:
+        doubt = doubt + np.where(everywhere, 0.0, ALL * held[:, present].sum(axis=1))
         yield Ledger("momentum", _beyond(whole, friction, doubt), everywhere)
     yield _energy(detail, size, pairs, everywhere & pushed)
 
 
-def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array]:
-    """m dv + C int v dt + K int x dt - f T of each body (k, 3) in N s, and its unit."""
+def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array, Array]:
+    """m dv + C int v dt + K int x dt - f T of each body (k, 3) in N s, its unit, and the size of these integrals."""
     mass, stiffness, damping, force = np.moveaxis(detail.bodies, -1, 0)
     x, v = detail.x, detail.v
     span = (detail.pieces.end - detail.pieces.begin)[:, None]
@@ -111,7 +115,8 @@ def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array]:
     unit = unit + EPS * (np.abs(stiffness) * size.x[:, 0] + np.abs(force)) * span
     unit = unit + late * acting[:, [0, -1]].max(axis=1) + np.abs(stiffness) * (doubt + _wander(detail, x))
     unit = unit + np.abs(damping) * (lag + _wander(detail, v))
-    return change, unit + TINY
+    held = np.abs(damping) * _total(detail, v) + np.abs(stiffness) * _total(detail, x) + np.abs(force) * span
+    return change, unit + TINY, held
 
 
 def _friction(detail: Detail, pairs: list[Impacts]) -> tuple[Array, Array]:
@@ -140,10 +145,10 @@ def _beyond(change: Array, friction: tuple[Array, Array], unit: Array) -> Array:
     return found
 
 
-def _bodies(detail: Detail, pairs: list[Impacts], momentum: Array, unit: Array, friction: tuple[Array, Array],
+def _bodies(detail: Detail, pairs: list[Impacts], own: tuple[Array, Array, Array], friction: tuple[Array, Array],
             resolved: tuple[NDArray[np.bool_], NDArray[np.bool_]], present: list[int]) -> Iterator[Ledger]:
-    """Momentum of each body that an impact can push."""
-    change, scale = momentum.copy(), unit.copy()
+    """Momentum of each body that an impact can push; `own`: that of `_momentum`."""
+    change, scale, held = (part.copy() for part in own)
     for pair in pairs:
         impulse, doubt = detail.integral(pair.force[:, 1:-1])
         noise = _total(detail, pair.by_u) * pair.noise[:, 0] + _total(detail, pair.by_d) * pair.noise_d[:, 0]
@@ -153,12 +158,14 @@ def _bodies(detail: Detail, pairs: list[Impacts], momentum: Array, unit: Array, 
         for body, direction in ((pair.side, sign), (OBJECT, -sign)):
             change[:, body] += direction * impulse
             scale[:, body] += noise
+            held[:, body] += impulse
     zero = np.zeros(len(change))
     for body, name in ((LEFT, "left"), (OBJECT, "object"), (RIGHT, "right")):
         if body in present:
             bound = friction if body == OBJECT else (zero, zero)
-            error = _beyond(change[:, body], bound, scale[:, body])
-            yield Ledger(f"momentum, {name}", error, resolved[0][:, body] & resolved[1])
+            known = resolved[0][:, body] & resolved[1]
+            unit = scale[:, body] + np.where(known, 0.0, ALL * held[:, body])
+            yield Ledger(f"momentum, {name}", _beyond(change[:, body], bound, unit), known)
 
 
 def _positions(detail: Detail, size: Sizes, noise: Array, smooth: NDArray[np.bool_], present: list[int]) -> Ledger:
@@ -173,9 +180,9 @@ def _positions(detail: Detail, size: Sizes, noise: Array, smooth: NDArray[np.boo
     fastest = np.abs(detail.v).max(axis=(1, 2))[:, None]  # a touch sets u = 0, and x of the arm follows x_o
     unit = EPS * (size.x[:, 0] + size.v[:, 0] * span) + noise * span + late * fastest + doubt
     unit = unit + _wander(detail, detail.v) + TINY
+    unit = unit + np.where(smooth, 0.0, ALL * _total(detail, detail.v))
     error = np.abs(detail.x[:, -1] - detail.x[:, 0] - way) / unit
-    anywhere = np.asarray(smooth[:, present].any(axis=1))
-    return Ledger("position", np.where(smooth, error, 0.0)[:, present].max(axis=1), anywhere)
+    return Ledger("position", error[:, present].max(axis=1), np.asarray(smooth[:, present].all(axis=1)))
 
 
 def _steps(detail: Detail, size: Sizes, noise: Array, acting: Array, smooth: NDArray[np.bool_], present: list[int]
@@ -227,7 +234,9 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
     lost, doubt = detail.integral(taken[:, 1:-1])
     late = EPS * detail.pieces.end * power
     unit = EPS * (unit + lost) + late + doubt + _wander(detail, taken) + TINY
-    return Ledger("energy", np.abs(level + lost) / unit, resolved & _resolved(detail, taken, unit))
+    known = resolved & _resolved(detail, taken, unit)
+    within = sum(pair.sudden * np.abs(pair.d).max(axis=1) for pair in pairs)  # a rounding of the time
+    return Ledger("energy", np.abs(level + lost) / (unit + np.where(known, 0.0, ALL * (lost + within))), known)
 
 
 def _loss_noise(detail: Detail, pair: Impacts) -> Array:

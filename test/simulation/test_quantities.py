@@ -55,6 +55,13 @@ def test_running_sums_follow_V_c() -> None:
     assert lost.total == pytest.approx(V_c[0] - V_c, abs=1e-8)
 
 
+def test_a_run_of_too_many_stretches_has_its_output_times() -> None:
+    run = simulate(scenes.load("no_contact", ["time.duration_s=1e5", "time.control_period_s=1000"]))
+    t, lost = running_losses(run)
+    assert np.array_equal(t, run.t)
+    assert all(len(total) == len(t) for total in lost)
+
+
 def test_what_held_commands_take_is_their_work() -> None:
     run = simulate(scenes.load("case_01"), sampled=True)
     level, lost = run.energy.V_c, losses(run)

@@ -43,7 +43,7 @@ def fuzzed(name: str) -> Scene:
 
 def errors(detail: Detail) -> dict[str, float]:
     """The largest error of each balance and relation."""
-    found = {entry.name: float(np.where(entry.resolved, entry.error, 0.0).max()) for entry in ledgers(detail)}
+    found = {entry.name: float(entry.error.max()) for entry in ledgers(detail)}
     for finding in findings(detail):
         found[finding.name] = max(finding.error, found.get(finding.name, 0.0))
     return found

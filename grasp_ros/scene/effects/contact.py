@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
-import numpy as np
-
 from grasp_ros.physics.layout import DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, impact_force_of, penetration
 from grasp_ros.physics.system import COLUMN, System
@@ -43,7 +41,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
     depth, gap = float(depths[at]), float(-depths[SIDES[far]])
     key, value = f"{side}_arm.position_m", sections[f"{side}_arm"]["position_m"]
     place = sections["object"]["position_m"]
-    if depth <= ROUNDING * np.abs(system.state[0::2]).max():
+    if depth <= ROUNDING * max(abs(value), abs(place)):
         return
     stored, pressing = 0.4 * system.pairs[at, HERTZIAN] * depth**2.5, _pressing(system, at, depth)
     if SIDES[far] in system.contacts and 0.0 < gap < depth:

@@ -31,7 +31,10 @@ def _build(side: str, sections: Sections, system: System) -> None:
 def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
     section = f"{side}_feedback"
     numbers = sections[section]
-    if numbers.get("set_point_m", 0.0) and numbers["position_gain_N_per_m"] == 0.0:
+    gains = numbers["position_gain_N_per_m"], numbers["velocity_gain_Ns_per_m"]
+    if not (any(gains) or numbers.get("feed_forward_N")):
+        yield Oddity(section, numbers, "has no effect: both gains are 0", "a gain or a feed_forward_N that is not 0")
+    elif numbers.get("set_point_m", 0.0) and gains[0] == 0.0:
         meant = "a position_gain_N_per_m that is not 0"
         yield Oddity(f"{section}.set_point_m", numbers["set_point_m"], "has no effect without a position gain", meant)
 

@@ -36,6 +36,7 @@ TABLE = (
 )
 
 NO_EFFECT = "has no effect"
+ROUNDING = 1e-9  # of the amplitude
 NEVER = "comes when the run has ended: nothing ever acts"
 
 A_PULSE = {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}
@@ -104,9 +105,14 @@ def _table_problems(section: str, sections: Sections) -> Iterable[Problem]:
         yield Problem(f"{section}.force_N", forces, f"as many forces as times, {len(times)}")
 
 
+def _highest(sections: Sections) -> float:
+    """The frequency in Hz of half a turn per control period."""
+    return 0.5 * NANOSECONDS / period_ns(sections)
+
+
 def _sine_problems(section: str, sections: Sections) -> Iterable[Problem]:
     """A staircase of one step per control period shows faster sines as slower ones."""
-    frequency, highest = sections[section]["frequency_Hz"], 0.5 * NANOSECONDS / period_ns(sections)
+    frequency, highest = sections[section]["frequency_Hz"], _highest(sections)
     if frequency > highest:
         allowed = f"at most {highest!r} Hz, half a turn per control period of time.control_period_s"
         yield Problem(f"{section}.frequency_Hz", frequency, allowed)
@@ -126,19 +132,26 @@ def _odd_pulse(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
 
 
 def _odd_sine(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
-    if sections[section]["amplitude_N"] == 0.0:
+    numbers = sections[section]
+    amplitude, phase = numbers["amplitude_N"], numbers.get("phase_rad", 0.0)
+    if amplitude == 0.0:
         yield Oddity(f"{section}.amplitude_N", 0.0, NO_EFFECT, "an amplitude above 0")
+    elif numbers["frequency_Hz"] == _highest(sections) and abs(math.cos(phase)) < ROUNDING:
+        why = "is 0 in the middle of every control period: the force has no effect"
+        yield Oddity(f"{section}.phase_rad", phase, why, "another phase, or a lower frequency_Hz")
 
 
 def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     times, forces, end = sections[section]["time_s"], sections[section]["force_N"], run_ns(sections)
+    late = [(time, force) for time, force in zip(times, forces, strict=True) if round(time * NANOSECONDS) >= end]
+    key, meant = f"{section}.time_s", f"before time.duration_s, {end / NANOSECONDS!r}"
     if not any(forces):
         yield Oddity(f"{section}.force_N", 0.0, "is every force: they have no effect", "a force that is not 0")
-    if round(times[0] * NANOSECONDS) >= end:
-        yield Oddity(f"{section}.time_s", times[0], NEVER, f"a begin before time.duration_s, {end / NANOSECONDS!r}")
-    elif round(times[-1] * NANOSECONDS) > end:
-        meant = f"a last time by time.duration_s, {end / NANOSECONDS!r}"
-        yield Oddity(f"{section}.time_s", times[-1], "comes when the run has ended: its force never acts", meant)
+    elif not any(forces[: len(forces) - len(late)]):
+        first = next(time for time, force in late if force != 0.0)
+        yield Oddity(key, first, NEVER, f"a begin {meant}")
+    elif late and (late[0][1] != 0.0 or round(late[0][0] * NANOSECONDS) > end):
+        yield Oddity(key, late[0][0], "comes when the run has ended: its force never acts", f"a last time {meant}")
 
 
 def _total(body: int, system: System, tick: int, _: Array) -> float:

@@ -22,6 +22,8 @@ COLUMNS = (  # of the law, and the numbers of the scene that stand in them
     (Column.POSITION_STEP, "position_step_m"), (Column.VELOCITY_STEP, "velocity_step_m_per_s"),
 )
 
+GAINS = {"position": "position_gain_N_per_m", "velocity": "velocity_gain_Ns_per_m"}  # of what is measured
+
 
 def _build(side: str, sections: Sections, system: System) -> None:
     numbers, law = sections[f"{side}_sensor"], system.laws[SIDES[side]]
@@ -37,14 +39,17 @@ def _build(side: str, sections: Sections, system: System) -> None:
 def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
     section = f"{side}_sensor"
     numbers, gains = sections[section], sections[f"{side}_feedback"]
-    wrong = {what: any(numbers.get(key) for key in (f"{what}_noise_{unit}", f"{what}_step_{unit}"))
-             for what, unit in (("position", "m"), ("velocity", "m_per_s"))}
-    used = {"position": gains["position_gain_N_per_m"], "velocity": gains["velocity_gain_Ns_per_m"]}
-    if not any(wrong.values()):
+    wrong = {key: numbers[key] for _, key in COLUMNS if numbers.get(key)}
+    unused = {key: value for key, value in wrong.items() if gains[GAINS[key.partition("_")[0]]] == 0.0}
+    if not wrong:
         yield Oddity(section, numbers, "has no effect: it measures exactly", "a noise or a step above 0")
-    elif not any(wrong[what] and used[what] for what in wrong):
+    elif unused == wrong:
         why = "has no effect: the gains of what it measures wrongly are 0"
         yield Oddity(section, numbers, why, f"gains of {side}_feedback that are not 0")
+    else:
+        for key, value in unused.items():
+            gain = f"{side}_feedback.{GAINS[key.partition('_')[0]]}"
+            yield Oddity(f"{section}.{key}", value, f"has no effect: {gain} is 0", "a gain that is not 0")
 
 
 EFFECTS = tuple(
