@@ -102,7 +102,7 @@ def _worst(detail: Detail, body: int, modes: tuple[int, ...], errors: Callable[[
     for allowed, where in _spans(detail, body, modes):
         found = [{name: float(values[where].max(initial=0.0)) for name, values in by_mode[mode].items()}
                  for mode in allowed]
-        for name, error in min(found, key=lambda errors: max(errors.values())).items():
+        for name, error in min(found, key=lambda errors: max(errors.values(), default=0.0)).items():
             worst[name] = max(worst.get(name, 0.0), error)
     for name, error in worst.items():
         yield Finding(name, error)
@@ -168,7 +168,7 @@ def _object(detail: Detail, pairs: list[Impacts], acting: Array) -> Iterator[Fin
     v = np.abs(detail.v[..., OBJECT])
     resting = {"stuck, v": np.where(v > 0.0, np.inf, 0.0), "stuck, push beyond F": (np.abs(push) - limit) / unit}
     yield from _worst(detail, OBJECT, (Slide.FREE, Slide.STUCK),
-                      lambda mode: resting if mode == Slide.STUCK else {"sliding": np.zeros_like(v)})
+                      lambda mode: resting if mode == Slide.STUCK else {})
     times, _ = _recorded(detail, OBJECT)
     piece, hit = _at_events(detail, times)
     if len(hit):

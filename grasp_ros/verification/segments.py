@@ -18,7 +18,7 @@ from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.trajectory import tick_of, tick_times
 
 NODES = 15  # of Gauss and Legendre in each part of a piece
-MOST_SEGMENTS = 30  # beyond: those at both ends of the run, and every n-th between them
+MOST_SEGMENTS = 1000  # beyond: those at both ends of the run, and every n-th between them
 PIECES = 150  # of all segments together, about
 LEVELS = 1, 8  # of ever shorter pieces at both ends of a segment
 MIDDLE = 3, 12  # equal pieces between them

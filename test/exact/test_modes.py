@@ -521,6 +521,17 @@ def test_pairs_that_leave_are_in_contact_again_when_inputs_may_change(side: Body
 
 
 @SIDES
+@pytest.mark.parametrize(("d", "options", "expected"), [
+    (-2.0 - 1e-14, {}, Pair.LEAVING), (-2.0 + 1e-14, {}, Pair.LEAVING), (-2.0 - 1e-9, {}, Pair.CLAMPED),
+    (-2.0 + 1e-9, {}, Pair.CONTACT), (-2.0, {"push": 1.0}, Pair.CONTACT), (-2.0, {"push": -1.0}, Pair.CLAMPED)])
+def test_a_pair_that_glides_goes_on_where_inputs_do_not_move_it(side: Body, d: float, options: dict[str, float],
+                                                                expected: Pair) -> None:
+    b = begin(bench(side, 0.01, d, Pair.LEAVING, **options))  # type: ignore[arg-type]
+    assert b.mode(side) is expected
+    assert b.events == ([(side, Transition.CLAMP)] if expected is Pair.CLAMPED else [])
+
+
+@SIDES
 def test_a_stuck_object_slips_when_an_input_exceeds_its_friction(side: Body) -> None:
     b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=6.0))
     assert b.slide is toward(side, Slide.RIGHTWARD)
@@ -648,6 +659,10 @@ def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
     assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
     assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=1e9) == STAY
     assert together(side, 0.5, -1e-4, (0.5, -1e-4), push=-1e9) == STAY
+    u = 0.5 * depth(1e-4)
+    for part, expected in ((1e2, STAY), (1e-2, LEAVING)):  # a spring that a push balances
+        k = part * (1e-4 / u) ** 2
+        assert together(side, 0.5, -1e-4, (0.5, -1e-4), stiffness=k, push=k * u) == expected
 
 
 @SIDES

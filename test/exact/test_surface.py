@@ -10,7 +10,9 @@ from exact.bench import bench
 from oracles import FREE
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.surface import glides, surface_side
+from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.rest import impact_beside
+from grasp_ros.exact.surface import glides, leave_gliding, surface_side
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Pair, Work
 from grasp_ros.physics.model import Contact, Grasp
 from grasp_ros.physics.system import System
@@ -45,6 +47,51 @@ def test_a_pair_glides_where_nothing_moves_it(side: Body, options: dict[str, Any
 def test_the_first_derivative_beyond_its_rounding_decides(side: Body, options: dict[str, Any], expected: float) -> None:
     b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)
     assert surface_side(b.plant, b.state, side) == pytest.approx(expected)
+
+
+@SIDES
+def test_beyond_rounding_the_speed_decides(side: Body) -> None:
+    assert surface_side(*bench(side, 0.01, -1.9, Pair.CONTACT, push=-5.0)[:2], side) == pytest.approx(0.05)
+    assert surface_side(*bench(side, 0.01, -2.1, Pair.CONTACT, push=5.0)[:2], side) == pytest.approx(-0.05)
+
+
+@SIDES
+def test_beyond_the_third_derivative_only_bodies_without_an_impact_beside_are_known(side: Body) -> None:
+    """Of the pair and its bodies the second and the third vanish, of the arm alone the fourth does not."""
+    k, a, u = 0.3, 0.7, 0.01
+    alone: dict[str, Any] = {"stiffness": k, "push": a + k * u, "object_push": a, "object_speed": 2.0}
+    b = bench(side, u, -2.0, Pair.CONTACT, **alone)
+    assert surface_side(b.plant, b.state, side) == pytest.approx(-k * a)
+    beside = {"beside": (u, 0.0), "beside_mode": Pair.CONTACT, "beside_push": a - 20.0}
+    pressed = {**alone, **beside, "push": a + k * u - 10.0}
+    b = bench(side, u, -2.0, Pair.CONTACT, **pressed)
+    push, pace = impact_beside(b.plant, b.state, side)
+    assert (abs(push), pace) == (pytest.approx(10.0), pytest.approx(0.0, abs=1e-9))
+    assert surface_side(b.plant, b.state, side) == 0.0
+    glides_beside = {**alone, "beside": (u, -2.0), "beside_mode": Pair.CONTACT, "beside_push": 5.0}
+    b = bench(side, u, -2.0, Pair.CONTACT, **glides_beside)
+    push, pace = impact_beside(b.plant, b.state, side)
+    assert push == 0.0
+    b = bench(side, u, -2.0, Pair.CONTACT, **{**glides_beside, "object_speed": 2.0 + pace / k})
+    assert surface_side(b.plant, b.state, side) == 0.0
+
+
+@SIDES
+@pytest.mark.parametrize(("d", "options", "expected"), [
+    (-2.0, {}, Pair.LEAVING), (-1.0, {}, Pair.CONTACT), (-2.0, {"push": 1.0}, Pair.CONTACT)])
+def test_a_pair_in_contact_leaves_where_nothing_moves_it(side: Body, d: float, options: dict[str, Any], expected: Pair
+                                                         ) -> None:
+    b = bench(side, 0.01, d, Pair.CONTACT, **options)
+    leave_gliding(b.plant, b.state)
+    assert (b.mode(side), b.mode(other(side)), b.events) == (expected, Pair.OPEN, [])
+
+
+@SIDES
+@pytest.mark.parametrize("mode", [mode for mode in Pair if mode not in (Pair.CONTACT, Pair.LEAVING)])
+def test_only_a_pair_in_contact_leaves(side: Body, mode: Pair) -> None:
+    b = bench(side, 0.01, -2.0, mode)
+    leave_gliding(b.plant, b.state)
+    assert b.mode(side) is mode
 
 
 @pytest.mark.parametrize(("p", "masses", "state"), [

@@ -111,6 +111,21 @@ def test_a_velocity_that_jumps_is_noticed(good: Detail, body: int, name: str) ->
     assert broken(shifted(good, body, 1e-18)) == set()
 
 
+@pytest.mark.parametrize("by", [1e-10, 1e-8, 1e-6, 1e-4, 1e-2, 1.0])
+def test_a_jump_within_a_piece_is_noticed_whether_or_not_a_quadrature_resolves_it(good: Detail, by: float) -> None:
+    k, node = len(good.x) // 2, 8
+    x, v, passed = good.x.copy(), good.v.copy(), good.t - good.t[k, node]
+    v[k, node:, OBJECT] += by
+    v[k + 1 :, :, OBJECT] += by
+    x[k, node:, OBJECT] += by * passed[k, node:]
+    x[k + 1 :, :, OBJECT] += by * passed[k + 1 :]
+    kicked = good._replace(x=x, v=v)
+    (known,) = (entry.resolved[k] for entry in ledgers(kicked) if entry.name == "momentum, object")
+    assert known == (by < 1e-5)
+    (error,) = (entry.error[k] for entry in ledgers(kicked) if entry.name == "momentum, object")
+    assert error > LIMIT
+
+
 def test_a_position_that_jumps_is_noticed(good: Detail) -> None:
     x = good.x.copy()
     x[50:, :, OBJECT] += 1e-12
