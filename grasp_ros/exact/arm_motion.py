@@ -10,9 +10,10 @@ from grasp_ros.exact.collocation import E_NODES, MATRIX, V_NODES, Approach, Begi
 from grasp_ros.exact.elimination import eliminate
 from grasp_ros.exact.impact import elastic_force
 from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.radau import DERIVATIVE, INTEGRAL, NODES, STAGES, times
 from grasp_ros.exact.records import Array, Tables
-from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, Body
+from grasp_ros.physics.layout import DAMPING, FORCE, MASS, OBJECT, STIFFNESS, Body
 
 
 @inlined
@@ -22,10 +23,10 @@ def drives(pair: Approach, h: float, body: Array) -> bool:
 
 
 @inlined
-def by_object(bodies: Array, side: Body, pair: Approach, other: Approach, h: float) -> bool:
+def by_object(bodies: Array, side: Body, pair: Approach, beside: Approach, h: float) -> bool:
     """Whether the motion of the object tells the impact on a heavier arm best; the other one has its digits then."""
     middle = bodies[OBJECT]
-    return bool(bodies[side, MASS] > middle[MASS]) and drives(pair, h, middle) and not drives(other, h, middle)
+    return bool(bodies[side, MASS] > middle[MASS]) and drives(pair, h, middle) and not drives(beside, h, middle)
 
 
 @inlined
@@ -35,32 +36,30 @@ def place_at(f: Array, start: Begin, j: int) -> float:
 
 
 @inlined
-def push_at(f: Array, bodies: Array, side: Body, pair: Approach, other: Approach, start: Begin, j: int) -> float:
-    """Force of a side on the object at a node, N."""
-    if not by_object(bodies, side, pair, other, start.h):
-        return float(pair.sign * impact_at(f, side, pair, start.h, j))
-    middle = bodies[OBJECT]
+def push_of_object(f: Array, middle: Array, side: Body, beside: Approach, start: Begin, j: int) -> float:
+    """Force of a side on the object at a node, N, from the motion of the object and the pair beside."""
     inertia = middle[MASS] / start.h * times(DERIVATIVE, j, f, V_NODES, 0.0)
     own = middle[FORCE] - middle[DAMPING] * (start.v + f[V_NODES + j]) - middle[STIFFNESS] * place_at(f, start, j)
-    return float((inertia - own) - other.sign * impact_at(f, RIGHT if side == LEFT else LEFT, other, start.h, j))
+    return float((inertia - own) - beside.sign * impact_at(f, other(side), beside, start.h, j))
 
 
 @inlined
-def by_forces(bodies: Array, side: Body, pair: Approach, other: Approach, h: float) -> bool:
-    """Whether forces tell the acceleration of an arm better than v_o and u'."""
-    return not pair.stiff or by_object(bodies, side, pair, other, h)
-
-
-@inlined
-def acceleration(f: Array, bodies: Array, side: Body, pair: Approach, other: Approach, start: Begin, j: int) -> float:
-    """Acceleration of an arm at a node, m/s^2; from forces it is without that of its damper."""
-    h, nodes, body = start.h, E_NODES + side * STAGES, bodies[side]
-    if not by_forces(bodies, side, pair, other, h):
-        faster = pair.sign * (pair.rate * times(DERIVATIVE, j, f, nodes, pair.e))
-        return float((times(DERIVATIVE, j, f, V_NODES, 0.0) + faster) / h)
-    x = place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, h, j)
-    push = push_at(f, bodies, side, pair, other, start, j)
+def by_forces(f: Array, bodies: Array, side: Body, pair: Approach, beside: Approach, start: Begin, told: bool, j: int
+              ) -> float:
+    """Acceleration of an arm at a node, m/s^2, without that of its damper; `told` by the object, or by the impact."""
+    body, x = bodies[side], place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, start.h, j)
+    if told:
+        push = push_of_object(f, bodies[OBJECT], side, beside, start, j)
+    else:
+        push = pair.sign * impact_at(f, side, pair, start.h, j)
     return float((body[FORCE] - body[STIFFNESS] * x - push) / body[MASS])
+
+
+@inlined
+def by_pair(f: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
+    """Acceleration of an arm at a node, m/s^2, from v_o and u'."""
+    faster = pair.sign * (pair.rate * times(DERIVATIVE, j, f, E_NODES + side * STAGES, pair.e))
+    return float((times(DERIVATIVE, j, f, V_NODES, 0.0) + faster) / start.h)
 
 
 @kernel
@@ -79,3 +78,19 @@ def damp(tables: Tables, rate: float, v: float, h: float) -> None:
     eliminate(f, MATRIX, STAGES + 1)
     for j in range(STAGES):
         row[j] = f[MATRIX + j * (STAGES + 1) + STAGES]
+
+
+@kernel
+def accelerate(tables: Tables, bodies: Array, side: Body, pair: Approach, beside: Approach, start: Begin, v: float
+               ) -> None:
+    """Write the accelerations of an arm that begins with v to `tables.row`, m/s^2."""
+    f, row, body = tables.f, tables.row, bodies[side]
+    told = by_object(bodies, side, pair, beside, start.h)
+    if pair.stiff and not told:
+        for j in range(STAGES):
+            row[j] = by_pair(f, side, pair, start, j)
+        return
+    for j in range(STAGES):
+        row[j] = by_forces(f, bodies, side, pair, beside, start, told, j)
+    if body[DAMPING] != 0.0:
+        damp(tables, body[DAMPING] / body[MASS], v, start.h)

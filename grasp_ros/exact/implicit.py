@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.arm_motion import acceleration, by_forces, damp
+from grasp_ros.exact.arm_motion import accelerate
 from grasp_ros.exact.collocation import (
     E_NODES,
     SUMS,
@@ -27,13 +27,11 @@ from grasp_ros.exact.records import Output, Plant, Settings, State, Tables
 from grasp_ros.exact.scales import STIFF, relaxation, slow_relaxation
 from grasp_ros.physics.layout import (
     CHECK,
-    DAMPING,
     DISSIPATION,
     EPS,
     HERTZIAN,
     LANES,
     LEFT,
-    MASS,
     RIGHT,
     TIME,
     U_L,
@@ -104,16 +102,13 @@ def write_lane(tables: Tables, lane: int, begin: float, h: float, rate: float) -
 
 
 @kernel
-def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, other: Approach, start: Begin
+def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, beside: Approach, start: Begin
                ) -> float:
     """Write the lanes of an arm from the nodes; returns the error of u', relative to what is allowed of 1."""
-    f, row, h, body = tables.f, tables.row, start.h, plant.bodies[side]
+    f, row, h = tables.f, tables.row, start.h
     nodes, largest = E_NODES + side * STAGES, 0.0
     v = V_L if side == LEFT else V_R
-    for j in range(STAGES):
-        row[j] = acceleration(f, plant.bodies, side, pair, other, start, j)
-    if body[DAMPING] != 0.0 and by_forces(plant.bodies, side, pair, other, h):
-        damp(tables, body[DAMPING] / body[MASS], state.y[v], h)
+    accelerate(tables, plant.bodies, side, pair, beside, start, state.y[v])
     write_lane(tables, v, state.y[v], h, 0.0)
     for j in range(STAGES):
         row[j] = pair.rate * (f[nodes + j] - pair.offset)

@@ -116,8 +116,8 @@ def is_quiet(start: Start, plant: Plant, state: State, n: int, left: int, right:
         first = first_of(c, n, lane) if a < 0 else a
         if not (passes_zero(state, side, a) or leads(c, n, lane, first, h, a > 0)):
             return False
-        presses = mode[side] == Pair.CONTACT and a <= 0  # with a > 0 it approaches
-        if (presses or mode[side] == Pair.CLAMPED) and not damped_leads(c, plant, n, side, h):
+        reaches = mode[side] == Pair.CLAMPED or (mode[side] == Pair.CONTACT and a <= 0)  # -1/p; not with a > 0
+        if reaches and not damped_leads(c, plant, n, side, h):
             return False
     return True
 

@@ -654,6 +654,13 @@ def test_an_object_at_rest_that_slips_needs_the_force_that_lets_it(side: Body, s
 
 
 @SIDES
+def test_a_pair_that_glides_leaves_alone(side: Body) -> None:
+    b = bench(side, 0.01, -2.0, Pair.CONTACT)
+    let_leave(b.plant, b.state, b.settings)
+    assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.LEAVING, Pair.OPEN, [])
+
+
+@SIDES
 def test_a_pair_that_will_turn_back_does_not_leave(side: Body) -> None:
     """20 u |u''| beside u'^2: a push that turns it before u = 0 keeps it in contact."""
     assert together(side, 0.5, -1e-4, (0.5, -1e-4)) == LEAVING
