@@ -120,6 +120,15 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
 
 
 @inlined
+def may_be_damped(plant: Plant, fall: float, size: float, t: float) -> bool:
+    """Whether the damper of one body can take a fall of the energy: what most segments need to know, for less."""
+    arm, body, far = plant.given[LEFT], plant.given[OBJECT], plant.given[RIGHT]
+    most = 2.0 * t * size
+    return bool(fall * arm[MASS] <= most * arm[DAMPING] or fall * far[MASS] <= most * far[DAMPING]
+                or fall * body[MASS] <= most * body[DAMPING])
+
+
+@inlined
 def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
     """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
 
@@ -157,4 +166,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     rounding += jump(plant, state.y, LEFT, before.left, t) + jump(plant, state.y, RIGHT, before.right, t)
     if rise > rounding:
         return Outcome.ENERGY_RISES
-    return Outcome.ENERGY_FALLS if -rise > rounding + losses(plant, before, modes, size, t) else Outcome.GO_ON
+    fall = -rise - rounding
+    if fall <= 0.0 or may_be_damped(plant, fall, size, t) or fall <= losses(plant, before, modes, size, t):
+        return Outcome.GO_ON
+    return Outcome.ENERGY_FALLS
