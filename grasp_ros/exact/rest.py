@@ -201,7 +201,7 @@ def parts(plant: Plant, y: Array, side: Body) -> bool:
         return False
     t = y[U_L + side] / -d
     a, jerk = abs(difference(plant, y, side, 2)[0]), abs(difference(plant, y, side, 3)[0])
-    return TURNS * max(t * a, 0.5 * t * (t * jerk)) < -d  # in this order, because squares underflow
+    return bool(TURNS * max(t * a, 0.5 * t * (t * jerk)) < -d)  # in this order, because squares underflow
 
 
 @inlined

@@ -28,6 +28,7 @@ EQUIVALENT: dict[str, str] = {
     **{f"make_transitions: drop {side}.when <= last: {side}.when <= last and {side}.what == Transition.CLAMP and"
        f" glides(plant, state, {side.upper()})": "it is asked again below; here it spares the price"
        for side in ("left", "right")},
+    "parts: delete branch: if not d < 0.0:": "at u' >= 0 the comparison below is false; here it spares two differences",
     "settle_resting: delete branch: if not (waits_l or waits_r):": "without a pair that waits nothing changes",
 }
 

@@ -24,6 +24,7 @@ from grasp_ros.exact.rest import (
     is_overtaken,
     leaning,
     parting_time,
+    parts,
     time_of_impulse,
     turn_back,
 )
@@ -395,3 +396,17 @@ def test_only_a_pair_that_leaves_is_turned_back(side: Body, mode: Pair) -> None:
     turn_back(b.state, side)
     assert b.mode(side) is Pair.LEAVING
     assert b.mode(other(side)) is (Pair.CONTACT if mode is Pair.LEAVING else mode)
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "options", "expected"), [
+    (0.01, -1.0, {}, True), (0.0, -1.0, {}, True), (0.01, 1.0, {"push": 9.0}, False), (0.01, 0.0, {}, False),
+    (0.01, -1.0, {"push": 4.9}, True), (0.01, -1.0, {"push": 5.1}, False),  # 20 u |u''| beside u'^2
+    (0.01, -1.0, {"stiffness": 9e2, "push": 9.0}, True),  # 10 (u / u')^2 k: of u''' alone
+    (0.01, -1.0, {"stiffness": 1.1e3, "push": 11.0}, False),
+])
+def test_a_pair_parts_where_nothing_but_its_force_can_turn_it_back(
+    side: Body, u: float, d: float, options: dict[str, float], expected: bool
+) -> None:
+    b = bench(side, u, d, Pair.CONTACT, **options)  # type: ignore[arg-type]
+    assert parts(b.plant, b.state.y, side) is expected
