@@ -17,16 +17,26 @@ from grasp_ros.physics.layout import DAMPING, FORCE, MASS, OBJECT, STIFFNESS, Bo
 
 
 @inlined
-def drives(pair: Approach, h: float, body: Array) -> bool:
-    """Whether an impact moves a body as u' asks, so that its force has lost its digits."""
-    return bool(h * pair.share * elastic_force(pair.hertzian, max(pair.u, 0.0)) > pair.rate * body[MASS])
+def grip(pair: Approach, h: float) -> float:
+    """The mass, in kg, that an impact moves within the step as u' asks; of what is lighter it has lost the motion."""
+    return float(h * pair.share * elastic_force(pair.hertzian, max(pair.u, 0.0)) / pair.rate)
 
 
 @inlined
-def by_object(bodies: Array, side: Body, pair: Approach, beside: Approach, h: float) -> bool:
-    """Whether the motion of the object tells the impact on a heavier arm best; the other one has its digits then."""
-    middle = bodies[OBJECT]
-    return bool(bodies[side, MASS] > middle[MASS]) and drives(pair, h, middle) and not drives(beside, h, middle)
+def speed(pair: Approach, start: Begin) -> float:
+    """What roundings of u' are relative to, m/s."""
+    return max(pair.rate * max(abs(pair.e - pair.offset), pair.offset), abs(start.v))
+
+
+@inlined
+def by_object(bodies: Array, side: Body, pair: Approach, beside: Approach, start: Begin) -> bool:
+    """Whether the motion of the object tells the impact on a heavier arm best: that of the other pair has its digits.
+
+    Its roundings give the object no more speed than those of u' have.
+    """
+    mass, h = bodies[OBJECT, MASS], start.h
+    known = grip(beside, h) * speed(beside, start) <= mass * speed(pair, start)
+    return bool(bodies[side, MASS] > mass and grip(pair, h) > mass and known)
 
 
 @inlined
@@ -85,7 +95,7 @@ def accelerate(tables: Tables, bodies: Array, side: Body, pair: Approach, beside
                ) -> None:
     """Write the accelerations of an arm that begins with v to `tables.row`, m/s^2."""
     f, row, body = tables.f, tables.row, bodies[side]
-    told = by_object(bodies, side, pair, beside, start.h)
+    told = by_object(bodies, side, pair, beside, start)
     if pair.stiff and not told:
         for j in range(STAGES):
             row[j] = by_pair(f, side, pair, start, j)

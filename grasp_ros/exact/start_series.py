@@ -117,17 +117,38 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
         if slips and abs(a_o) * plant.bodies[OBJECT, MASS] <= doubt:
             a_o = 0.0
         c[following + V_O] = share * a_o
-        # Both move alike until u begins; what tells them apart before is rounding, which a strong damper would enlarge.
-        if k + 2 * POWERS < begin_l:
-            c[following + V_L] = c[following + V_O]
-        if k + 2 * POWERS < begin_r:
-            c[following + V_R] = c[following + V_O]
+        wait_alike(c, plant, k, k + 2 * POWERS < begin_l, k + 2 * POWERS < begin_r, abs(force_l) + abs(force_r))
         c[following + X_L], c[following + X_R] = share * c[i + V_L], share * c[i + V_R]
         c[following + X_O] = share * c[i + V_O]
         if k + POWERS >= begin_l:
             c[following + U_L] = share * (c[i + V_L] - c[i + V_O])
         if k + POWERS >= begin_r:
             c[following + U_R] = share * (c[i + V_O] - c[i + V_R])
+
+
+@inlined
+def wait_alike(c: Array, plant: Plant, k: int, left: bool, right: bool, force: float) -> None:
+    """Both bodies of a pair move alike until its u begins; what tells them apart is rounding.
+
+    A strong damper would enlarge it. What they have in common is known best from the body whose terms are smaller; if
+    all three move alike, from the object.
+    """
+    i, following = LANES * k, LANES * (k + POWERS)
+    one = 1.0 if k == 0 else 0.0
+    if left != right:
+        v, x, body = (V_L, X_L, plant.bodies[LEFT]) if left else (V_R, X_R, plant.bodies[RIGHT])
+        if sizes(body, one, c[i + x], c[i + v], 0.0) < sizes(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force):
+            c[following + V_O] = c[following + v]
+    if left:
+        c[following + V_L] = c[following + V_O]
+    if right:
+        c[following + V_R] = c[following + V_O]
+
+
+@inlined
+def sizes(body: Array, one: float, x: float, v: float, force: float) -> float:
+    """The sum of the sizes of the terms of `pushed`."""
+    return (abs(one * body[FORCE]) + abs(body[STIFFNESS] * x) + abs(body[DAMPING] * v) + abs(force)) / body[MASS]
 
 
 @kernel

@@ -147,13 +147,17 @@ def _beyond(change: Array, friction: tuple[Array, Array], unit: Array) -> Array:
 
 def _bodies(detail: Detail, pairs: list[Impacts], own: tuple[Array, Array, Array], friction: tuple[Array, Array],
             resolved: tuple[NDArray[np.bool_], NDArray[np.bool_]], present: list[int]) -> Iterator[Ledger]:
-    """Momentum of each body that an impact can push; `own`: that of `_momentum`."""
+    """Momentum of each body that an impact can push; `own`: that of `_momentum`.
+
+    An impact that is over within a rounding of the time pushes what rests in a contact beside it in that time, too.
+    """
     change, scale, held = (part.copy() for part in own)
     for pair in pairs:
         impulse, doubt = detail.integral(pair.force[:, 1:-1])
         noise = _total(detail, pair.by_u) * pair.noise[:, 0] + _total(detail, pair.by_d) * pair.noise_d[:, 0]
         noise = noise + doubt + EPS * (impulse + pair.bounce[:, 0]) + _wander(detail, pair.force)
         noise = noise + EPS * detail.pieces.end * pair.force.max(axis=1) + pair.sudden  # each time is rounded by itself
+        held += pair.sudden[:, None]
         sign = 1.0 if pair.side == LEFT else -1.0
         for body, direction in ((pair.side, sign), (OBJECT, -sign)):
             change[:, body] += direction * impulse
