@@ -19,6 +19,7 @@ from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.quantities import (
     SETTLED,
+    by_output_times,
     impact_forces_of,
     losses,
     rests_at_zero,
@@ -78,7 +79,8 @@ def _amounts(trajectory: Trajectory) -> list[Row]:
     if len(trajectory.t) > 1 and not system.external:
         lost = losses(trajectory)
         parts = [f"{name} {float(value):.4g}" for name, value in lost._asdict().items() if float(value) != 0.0]
-        rows.append(("energy lost, J of V", ", ".join(parts) or "none"))
+        how = "; trapezoidal rule at the output times" if parts and by_output_times(trajectory) else ""
+        rows.append(("energy lost, J of V", (", ".join(parts) or "none") + how))
     return rows
 
 

@@ -127,6 +127,17 @@ def edges_of(run: Trajectory, longest: float) -> Array:
     return np.concatenate([[0.0], *cuts])
 
 
+def is_smooth_between(run: Trajectory, edges: Array) -> bool:
+    """Whether a motion is known to be smooth between edges, those of `edges_of`, and can be integrated there."""
+    located = run.method == EXACT and run.status is Status.DONE and not (run.sampled or run.scene.system.external)
+    return located and len(edges) > 0
+
+
+def by_output_times(run: Trajectory) -> bool:
+    """Whether `losses` are no more exact than the output times are dense; see `running_losses`."""
+    return not is_smooth_between(run, edges_of(run, LONGEST))
+
+
 def running_losses(run: Trajectory, longest: float = LONGEST) -> tuple[Array, Losses]:
     """Energy lost so far by each cause: times (n,), at most `longest` s apart, in s, and arrays (n,) in J of V.
 
@@ -136,8 +147,7 @@ def running_losses(run: Trajectory, longest: float = LONGEST) -> tuple[Array, Lo
     rule.
     """
     system, edges = run.scene.system, edges_of(run, longest)
-    located = run.method == EXACT and run.status is Status.DONE and not (run.sampled or system.external)
-    if not (located and len(edges)):
+    if not is_smooth_between(run, edges):
         lost = power_lost(system, run.state)
         steps = np.diff(run.t)
         sums = [np.concatenate([[0.0], np.cumsum(0.5 * steps * (rate[1:] + rate[:-1]))]) for rate in lost]

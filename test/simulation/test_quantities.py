@@ -11,6 +11,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.quantities import (
+    by_output_times,
     contact_intervals,
     impact_forces_of,
     last_outside,
@@ -60,6 +61,8 @@ def test_a_run_of_too_many_stretches_has_its_output_times() -> None:
     t, lost = running_losses(run)
     assert np.array_equal(t, run.t)
     assert all(len(total) == len(t) for total in lost)
+    assert by_output_times(run)
+    assert not by_output_times(simulate(run.scene, grid=[0.0, 1e3]))
 
 
 def test_what_held_commands_take_is_their_work() -> None:
