@@ -7,8 +7,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.simulation import simulate
 from grasp_ros.verification.found import LIMIT, answer, answers, read, verdict
 
 DIRECTORY = Path(__file__).parent / "found"
@@ -48,3 +51,11 @@ def test_a_wrong_answer_is_seen() -> None:
     right = ANSWERS["touching_chain"]
     moved = [[f"{float(value) * (1 + 1e-9):.20e}" for value in row] for row in right.state]
     assert verdict(SCENES["touching_chain"], right._replace(state=moved)).error > 1e4
+
+
+def test_a_pair_that_leaves_by_a_low_accuracy_is_pushed_back_by_a_new_force() -> None:
+    """At the loosest accuracy both pairs are released before the tick at which their arms are pushed together."""
+    loose = simulate(SCENES["leaving_pushed_gently"], accuracy=1e-3)
+    right = np.array(ANSWERS["leaving_pushed_gently"].state[-1], dtype=float)
+    assert len(loose.times(Transition.RELEASE, LEFT)) == 1
+    assert loose.state[-1] == pytest.approx(right, rel=1e-3, abs=1e-12)
