@@ -20,27 +20,29 @@ from grasp_ros.exact.collocation import (
     collocate,
     motion_of,
 )
-from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.kinematics import approach, reduced_mass
+from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.kinematics import approach, reduced_mass, velocity_lane
 from grasp_ros.exact.radau import DERIVATIVE, FIRST, STAGES, TO_LEGENDRE, TO_POWERS, times
-from grasp_ros.exact.records import Output, Plant, Settings, State, Tables
+from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.scales import STIFF, relaxation, slow_relaxation
 from grasp_ros.physics.layout import (
     CHECK,
+    DAMPING,
     DISSIPATION,
     EPS,
     HERTZIAN,
     LANES,
     LEFT,
+    MASS,
+    OBJECT,
     RIGHT,
+    STIFFNESS,
     TIME,
     U_L,
     V_L,
     V_O,
     V_R,
-    X_L,
     X_O,
-    X_R,
     Body,
     Filled,
     Pair,
@@ -48,7 +50,6 @@ from grasp_ros.physics.layout import (
 )
 
 LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
-PLACE, VELOCITY = 0, 1  # of a body in the state
 FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
 ROUNDINGS = 32.0  # times what is allowed: so much error may be rounding of what a step gains, and go with its length
 JUMP = 8.0  # times as much as the last coefficients weighs what is left of a relaxation at the begin
@@ -146,25 +147,24 @@ def write_lanes(tables: Tables, plant: Plant, state: State, left: Approach, righ
     return max(error, write_side(tables, plant, state, RIGHT, right, left, start))
 
 
-@kernel
-def largest_in_contact(state: State, lane: int) -> float:
-    """The largest size of x or v of the object and of the arms that push it; the others fly as they like."""
-    y, largest = state.y, abs(state.y[X_O + lane])
-    if state.mode[LEFT] == Pair.CONTACT:
-        largest = max(largest, abs(y[X_L + lane]))
-    if state.mode[RIGHT] == Pair.CONTACT:
-        largest = max(largest, abs(y[X_R + lane]))
-    return largest
+@inlined
+def own_speed(body: Array, x: float, v: float) -> float:
+    """The larger of a body's speed and the one that its spring can give it: it swings, or creeps against its damper."""
+    swing = math.sqrt(body[STIFFNESS] / body[MASS])
+    rate = body[STIFFNESS] / body[DAMPING] if body[DAMPING] * swing > body[STIFFNESS] else swing
+    return max(abs(v), rate * abs(x))
 
 
 @kernel
-def velocity_scale(plant: Plant, state: State, settings: Settings) -> float:
-    """What errors of velocities are relative to, m/s."""
-    scale = math.inf
+def velocity_scale(plant: Plant, state: State) -> float:
+    """What errors of velocities are relative to, m/s: the object and the arms that push it; others fly as they like."""
+    y, slowest, scale = state.y, math.inf, own_speed(plant.bodies[OBJECT], state.y[X_O], state.y[V_O])
     for side in (LEFT, RIGHT):
-        if state.mode[side] == Pair.CONTACT and plant.pairs[side, DISSIPATION] > 0.0:
-            scale = min(scale, 1.0 / plant.pairs[side, DISSIPATION])
-    return max(scale, largest_in_contact(state, VELOCITY), settings.rate * largest_in_contact(state, PLACE))
+        if state.mode[side] == Pair.CONTACT:
+            scale = max(scale, own_speed(plant.bodies[side], y[velocity_lane(side) - 1], y[velocity_lane(side)]))
+            if plant.pairs[side, DISSIPATION] > 0.0:
+                slowest = min(slowest, 1.0 / plant.pairs[side, DISSIPATION])
+    return max(scale, slowest)
 
 
 @kernel
@@ -180,7 +180,7 @@ def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings
     fastest = max(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT))
     slower = slow_relaxation(plant, state)
     creeping = creep_rate(plant, state, LEFT) + creep_rate(plant, state, RIGHT)
-    h, scale = min(span, LENGTH / (settings.rate + creeping)), velocity_scale(plant, state, settings)
+    h, scale = min(span, LENGTH / (settings.rate + creeping)), velocity_scale(plant, state)
     allowed = FINEST + 100.0 * settings.tolerance
     longest = h
     error = before = math.inf
@@ -195,7 +195,7 @@ def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings
         out.work[Work.REJECTED_STEPS] += 1
         shorter = h * min(max(0.7 * error ** (-1.0 / (STAGES - 1)), 0.1), 0.7)
         if error > 0.03 * before or (error == math.inf and h < longest):  # not what the polynomials neglect
-            if error < ROUNDINGS:
+            if error < ROUNDINGS * max(1.0, EPS * abs(tables.f[V_NODES + STAGES - 1]) / (allowed * scale)):
                 shorter = 0.5 * h / error
             elif slower * shorter > LENGTH:
                 shorter = LENGTH / slower

@@ -23,8 +23,9 @@ OPEN; where none differs it is RESTING, and arm and object move together. An obj
 balance what pushes it but for the rounding of its terms (`push_on_object`); stuck it is a wall. This holds
 
 * at the start: for pairs, object, and pairs again, as friction lets them; no events (`initial_modes`, `initial_slide`);
-* at events and between segments: for pairs at rest without force, which an event beside may press (`settle_resting`),
-  for an object that stops, which turns around unrecorded if more than F pushes it, and for one that is stuck;
+* at events and between segments: for pairs at rest without force, which an event beside may press, and contacts that
+  are so young that only rounding moves them (`settle_resting`), for an object that stops, which turns around unrecorded
+  if more than F pushes it, and for one that is stuck;
 * at ticks: for the object, and pairs that are LEAVING or about to begin from rest (`begin_interval`).
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
@@ -39,7 +40,7 @@ from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, velocity_lane
 from grasp_ros.exact.outputs import record
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, is_negligible, leaning, parts, turn_back
+from grasp_ros.exact.rest import NEVER, begins_anew, is_negligible, leaning, parts, turn_back
 from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
 from grasp_ros.physics.layout import (
     EPS,
@@ -118,9 +119,10 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
         apply_friction(plant, mode)
         return
     settle_object(plant, state, out)
-    left, right = mode_at_tick(plant, state, LEFT), mode_at_tick(plant, state, RIGHT)
-    settle(state, LEFT, left, out)
-    settle(state, RIGHT, right, out)
+    for _ in range(2):  # a pair that is pushed back may push the other one back, too
+        left, right = mode_at_tick(plant, state, LEFT), mode_at_tick(plant, state, RIGHT)
+        settle(state, LEFT, left, out)
+        settle(state, RIGHT, right, out)
 
 
 @inlined
@@ -163,8 +165,9 @@ def waits(state: State, side: Body) -> bool:
 
 @inlined
 def settle_resting(plant: Plant, state: State, out: Output) -> None:
-    """Pairs at u = u' = 0 without force: what acts now may press them together, one of them the other, too."""
-    waits_l, waits_r = waits(state, LEFT), waits(state, RIGHT)
+    """Pairs at u = u' = 0: what acts now may press them together, one of them the other, too."""
+    waits_l = waits(state, LEFT) or begins_anew(plant, state, LEFT)
+    waits_r = waits(state, RIGHT) or begins_anew(plant, state, RIGHT)
     if not (waits_l or waits_r):
         return
     for _ in range(2):

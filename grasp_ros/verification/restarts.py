@@ -84,10 +84,13 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     reached[:, ::2] = np.maximum.accumulate(reached[:, ::2].max(axis=1))[:, None]  # in a contact x follows x_o
     pairs = impacts(detail, scale)
     moving = _rows(np.abs(detail.v[pieces]), accelerations(detail, pairs)[pieces])
-    moving[:, ::2] = np.maximum(moving[:, ::2], _put_at_touch(detail, pieces))
+    touched = _touched(detail, pieces)[:, None]  # a rounding of that time moves an arm: it is put where the object is
+    fastest = np.maximum.accumulate(np.abs(detail.v[pieces]).max(axis=2).ravel())[:, None]
+    moving[:, ::2] = np.maximum(moving[:, ::2], np.where(touched, fastest, 0.0))
     unit = grown + EPS * (reached + size) + _late(times, whole, moving) + TINY
     unit += _noise(detail, pairs, pieces, times - start)
-    unit[:, 1::2] += EPS * reached[:, ::2] * rates(detail.bodies[first])[[LEFT, OBJECT, RIGHT]]
+    slowing = np.where(touched, _slowing(detail.bodies[first]), 0.0)  # on the way to a touch that roundings of x shift
+    unit[:, 1::2] += EPS * reached[:, ::2] * (rates(detail.bodies[first]) + slowing)[:, [LEFT, OBJECT, RIGHT]]
     error = (np.abs(again - whole) / unit)[:, there].max(axis=1) / walk(detail.run, 1)
     yield "splitting", float(error[~_beside_event(detail, pieces).ravel()].max(initial=0.0))
 
@@ -100,13 +103,20 @@ def _beside_event(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
     return np.asarray(begins | ends)
 
 
-def _put_at_touch(detail: Detail, pieces: slice) -> Array:
-    """Speeds (n, 1) with which a rounding of the time of a touch moves an arm, which is put where the object is."""
-    fastest = np.maximum.accumulate(np.abs(detail.v[pieces]).max(axis=2).ravel())
+def _touched(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
+    """Which outputs (n,) come after the first touch in these pieces."""
     events = detail.run.event_table
     touches = events[events[:, EVENT_KIND] == Transition.TOUCH, EVENT_TIME]
     first = min(touches[touches > detail.pieces.begin[pieces.start]], default=np.inf)
-    return np.where(detail.t[pieces].ravel() >= first, fastest, 0.0)[:, None]
+    return np.asarray(detail.t[pieces].ravel() >= first)
+
+
+def _slowing(bodies: Array) -> Array:
+    """How fast dampers (3, 4) slow bodies down, and the object that they hit, (3,) in 1/s."""
+    mass = bodies[:, MASS]
+    found: Array = np.where(mass > 0.0, np.abs(bodies[:, DAMPING]) / np.where(mass > 0.0, mass, 1.0), 0.0)
+    found[OBJECT] = found.max()
+    return found
 
 
 def _rows(x: Array, v: Array) -> Array:

@@ -87,7 +87,9 @@ def sizes(detail: Detail) -> Sizes:
     with np.errstate(divide="ignore", invalid="ignore"):
         rest = np.where(stiffness != 0.0, np.abs(force / stiffness), 0.0)
     swing = np.where(stiffness != 0.0, rates(detail.bodies)[:, None] * np.minimum(own + rest, 2.0 * own), np.inf)
-    gained = (np.abs(stiffness) * own + np.abs(force)) / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
+    acting = np.abs(stiffness) * own + np.abs(force)
+    acting[..., OBJECT] += detail.run.scene.system.coulomb
+    gained = acting / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
     v = _before_decay(detail, np.abs(detail.v).max(axis=1), np.where(touching[:, None], taken, 0.0))[:, None]
     way = _with_way(detail, v + np.minimum(swing, gained))
     v = way + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
@@ -150,8 +152,11 @@ def impact_speed(detail: Detail, pairs: list[Impacts]) -> Array:
 
 def push_noise(detail: Detail, pairs: list[Impacts]) -> Array:
     """Speed (k,) in m/s that the roundings of the impacts give to the object from the begin of its segment on."""
-    mass = detail.bodies[:, OBJECT, MASS]
-    found: Array = force_noise(detail, pairs) * elapsed(detail)[:, 0, 0] / np.where(mass > 0.0, mass, 1.0)
+    mass, pieces = detail.bodies[:, OBJECT, MASS], detail.pieces
+    gained = force_noise(detail, pairs) * (pieces.end - pieces.begin) / np.where(mass > 0.0, mass, 1.0)
+    total = np.cumsum(gained)
+    _, first, of = np.unique(pieces.segment, return_index=True, return_inverse=True)
+    found: Array = total - (total - gained)[first[of]]
     return found
 
 

@@ -532,6 +532,14 @@ def test_a_pair_that_glides_goes_on_where_inputs_do_not_move_it(side: Body, d: f
 
 
 @SIDES
+def test_a_pair_that_is_pushed_back_pushes_back_the_other_one(side: Body) -> None:
+    """Both glide, and an input presses only one arm; the object that it pushes comes towards the other one."""
+    glides = (0.01, -2.0)
+    b = begin(bench(side, *glides, Pair.LEAVING, beside=glides, beside_mode=Pair.LEAVING, beside_push=-1.0))
+    assert (b.mode(side), b.mode(other(side)), b.events) == (Pair.CONTACT, Pair.CONTACT, [])
+
+
+@SIDES
 def test_a_stuck_object_slips_when_an_input_exceeds_its_friction(side: Body) -> None:
     b = begin(bench(side, -1.0, 0.0, coulomb=5.0, slide=Slide.STUCK, object_push=6.0))
     assert b.slide is toward(side, Slide.RIGHTWARD)
@@ -573,6 +581,24 @@ def test_only_a_pair_at_rest_without_force_settles(side: Body, u: float, d: floa
     assert b.mode(side) is (Pair.CONTACT if touches else mode)
     assert b.events == ([(side, Transition.TOUCH)] if touches else [])
     assert b.recorded_motion == ([(0.0, 0.0)] if touches else [])
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "options", "anew"), [
+    (1e-17, {}, True), (1e-15, {}, False), (1e-17, {"d": 1e-18}, False), (1e-17, {"mode": Pair.CLAMPED}, False),
+    (1e-17, {"push": 1.001}, False), (1e-17, {"beside": (0.01, 0.1), "beside_mode": Pair.CONTACT}, False),
+    (1e-17, {"beside": (0.01, -2.0), "beside_mode": Pair.CONTACT}, False), (1e-17, {"hertzian": 1e15}, False)])
+def test_a_contact_of_which_only_rounding_is_left_begins_anew(side: Body, u: float, options: dict[str, Any],
+                                                              anew: bool) -> None:
+    """Arm and object fall side by side, 1 m away from 0, with u below or above the rounding of that."""
+    how = {"d": 0.0, "mode": Pair.CONTACT, "push": 1.0, "object_push": 1.0, **options}
+    hertzian = how.pop("hertzian", 1e4)
+    b = bench(side, u, **how)
+    b.plant.pairs[side, HERTZIAN] = hertzian
+    b.state.y[[velocity_lane(side) - 1, X_O]] = 1.0 + u, 1.0
+    settle_resting(b.plant, b.state, b.out)
+    assert b.events == ([(side, Transition.RELEASE)] if anew else [])
+    assert (b.mode(side), b.state.y[U_L + side]) == ((Pair.RESTING, 0.0) if anew else (how["mode"], u))
 
 
 @SIDES
