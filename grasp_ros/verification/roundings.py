@@ -39,7 +39,7 @@ class Impacts(NamedTuple):
     noise: Array  # of u by rounding of the positions, m
     noise_d: Array  # of u', m/s
     bounce: Array  # (k, 1): mu times the speed of an impact of the segment's energy, kg m/s
-    sudden: Array  # (k,): of that, what the pair exchanges within a rounding of the time at a touch
+    sudden: Array  # (k,) N s, what the pair exchanges within a rounding of the time at a touch
 
 
 def walk(run: Trajectory, parts: int) -> float:
@@ -202,6 +202,8 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     bounce = mu[:, None] * np.sqrt(largest_in_segment(detail, speed2))[:, None]
     after = (detail.pieces.kind[1:] & FIRST > 0)[:, None]  # the state at an event has the roundings of the way to it
     bounce[1:] = np.where(after, np.maximum(bounce[1:], bounce[:-1]), bounce[1:])
-    reached = np.minimum(bounce[:, 0], late * impact_force(contact, late * fastest, fastest))
+    caught = masses[0] * fastest if len(detail.run.scene.system.contacts) > 1 else 0.0  # by the other arm
+    most = np.maximum(bounce[:, 0], caught)
+    reached = np.minimum(most, late * impact_force(contact, late * fastest, fastest))
     sudden = np.where(detail.pieces.kind != INNER, reached, 0.0)
     return Impacts(side, u, d, force, by_u, by_d, loss, noise, noise_d, bounce, sudden)
