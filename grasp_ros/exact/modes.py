@@ -23,10 +23,10 @@ OPEN; where none differs it is RESTING, and arm and object move together. An obj
 balance what pushes it but for the rounding of its terms (`push_on_object`); stuck it is a wall. This holds
 
 * at the start: for pairs, object, and pairs again, as friction lets them; no events (`initial_modes`, `initial_slide`);
-* at events and between segments: for pairs at rest without force, which an event beside may press, and contacts that
-  are so young that only rounding moves them (`settle_resting`), for an object that stops, which turns around unrecorded
-  if more than F pushes it, and for one that is stuck;
-* at ticks: for the object, and pairs that are LEAVING or about to begin from rest (`begin_interval`).
+* at events, at ticks and between segments: for pairs at rest, without force or about to begin, which what happens
+  beside them may press or let go, and contacts that are so young that only rounding moves them (`settle_resting`);
+* at events: for an object that stops, which turns around unrecorded if more than F pushes it, and for a stuck one;
+* at ticks: for the object, and pairs that are LEAVING (`begin_interval`).
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
 one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse, unless an
@@ -127,10 +127,10 @@ def begin_interval(plant: Plant, state: State, out: Output) -> None:
 
 @inlined
 def mode_at_tick(plant: Plant, state: State, side: Body) -> Pair:
-    """Mode of a pair under new inputs: anew, if it is about to begin from rest, or leaves and something moves it."""
+    """Mode of a pair under new inputs: anew, if it leaves and something moves it; at rest, `settle_resting` decides."""
     mode = state.mode[side]
     leaves = mode == Pair.LEAVING and not has_glided(plant, state, side, DRIFT)
-    return mode_of(plant, state, side) if leaves or (mode == Pair.CONTACT and is_resting(state.y, side)) else mode
+    return mode_of(plant, state, side) if leaves else mode
 
 
 # Rules between segments.
@@ -159,8 +159,8 @@ def settle(state: State, side: Body, following: Pair, out: Output) -> None:
 
 @inlined
 def waits(state: State, side: Body) -> bool:
-    """Whether a pair without force is at u = u' = 0."""
-    return state.mode[side] in (Pair.OPEN, Pair.RESTING) and is_resting(state.y, side)
+    """Whether a pair is at u = u' = 0: without force, or about to begin beside one that may have begun anew."""
+    return state.mode[side] in (Pair.OPEN, Pair.RESTING, Pair.CONTACT) and is_resting(state.y, side)
 
 
 @inlined

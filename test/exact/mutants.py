@@ -22,8 +22,6 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 ROOM = "grasp_ros.exact"
 MODULES = ("modes", "rest", "surface")
 EQUIVALENT: dict[str, str] = {
-    "mode_at_tick: drop mode == Pair.CONTACT: mode == Pair.CONTACT and is_resting(state.y, side)":
-        "`settle_resting` does the same before the first segment",
     "impact_beside: drop u <= 0.0: state.mode[beside] != Pair.CONTACT or u <= 0.0": "at u = 0 all terms are 0",
     **{f"make_transitions: drop {side}.when <= last: {side}.when <= last and {side}.what == Transition.CLAMP and"
        f" glides(plant, state, {side.upper()})": "it is asked again below; here it spares the price"

@@ -597,6 +597,17 @@ def test_a_contact_of_which_only_rounding_is_left_rests(side: Body, u: float, an
 
 
 @SIDES
+def test_a_contact_about_to_begin_rests_where_the_push_beside_begins_anew(side: Body) -> None:
+    """All fall side by side, 1 m away from 0: what pressed this pair from rest is rounding, and put back to u = 0."""
+    b = bench(side, 0.0, 0.0, Pair.CONTACT, push=1.0, object_push=1.0, beside=(1e-17, 0.0), beside_mode=Pair.CONTACT,
+              beside_push=1.0)
+    b.state.y[[velocity_lane(side) - 1, X_O, velocity_lane(other(side)) - 1]] = 1.0
+    settle_resting(b.plant, b.state, b.out)
+    assert (b.mode(side), b.mode(other(side))) == (Pair.RESTING, Pair.RESTING)
+    assert sorted(b.events) == [(LEFT, Transition.RELEASE), (RIGHT, Transition.RELEASE)]
+
+
+@SIDES
 @pytest.mark.parametrize(("u", "d", "rests"), [(0.0, 0.0, True), (0.0, 1e-300, False), (-1e-300, 0.0, False)])
 def test_a_pair_at_rest_is_one_at_zero_without_speed(side: Body, u: float, d: float, rests: bool) -> None:
     assert is_resting(bench(side, u, d).state.y, side) == rests
