@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.impact_law import stored_energy
+from grasp_ros.physics.impact_law import elastic_force, stored_energy
 from grasp_ros.physics.layout import DISSIPATION, EPS, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.verification.roundings import (
@@ -49,7 +49,7 @@ class Ledger(NamedTuple):
 
 def _total(detail: Detail, values: Array) -> Array:
     """Integral of the size of values (k, n + 2, ...)."""
-    return detail.integral(np.abs(values[:, 1:-1]))[0]
+    return detail.total(np.abs(values[:, 1:-1]))
 
 
 def _wander(detail: Detail, values: Array) -> Array:
@@ -230,7 +230,7 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
         stored = stored_energy(hertzian, deep)
         level = level + stored[:, 1] - stored[:, 0]
         taken = taken + pair.loss
-        elastic = hertzian * np.maximum(pair.u, 0.0) ** 1.5
+        elastic = elastic_force(hertzian, np.maximum(pair.u, 0.0))
         unit = unit + stored.max(axis=1) + (elastic.max(axis=1) * pair.noise[:, 0] / EPS)
         unit = unit + pair.bounce[:, 0] * np.abs(pair.d).max(axis=1)
         unit = unit + _loss_noise(detail, pair)

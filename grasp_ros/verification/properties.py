@@ -168,8 +168,9 @@ def _held(run: Trajectory) -> float:
 
 def _balances(close: Detail, product: Product) -> Iterator[Check]:
     """Equations of motion and energy; where they fail, those of shorter pieces count."""
-    found = {ledger.name: ledger.error for ledger in ledgers(close)}
-    skipped = {ledger.name: int(np.count_nonzero(~ledger.resolved)) for ledger in ledgers(close)}
+    books = list(ledgers(close))
+    found = {ledger.name: ledger.error for ledger in books}
+    skipped = {ledger.name: int(np.count_nonzero(~ledger.resolved)) for ledger in books}
     fails = np.logical_or.reduce([~(error <= LIMIT) for error in found.values()])
     if fails.any():
         shorter, first = cut(close.pieces, fails)

@@ -103,11 +103,13 @@ def _before_decay(detail: Detail, v: Array, taken: Array) -> Array:
     by the dissipation of what is pressed.
     """
     pieces, mass, found = detail.pieces, detail.bodies[..., MASS], v.copy()
-    passed = elapsed(detail)[:, 0]
-    for k, body in np.argwhere(taken * passed > mass).tolist():
-        since = pieces.begin[k] - STEP * mass[k, body] / taken[k, body]
-        earlier = slice(np.searchsorted(pieces.end, since), k + 1)
-        found[k, body] = (v[earlier, body] * (pieces.segment[earlier] == pieces.segment[k])).max()
+    damped = taken * elapsed(detail)[:, 0] > mass
+    for body in np.flatnonzero(damped.any(axis=0)).tolist():
+        last = np.flatnonzero(damped[:, body])
+        since = pieces.begin[last] - STEP * mass[last, body] / taken[last, body]
+        first = np.maximum(np.searchsorted(pieces.end, since), np.searchsorted(pieces.segment, pieces.segment[last]))
+        spans = np.column_stack([first, last + 1]).ravel()  # `reduceat` wants a number behind the last
+        found[last, body] = np.maximum.reduceat(np.append(v[:, body], 0.0), spans)[::2]
     return found
 
 
@@ -190,10 +192,10 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     noise_d = EPS * (size.v[..., side] + size.v[..., OBJECT])
     deep, damped = np.maximum(u, 0.0), 1.0 + contact.dissipation * d
     near, doubt = np.maximum(u + noise, 0.0), contact.dissipation * noise_d + 2.0 * EPS  # of 1 + p u'
-    by_u = 1.5 * contact.hertzian * np.sqrt(near) * (np.maximum(damped, 0.0) + doubt)
-    by_d = np.where(damped >= -doubt, contact.dissipation * contact.hertzian * near**1.5, 0.0)
-    released = contact.hertzian * deep**1.5 * -d
-    loss = np.where(damped >= 0.0, contact.dissipation * contact.hertzian * deep**1.5 * d * d, released)
+    slope, elastic = contact.hertzian * np.sqrt(near), contact.hertzian * (deep * np.sqrt(deep))
+    by_u = 1.5 * slope * (np.maximum(damped, 0.0) + doubt)
+    by_d = np.where(damped >= -doubt, contact.dissipation * near * slope, 0.0)
+    loss = np.where(damped >= 0.0, contact.dissipation * elastic * d * d, elastic * -d)
     masses = detail.bodies[:, side, MASS], detail.bodies[:, OBJECT, MASS]
     mu = masses[0] * masses[1] / (masses[0] + masses[1])
     late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)

@@ -51,7 +51,7 @@ class Detail(NamedTuple):
 
     run: Trajectory
     pieces: Pieces
-    rule: Rule
+    weights: Array  # (3, k, n) s: of the rule in each piece, and of the two coarse ones
     t: Array  # (k, n + 2) s
     x: Array  # (k, n + 2, 3) m
     v: Array  # (k, n + 2, 3) m/s
@@ -62,13 +62,18 @@ class Detail(NamedTuple):
 
         That is the larger of two differences: where the nodes are too few for a motion one may vanish by chance.
         """
-        fine, *coarse = (self._sum(table, values) for table in (self.rule.weights, *self.rule.coarse))
+        fine, *coarse = (_sums(table, values) for table in self.weights)
         return fine, np.maximum(*(np.abs(fine - other) for other in coarse))
 
-    def _sum(self, table: Array, values: Array) -> Array:
-        length = self.pieces.end - self.pieces.begin
-        found: Array = np.einsum("kn,kn...->k...", table[self.pieces.kind] * length[:, None], values)
-        return found
+    def total(self, values: Array) -> Array:
+        """The integrals alone."""
+        return _sums(self.weights[0], values)
+
+
+def _sums(weights: Array, values: Array) -> Array:
+    """Sums (k, ...) of values (k, n, ...) by weights (k, n)."""
+    found: Array = np.einsum("kn,kn...->k...", weights, values)
+    return found
 
 
 @cache
@@ -162,4 +167,5 @@ def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
         ticks = tick_of(run.scene, 0.5 * (pieces.begin + pieces.end)).tolist()
         acting[..., FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
     places = np.array(PLACES)
-    return Detail(run, pieces, table, grid, states[..., places], states[..., places + 1], acting)
+    weights = np.array([table.weights, *table.coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
+    return Detail(run, pieces, weights, grid, states[..., places], states[..., places + 1], acting)
