@@ -40,7 +40,7 @@ from grasp_ros.physics.layout import (
 )
 
 NOTHING = 2.0**-72  # of a way: below its roundings long before
-TURNS = 20.0  # times what u' may change on the way to u = 0
+TURNS, CLAMPS = 20.0, 4.0  # times what u' may change on the way to u = 0: both terms, and those behind them
 LOWEST, HIGHEST = 2, 6  # derivatives
 ROUNDINGS = 4.0  # of 1 + p u'
 DOUBT = 64.0 * EPS  # of the sum of the terms of a derivative
@@ -196,13 +196,15 @@ def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> 
 
 @kernel
 def parts(plant: Plant, y: Array, side: Body) -> bool:
-    """Whether a pair separates, and nothing but its force can turn it back before u = 0."""
-    d = approach(y, side)
+    """Whether a pair separates, and nothing but its force can turn it back, or take u' to -1/p, before u = 0."""
+    d, loss = approach(y, side), plant.pairs[side, DISSIPATION]
     if not d < 0.0:
         return False
     t = y[U_L + side] / -d
     a, jerk = abs(difference(plant, y, side, 2)[0]), abs(difference(plant, y, side, 3)[0])
-    return bool(TURNS * max(t * a, 0.5 * t * (t * jerk)) < -d)  # in this order, because squares underflow
+    change = max(t * a, 0.5 * t * (t * jerk))  # in this order, because squares underflow
+    clamps = 0.0 < surface_factor(plant, y, side, ROUNDINGS) < CLAMPS * loss * change
+    return bool(TURNS * change < -d and not clamps)
 
 
 @kernel

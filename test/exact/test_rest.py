@@ -406,6 +406,10 @@ def test_only_a_pair_that_leaves_is_turned_back(side: Body, mode: Pair) -> None:
     (0.01, -1.0, {"push": 4.9}, True), (0.01, -1.0, {"push": 5.1}, False),  # 20 u |u''| beside u'^2
     (0.01, -1.0, {"stiffness": 9e2, "push": 9.0}, True),  # 10 (u / u')^2 k: of u''' alone
     (0.01, -1.0, {"stiffness": 1.1e3, "push": 11.0}, False),
+    (0.01, -1.9, {"push": -4.0}, True), (0.01, -1.9, {"push": -5.0}, False),  # 4 u |u''| / u' up to u' = -2 = -1/p
+    (0.01, -1.9, {"push": -4.0, "p": 0.52}, False), (0.01, -1.9, {"p": 0.52}, True),
+    (0.01, -2.0, {"push": -4.0}, True), (0.01, -2.1, {"push": -4.0}, True),  # there, or beyond
+    (0.01, -1.9, {"push": -4.0, "p": 0.0}, True),
 ])
 def test_a_pair_parts_where_nothing_but_its_force_can_turn_it_back(
     side: Body, u: float, d: float, options: dict[str, float], expected: bool
