@@ -29,8 +29,8 @@ balance what pushes it but for the rounding of its terms (`push_on_object`); stu
 * at ticks: for the object, and pairs that are LEAVING (`begin_interval`).
 
 What closes or opens a pair during a run is recorded as TOUCH or RELEASE, a slip as SLIP. Both pairs about to part at
-one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse, unless an
-object at rest slips by it; so does a pair whose force has died out at u' = -1/p, off which nothing moves it.
+one instant, where w_l w_r = 0 stops the regularised time, go LEAVING, without the rest of their impulse, unless one
+clamps before, or an object at rest slips by it; so does a pair whose force has died out at a u' = -1/p that it keeps.
 """
 
 from __future__ import annotations
