@@ -91,7 +91,7 @@ def _add_loop(draw: Draw, sections: dict[str, dict[str, Any]], seconds: float) -
 
 def _add_effects(draw: Draw, sections: dict[str, dict[str, Any]], acceleration: float) -> None:
     """Friction, tilt, a pulse, set-points and constant forces of the usual size, and sides that are not there."""
-    weight = sections["object"]["mass_kg"] * acceleration
+    weight = min(sections["object"]["mass_kg"] * acceleration, 1e11)  # ten of them are a force that a scene allows
     if draw.chance(0.4):
         sections["object_friction"] = {"coulomb_N": weight * draw.decades(-4.0, 1.0),
                                        "viscous_Ns_per_m": weight * draw.decades(-5.0, 0.0, zero=0.5)}

@@ -132,6 +132,12 @@ def test_elastic_motion_runs_backwards(hertzian: float, mass: float, v_l: float,
     assert reversal(scene, Product()) < 1e-9
 
 
+@pytest.mark.parametrize(("seed", "number"), [(17400, 291382), (17500, 350067)])
+def test_the_friction_of_a_heavy_object_is_one_that_a_scene_allows(seed: int, number: int) -> None:
+    """One draw in 300,000 ended the search."""
+    assert 1e11 < fuzz.draw(seed, number).system.coulomb <= 1e12
+
+
 def test_fuzzing_counts_failures_and_writes_their_scenes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
