@@ -5,10 +5,13 @@ from __future__ import annotations
 import copy
 from typing import Any
 
+import numpy as np
 import yaml
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
 from grasp_ros.scene import Scene, load
+from grasp_ros.simulation import simulate
 
 BASE: dict[str, Any] = yaml.safe_load(load("case_01").to_yaml())
 
@@ -41,3 +44,12 @@ def case_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001,
 def horizon(name: str, seconds: float, *settings: str) -> Scene:
     """A scene over another time."""
     return scenes.load(name, [f"time.duration_s={seconds}", *settings])
+
+
+def stalling() -> float:
+    """A coarse setting at which scipy's DOP853 stalls on case 2, within 20 s; last bits say which one does."""
+    scene = horizon("case_02", 20.0)
+    for setting in np.geomspace(3e-4, 3e-5, 60).tolist():
+        if simulate(scene, method="dop853_events", setting=setting).status is Status.STALLED:
+            return float(setting)
+    raise AssertionError("none of 60 settings stalls")

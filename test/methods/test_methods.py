@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import horizon
+from documents import horizon, stalling
 from oracles import ELASTIC, STANDARD, impact, make_grasp, reduced_mass
 
 from grasp_ros import scene as scenes
@@ -98,7 +98,7 @@ def test_jacobian_is_the_derivative_of_the_right_hand_side() -> None:
 
 def test_a_coarse_method_misses_contacts_and_does_not_hide_it() -> None:
     """Order 8 with events reports success on case 2 with most of the 54 touches missed."""
-    motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=1e-5)
+    motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=1e-3)
     found = sum(len(motion.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     assert motion.status is Status.DONE
     assert 0 < found < 54
@@ -171,7 +171,7 @@ def test_elastic_arm_keeps_its_period() -> None:
 
 
 def test_events_without_progress_end_with_a_status() -> None:
-    """scipy at 1e-4 on case 2: a touch and a release at the same instant, for ever."""
-    motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=1e-4)
+    """scipy on case 2: a touch and a release at the same instant, for ever."""
+    motion = simulate(horizon("case_02", 20.0), method="dop853_events", setting=stalling())
     assert motion.status is Status.STALLED
     assert motion.t[-1] < 20.0
