@@ -140,7 +140,7 @@ def deliver(tables: Tables, step: Step, s: float, t: float, how: tuple[Placing, 
     tau = due(state, out)
     while tau < t:
         row = out.rows[out.filled[Filled.OUTPUTS]]
-        values_and_ways(tables.c, step.order, invert_time(tables, step, tau, s, t), at)
+        values_and_ways(tables.c, step.order.number, invert_time(tables, step, tau, s, t), at)
         write_state(at, penetration(at[Z_L], step.left), penetration(at[Z_R], step.right), row)
         place_beside(at, how, free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
@@ -154,7 +154,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     c, at, y, mode = tables.c, tables.at, state.y, state.mode
     span = within_decay(plant, mode, span)
     step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
-    n = step.order
+    n = step.order.number
     h = accepted_length(tables, step, h, settings, out.work)
     left = pair_candidate(tables, plant, state, n, LEFT, h, out.work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)

@@ -134,7 +134,7 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
     bisection: its error is cubed each time, or squared where u' is little more than rounding or a pair grows, so a
     correction of 1e-8 is the last one needed. It starts from the parabola through both ends.
     """
-    c, at, n, unit = tables.c, tables.at, step.order, step.unit
+    c, at, n, unit = tables.c, tables.at, step.order.number, step.unit
     slope = c[LANES + TIME]
     bend = (total - slope * high) / (high * high)
     s = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))

@@ -38,12 +38,19 @@ class State(NamedTuple):
     clock: Array  # (3,) time since the begin of the interval, what its roundings left out, and that begin, s
 
 
+class Order(NamedTuple):
+    """Where a Taylor series ends."""
+
+    number: int  # of its last term
+    first: float  # tolerance^(1 / (number + 1)): where the first neglected term of a series with radius 1 reaches it
+
+
 class Settings(NamedTuple):
     """What the accuracy of a run rests on."""
 
     tolerance: float  # first neglected Taylor term, relative to the impact
-    order: int  # of the Taylor series, unless a step is short
-    first: float  # of a step of that order, see `Step`
+    one: Order  # of a step with one pair in contact, unless the step is short
+    both: Order  # of one with both
     rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `scales.rate_bound`
 
 
@@ -98,7 +105,7 @@ class Tables(NamedTuple):
     the begin of the step, and CHECK for w w, w_l w_r or the P of `growing`, as far as it is expanded.
     """
 
-    c: Array  # (LANES (order + 1),)
+    c: Array  # (LANES (order + 1),), with the order of `Settings.both`
     f: Array  # (FACTORS (order + 1),)
     at: Array  # (2 LANES,) values of the lanes at some s, and how far they have come
     size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
@@ -112,8 +119,7 @@ NEITHER = -1  # in place of a side
 class Step(NamedTuple):
     """A Taylor step: what its series stand for."""
 
-    order: int
-    first: float  # tolerance^(1 / (order + 1)): where the first neglected term of a series with radius 1 reaches it
+    order: Order
     unit: float  # of s, such that the radius of convergence is about 1
     left: bool  # whether the left pair is in contact
     right: bool

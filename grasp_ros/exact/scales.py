@@ -8,6 +8,7 @@ from grasp_ros.exact.bits import near_inverse, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass, relative_motion
+from grasp_ros.exact.orders import RADIUS, lower_order, new_order, order_for
 from grasp_ros.exact.records import NEITHER, Array, Integers, Output, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
@@ -28,8 +29,6 @@ from grasp_ros.physics.layout import (
 
 SHALLOW = 1e-180  # J; powers of less may underflow, and are taken in a unit of length of 2^-400 m
 LONGER, WIDER = 2.0**400, 2.0**200  # by which u and w count more of it
-RADIUS = 0.5  # of convergence of the series of a step, in its units: the least that is usual
-LEAST = 12  # order of a Taylor step
 KNOWN = 2.0**-30  # of the velocities: below it u' is too little of them for a quotient
 YOUNG, LATER = 0.25, 0.75  # parts of both pairs' time and of the other's age that the age of a pair that grows is below
 LEAST_GROWTH, MOST_GROWTH = 0.6, 0.9  # of 1 - 1/n, where u is like t^n: w_l w_r suits n = 1 and 2
@@ -48,9 +47,10 @@ def rate_bound(bodies: Array) -> float:
 
 
 @kernel
-def new_settings(tolerance: float, order: int, given: Array) -> Settings:
-    """What the accuracy of a run rests on."""
-    return Settings(tolerance, order, math.exp(math.log(tolerance) / (order + 1)), rate_bound(given))
+def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
+    """What the accuracy of a run rests on; the workspace holds series of this order."""
+    one, both = new_order(tolerance, lower_order(highest)), new_order(tolerance, highest)
+    return Settings(tolerance, one, both, rate_bound(given))
 
 
 @kernel
@@ -124,19 +124,6 @@ def within_decay(plant: Plant, mode: Integers, span: float) -> float:
 
 
 @inlined
-def order_for(settings: Settings, reach: float) -> tuple[int, float]:
-    """Even order that suffices for a step to a reach in units, at most that of the settings, and its `Step.first`."""
-    part = reach / RADIUS
-    if not part < settings.first:
-        return settings.order, settings.first
-    order = 2 * math.ceil(0.5 * (math.log(settings.tolerance) / math.log(part) - 1.0))
-    order = max(order, LEAST)
-    if order >= settings.order:
-        return settings.order, settings.first
-    return order, math.exp(math.log(settings.tolerance) / (order + 1))
-
-
-@inlined
 def grows(plant: Plant, state: State, side: Body, fastest: float) -> bool:
     """Whether a pair in contact comes from rest beside the other one, and is young; fastest: the rate of both in 1/s.
 
@@ -175,16 +162,17 @@ def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Ste
         w_l, rate_l = turning_rate(plant, state, LEFT)
     if right:
         w_r, rate_r = turning_rate(plant, state, RIGHT)
+    highest = settings.both if left and right else settings.one
     if left and right:
         growing = growing_side(plant, state, w_l, rate_l, w_r, rate_r)
         if growing != NEITHER:
-            return Step(settings.order, settings.first, 1.0, left, right, growing)
+            return Step(highest, 1.0, left, right, growing)
     fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
     unit = near_inverse(fastest) if fastest > 0.0 else 1.0
-    if outlasts(state.y, w_l, w_r, unit, span, RADIUS * settings.first):
-        return Step(settings.order, settings.first, unit, left, right, NEITHER)
-    order, first = order_for(settings, reach_of_span(state, left, right, unit, span))
-    return Step(order, first, unit, left, right, NEITHER)
+    if outlasts(state.y, w_l, w_r, unit, span, RADIUS * highest.first):
+        return Step(highest, unit, left, right, NEITHER)
+    order = order_for(settings.tolerance, highest, reach_of_span(state, left, right, unit, span))
+    return Step(order, unit, left, right, NEITHER)
 
 
 @inlined

@@ -12,12 +12,11 @@ The coefficients are also the dense output, and bounds on them prove where an ev
 With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g (1 + p u'). An order waits only for the newest
 coefficients of the velocities, and they pass through one product; w, u = w^2 and g are known one order ahead.
 
-Source of step size and order: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by
+Source of the step size: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by
 means of high-order Taylor methods, Experimental Mathematics 14 (2005), sections 3.1 and 3.2.
 """
 
 import itertools
-import math
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from grasp_ros.exact.collocation import ROW, WORKSPACE
 from grasp_ros.exact.flight import FLIGHT_ORDER
 from grasp_ros.exact.fused import fma
 from grasp_ros.exact.jit import inlined, kernel
+from grasp_ros.exact.orders import higher_order
 from grasp_ros.exact.records import Array, Lanes, PerMass, Start, Tables
 from grasp_ros.exact.start import ORDER
 from grasp_ros.physics.layout import (
@@ -52,15 +52,6 @@ FACTORS, SECOND = 32, 16  # numbers of one order in the table of factors, and wh
 CACHE_LINE = 64  # bytes
 LARGEST = 960  # binary exponent of a unit
 FIRST, UPPER, ONE, TWO = (np.int64(number) for number in (0, 8, 1, 2))  # typed, or `convolve` is compiled for each
-
-
-def series_order(tolerance: float) -> int:
-    """Order that costs least for a tolerance; even, see `polynomial.values`.
-
-    Jorba and Zou derive -ln(tolerance) / 2 + 1 from a work that grows with the square of the order. Here the work
-    per order is nearly constant, because a product is one short loop over vectors: the measured optimum is higher.
-    """
-    return 2 * math.ceil(-0.4 * math.log(tolerance) + 2.0)
 
 
 @kernel
@@ -236,7 +227,8 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
 
 
 def new_tables(order: int) -> Tables:
-    """Workspace for steps of one order; its tables begin at cache lines, which vector loads want."""
+    """Workspace for steps of this order and of `higher_order`; tables begin at cache lines, which vector loads want."""
+    order = higher_order(order)
     orders, line = max(order, int(FLIGHT_ORDER)) + 1, CACHE_LINE // 8
     ends = list(itertools.accumulate((LANES * orders, max(FACTORS * orders, WORKSPACE), 2 * LANES, ROW)))
     room = np.zeros(ends[-1] + order + 1 + line)

@@ -11,7 +11,7 @@ from grasp_ros.exact.growing import expand_growing
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import own_size, rate_lanes
 from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
-from grasp_ros.exact.records import NEITHER, Array, Integers, Lanes, Plant, Settings, State, Step, Tables
+from grasp_ros.exact.records import NEITHER, Array, Integers, Lanes, Order, Plant, Settings, State, Step, Tables
 from grasp_ros.exact.series import ONE, TWO, expand_both, expand_one, scale_of
 from grasp_ros.physics.layout import (
     CHECK,
@@ -64,11 +64,12 @@ def largest_part(x: Lanes, inverse: Lanes) -> float:
 
 
 @inlined
-def step_size(c: Array, inverse: Lanes, n: int, first: float) -> float:
-    """Step in s / unit at which the first neglected term of a lane is a part of its size; `first`: the part's root.
+def step_size(c: Array, inverse: Lanes, order: Order) -> float:
+    """Step in s / unit at which the first neglected term of a lane is the tolerated part of its size.
 
     The radius of convergence is estimated from the last TAIL coefficients. Where they have vanished it is inf.
     """
+    n = order.number
     last = sizes(c, n)
     if not last[0] + last[1] + last[2] + last[3] + last[5] + last[6] + last[7] < math.inf:
         return 0.0  # the coefficients have left the range of numbers
@@ -77,7 +78,7 @@ def step_size(c: Array, inverse: Lanes, n: int, first: float) -> float:
         largest = largest_part(sizes(c, k), inverse)
         if largest > 0.0:
             growth = max(growth, near_log2(largest) * INVERSE[k])
-    return first * near_exp2(-growth) if growth > -math.inf else math.inf
+    return order.first * near_exp2(-growth) if growth > -math.inf else math.inf
 
 
 @inlined
@@ -96,12 +97,13 @@ def begin_series(tables: Tables, state: State) -> None:
 @inlined
 def expand(tables: Tables, plant: Plant, step: Step) -> None:
     """The series of a step from its order 0."""
+    n = step.order.number
     if step.growing != NEITHER:
-        expand_growing(tables.c, tables.f, plant.bodies, plant.pairs, step.growing, step.unit, step.order)
+        expand_growing(tables.c, tables.f, plant.bodies, plant.pairs, step.growing, step.unit, n)
     elif step.left and step.right:
-        expand_both(tables.c, tables.f, plant.bodies, plant.pairs, step.unit, step.order)
+        expand_both(tables.c, tables.f, plant.bodies, plant.pairs, step.unit, n)
     else:
-        expand_one(tables.c, tables.f, plant.bodies, plant.pairs, LEFT if step.left else RIGHT, step.unit, step.order)
+        expand_one(tables.c, tables.f, plant.bodies, plant.pairs, LEFT if step.left else RIGHT, step.unit, n)
 
 
 @inlined
@@ -145,7 +147,7 @@ def length(tables: Tables, pulled: tuple[float, float, float], step: Step, setti
     z_l = depth_size(c[Z_L], step.left, z_l, t * (v_l + v_o))
     z_r = depth_size(c[Z_R], step.right, z_r, t * (v_o + v_r))
     parts = (inverse(t), inverse(v_l), inverse(x_o), inverse(v_o), 0.0, inverse(v_r), inverse(z_l), inverse(z_r))
-    return step_size(c, parts, step.order, step.first)
+    return step_size(c, parts, step.order)
 
 
 @inlined
@@ -171,12 +173,12 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
         if fits > 0 and (turn == 0 or fits > MOST_FITS or orders_to_one(h, MOST) == 0):
             return step, h
         if h == math.inf:
-            values(tables.c, step.order, 1.0, tables.at)
+            values(tables.c, step.order.number, 1.0, tables.at)
             apart = (step.left and tables.at[Z_L] <= 0.0) or (step.right and tables.at[Z_R] <= 0.0)
             if apart or tables.at[TIME] >= span:
                 return step, 1.0
         unit = step.unit * power_of_two(orders_to_one(h, MOST))
-        step = Step(step.order, step.first, unit, step.left, step.right, step.growing)
+        step = Step(step.order, unit, step.left, step.right, step.growing)
     return step, math.nan
 
 
@@ -211,8 +213,8 @@ def accepted_length(tables: Tables, step: Step, h: float, settings: Settings, wo
     Shortening it costs no new expansion.
     """
     for _ in range(60):
-        values_and_ways(tables.c, step.order, h, tables.at)
-        curvatures(tables.c, step.order, h, tables.size)
+        values_and_ways(tables.c, step.order.number, h, tables.at)
+        curvatures(tables.c, step.order.number, h, tables.size)
         if is_exact(tables, step, h, settings.tolerance):
             return h
         work[Work.REJECTED_STEPS] += 1

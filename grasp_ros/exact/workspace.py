@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from grasp_ros.exact.orders import series_order
 from grasp_ros.exact.records import Array, Tables
-from grasp_ros.exact.series import new_tables, series_order
+from grasp_ros.exact.series import new_tables
 
 EVENT_ROWS = 1024
 _FREE: dict[float, list[tuple[Tables, Array]]] = {}  # by accuracy; what nobody uses

@@ -12,7 +12,8 @@ import numpy as np
 from grasp_ros import simulation
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.series import expand_one, new_tables, series_order
+from grasp_ros.exact.orders import series_order
+from grasp_ros.exact.series import expand_one, new_tables
 from grasp_ros.physics.layout import LANES, LEFT, V_L, Z_L, Z_R, Work
 from grasp_ros.scene import Scene
 

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.orders import higher_order
 from grasp_ros.exact.outputs import SPARE
 from grasp_ros.exact.records import Array, Output, Plant, Settings, State
-from grasp_ros.exact.scales import rate_bound
+from grasp_ros.exact.scales import new_settings
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EVENT_BODY,
@@ -97,7 +98,7 @@ def bench(
     plant = Plant(given, given.copy(), pairs, coulomb)
     out = Output(np.zeros(0), np.zeros((0, 6)), np.zeros((SPARE, 5)), np.zeros(len(Filled), dtype=np.int64),
                  np.zeros(len(Work), dtype=np.int64))
-    settings = Settings(TOLERANCE, ORDER, TOLERANCE ** (1.0 / (ORDER + 1)), rate_bound(given))
+    settings = new_settings(TOLERANCE, higher_order(ORDER), given)
     return Bench(plant, State(y, modes, np.array([time, 0.0, 0.0])), settings, out)
 
 

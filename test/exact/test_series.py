@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
+from grasp_ros.exact.orders import higher_order, lower_order, series_order
 from grasp_ros.exact.polynomial import curvatures, invert_time, lane_range, values
-from grasp_ros.exact.records import NEITHER, Plant, Settings, Start, State, Step, Tables
-from grasp_ros.exact.scales import impact_scales, new_step, rate_bound
-from grasp_ros.exact.series import expand_one, new_tables, series_order
+from grasp_ros.exact.records import NEITHER, Order, Plant, Settings, Start, State, Step, Tables
+from grasp_ros.exact.scales import impact_scales, new_settings, new_step
+from grasp_ros.exact.series import expand_one, new_tables
 from grasp_ros.exact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length, pulls
 from grasp_ros.exact.taylor_step import expand as expand_step
 from grasp_ros.physics.layout import (
@@ -62,7 +63,7 @@ def growing(name: str) -> int:
 
 def step_of(name: str, n: int, unit: float) -> Step:
     """The step of a table of n orders."""
-    return Step(n, 0.0, unit, *sides(name), growing(name))
+    return Step(Order(n, 0.0), unit, *sides(name), growing(name))
 
 
 def new_start(name: str, n: int) -> Tables:
@@ -224,7 +225,8 @@ def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
             tables.c[Z_R if left else Z_L] = START["both"][5 if left else 4]
             expand_one(tables.c, tables.f, BODIES, PAIRS, LEFT if left else RIGHT, 1.0, n)
             start = tables.c[: LANES * (n + 1)].reshape(n + 1, LANES)
-        s = invert_time(tables_of(start), Step(n, 0.0, 1.0, *touching, NEITHER), tau, high, at(start, high)[TIME])
+        step = Step(Order(n, 0.0), 1.0, *touching, NEITHER)
+        s = invert_time(tables_of(start), step, tau, high, at(start, high)[TIME])
         end = at(start, s)
         end[[Z_L, Z_R]] **= np.where(touching, 2, 1)
         ends.append(end[[V_L, X_O, V_O, V_R, Z_L, Z_R]])
@@ -253,8 +255,7 @@ def motion(name: str) -> tuple[Plant, State]:
 
 def settings_of(tolerance: float) -> Settings:
     """What follows from a tolerance."""
-    n = series_order(tolerance)
-    return Settings(tolerance, n, tolerance ** (1.0 / (n + 1)), rate_bound(BODIES))
+    return new_settings(tolerance, higher_order(series_order(tolerance)), BODIES)
 
 
 def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[Tables, Step, float]:
@@ -263,7 +264,7 @@ def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[
     step = new_step(plant, state, settings, np.inf)
     if unit is not None:
         step = step._replace(unit=unit)
-    tables = new_tables(settings.order)
+    tables = new_tables(settings.one.number)
     tables.f[:] = np.nan
     begin_series(tables, state)
     expand_step(tables, plant, step)
@@ -279,7 +280,7 @@ def test_a_step_neglects_little_of_what_moves_in_each_lane(name: str) -> None:
     for tolerance in (1e-4, 1e-8, 1e-12):
         settings = settings_of(tolerance)
         tables, step, h = expanded(name, settings)
-        table = tables.c[: LANES * (settings.order + 1)].reshape(-1, LANES)
+        table = tables.c[: LANES * (step.order.number + 1)].reshape(-1, LANES)
         best = expand(name, 60, unit=step.unit)
         moved = np.abs(best[1:6] * h ** np.arange(1, 6)[:, None]).max(axis=0)
         moved[X_O] = max(moved[X_O], moved[TIME] * moved[V_O])
@@ -309,6 +310,7 @@ def test_a_unit_that_does_not_fit_is_replaced(name: str, orders: int) -> None:
 def test_a_step_that_is_too_long_is_shortened_without_another_expansion(name: str) -> None:
     settings, work = settings_of(1e-16), np.zeros(len(Work), dtype=np.int64)
     tables, step, h = expanded(name, settings)
+    assert step.order == (settings.both if all(sides(name)) else settings.one)
     coefficients = tables.c.copy()
     assert accepted_length(tables, step, h, settings, work) == h
     assert work[Work.REJECTED_STEPS] == 0
@@ -316,7 +318,7 @@ def test_a_step_that_is_too_long_is_shortened_without_another_expansion(name: st
     assert 0.5 * h < shorter < 4.0 * h
     assert work[Work.REJECTED_STEPS] > 0
     assert (tables.c == coefficients).all()
-    table = coefficients[: LANES * (settings.order + 1)].reshape(-1, LANES)
+    table = coefficients[: LANES * (step.order.number + 1)].reshape(-1, LANES)
     assert tables.at[:LANES].tolist() == at(table, shorter).tolist()
 
 
@@ -325,6 +327,11 @@ def test_order_grows_with_the_accuracy() -> None:
     assert orders == sorted(orders)
     assert orders[0] >= 8
     assert orders[-1] <= 40
+    for order in orders:
+        higher = higher_order(order)
+        assert higher % 2 == 0
+        assert 4 * order <= 3 * higher < 4 * order + 6
+        assert lower_order(higher) == order
 
 
 def test_scales_are_those_of_a_hertz_impact() -> None:
@@ -382,11 +389,11 @@ def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -
     y = np.array([u, speed, 0.0, 0.0, -u if both else 1.0, -speed, u, u if both else -1.0])
     state = State(y, np.array([Pair.CONTACT, Pair.CONTACT if both else Pair.OPEN, Slide.FREE]), np.zeros(3))
     plant, settings = Plant(bodies, bodies, pairs, 0.0), settings_of(1e-14)._replace(rate=0.0)
-    step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.order)
+    step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.one.number)
     begin_series(tables, state)
     expand_step(tables, plant, step)
     h = length(tables, pulls(plant, y), step, settings, 1.0)
     assert 0.25 < h < 4.0
     duration = 2.9432751843247047 * depth / speed
-    table = tables.c[: LANES * (settings.order + 1)].reshape(-1, LANES)
+    table = tables.c[: LANES * (step.order.number + 1)].reshape(-1, LANES)
     assert 0.01 * duration < at(table, h)[TIME] < duration

@@ -17,7 +17,8 @@ from oracles import FREE, done, kinds, run
 from grasp_ros.exact.friction import apply_friction
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.modes import initial_modes
-from grasp_ros.exact.records import Array, Settings
+from grasp_ros.exact.records import Array
+from grasp_ros.exact.scales import new_settings
 from grasp_ros.exact.series import new_tables
 from grasp_ros.exact.start import must_start, start_segment
 from grasp_ros.exact.start_scales import holding_time
@@ -102,8 +103,8 @@ def segment(name: str, side: Body, tolerance: float = 1e-16) -> tuple[Bench, Ben
 def start_for(b: Bench, span: float, tolerance: float = 1e-16) -> float:
     """The start segment of at most `span` seconds; its length."""
     assert must_start(b.state)
-    settings = Settings(tolerance, b.settings.order, tolerance ** (1.0 / (b.settings.order + 1)), b.settings.rate)
-    found = float(start_segment(new_tables(b.settings.order), b.plant, b.state, settings, span, b.out))
+    settings = new_settings(tolerance, b.settings.both.number, b.plant.given)._replace(rate=b.settings.rate)
+    found = float(start_segment(new_tables(b.settings.one.number), b.plant, b.state, settings, span, b.out))
     assert [b.state.y[U_L + side] for side, _ in b.events] in ([], [0.0])  # it ends with its first event
     assert b.out.work[Work.CONTACT_STEPS] == 1
     return found
