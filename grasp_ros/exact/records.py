@@ -43,6 +43,7 @@ class Order(NamedTuple):
 
     number: int  # of its last term
     first: float  # tolerance^(1 / (number + 1)): where the first neglected term of a series with radius 1 reaches it
+    early: int  # of a term up to which they must have fallen no slower than up to the last one
 
 
 class Settings(NamedTuple):

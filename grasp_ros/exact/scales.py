@@ -8,7 +8,7 @@ from grasp_ros.exact.bits import near_inverse, power_of_two_root
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass, relative_motion
-from grasp_ros.exact.orders import RADIUS, lower_order, new_order, order_for
+from grasp_ros.exact.orders import LEAST, RADIUS, lower_order, new_order, order_for
 from grasp_ros.exact.records import NEITHER, Array, Integers, Output, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
@@ -49,8 +49,9 @@ def rate_bound(bodies: Array) -> float:
 @kernel
 def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
     """What the accuracy of a run rests on; the workspace holds series of this order."""
-    one, both = new_order(tolerance, lower_order(highest)), new_order(tolerance, highest)
-    return Settings(tolerance, one, both, rate_bound(given))
+    one = lower_order(highest)
+    both = new_order(tolerance, highest, max(lower_order(one), LEAST))
+    return Settings(tolerance, new_order(tolerance, one, one), both, rate_bound(given))
 
 
 @kernel

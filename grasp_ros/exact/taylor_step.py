@@ -64,20 +64,30 @@ def largest_part(x: Lanes, inverse: Lanes) -> float:
 
 
 @inlined
-def step_size(c: Array, inverse: Lanes, order: Order) -> float:
-    """Step in s / unit at which the first neglected term of a lane is the tolerated part of its size.
+def growth_up_to(c: Array, inverse: Lanes, n: int) -> float:
+    """Binary logarithm of the inverse radius of convergence as TAIL coefficients up to n tell; -inf: they vanish."""
+    growth = -math.inf
+    for k in range(n - TAIL + 1, n + 1):
+        largest = largest_part(sizes(c, k), inverse)
+        if largest > 0.0:
+            growth = max(growth, near_log2(largest) * INVERSE[k])
+    return growth
 
-    The radius of convergence is estimated from the last TAIL coefficients. Where they have vanished it is inf.
+
+@inlined
+def step_size(c: Array, inverse: Lanes, order: Order) -> float:
+    """Step in s / unit at which the first neglected term of a lane is the tolerated part of its size, or inf.
+
+    The terms of a high order must fall on the way, too: 52 of an exponential function neglect nothing at eight time
+    constants, but some of them are thousands of times as large as their sum.
     """
     n = order.number
     last = sizes(c, n)
     if not last[0] + last[1] + last[2] + last[3] + last[5] + last[6] + last[7] < math.inf:
         return 0.0  # the coefficients have left the range of numbers
-    growth = -math.inf  # binary logarithm of the inverse radius
-    for k in range(n - TAIL + 1, n + 1):
-        largest = largest_part(sizes(c, k), inverse)
-        if largest > 0.0:
-            growth = max(growth, near_log2(largest) * INVERSE[k])
+    growth = growth_up_to(c, inverse, n)
+    if order.early < n:
+        growth = max(growth, growth_up_to(c, inverse, order.early))
     return order.first * near_exp2(-growth) if growth > -math.inf else math.inf
 
 

@@ -238,9 +238,10 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
     lost, doubt = detail.integral(taken[:, 1:-1])
     late = EPS * detail.pieces.end * power
     unit = EPS * (unit + lost) + late + doubt + _wander(detail, taken) + TINY
-    known = resolved & _resolved(detail, taken, unit)
+    known = resolved & _resolved(detail, taken, unit) & np.isfinite(unit)  # squares may leave the range of numbers
     within = sum(pair.sudden * np.abs(pair.d).max(axis=1) for pair in pairs)  # a rounding of the time
-    return Ledger("energy", np.abs(level + lost) / (unit + np.where(known, 0.0, ALL * (lost + within))), known)
+    error = np.abs(level + lost) / (unit + np.where(known, 0.0, ALL * (lost + within)))
+    return Ledger("energy", np.where(np.isfinite(unit), error, 0.0), known)
 
 
 def _loss_noise(detail: Detail, pair: Impacts) -> Array:
