@@ -99,6 +99,25 @@ def test_a_touching_chain_takes_ten_steps_a_contact(object_mass: float, softer: 
     assert done(result).work[Work.CONTACT_STEPS] <= 20
 
 
+def test_most_drawn_touching_chains_take_ten_steps_a_swing() -> None:
+    """A swing: a maximum of a penetration, or of the object's speed between two arms, of which there are more."""
+    rng, steps = np.random.default_rng(5), []
+    for _ in range(100):
+        m_l, m_o, m_r = 10.0 ** rng.uniform(-1.0, 1.0, 3)
+        contacts = [Contact(10.0 ** rng.uniform(3.0, 7.0), rng.uniform(0.0, 3.0)) for _ in range(2)]
+        grasp = Grasp(FREE._replace(mass=m_l), FREE._replace(mass=m_r), *contacts, m_o)
+        start = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+        result = run(grasp, start, 5.0)
+        states = run(grasp, start, 5.0, np.linspace(0.0, result.integrator.events[-1].time, 4001)).states
+        depths = states[:, 0:4:2] - states[:, 2:6:2]
+        deepest = (depths[1:-1] > depths[:-2]) & (depths[1:-1] >= depths[2:]) & (depths[1:-1] > 0.0)
+        change = np.diff(states[:, 3])
+        turns = np.count_nonzero(np.diff(np.sign(change[np.abs(change) > 1e-13])))
+        steps.append(done(result).work[Work.CONTACT_STEPS] / max(np.count_nonzero(deepest), turns + 1))
+    assert np.median(steps) < 9.0
+    assert np.quantile(steps, 0.9) <= 10.0
+
+
 def test_elastic_symmetric_arm_is_periodic() -> None:
     """O12; the hard cases count the touches and measure the phase."""
     period = float(elastic_period(1, 15, 10_000, "0.3"))
