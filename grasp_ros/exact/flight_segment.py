@@ -44,6 +44,8 @@ from grasp_ros.physics.layout import (
     Work,
 )
 
+TOLD = 2.0**-20  # of a gap
+
 
 @inlined
 def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
@@ -117,17 +119,28 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
 
 
 @inlined
+def places_tell(y: Array, side: Body) -> bool:
+    """Whether the places of a pair say about what its u is: they may be apart by the roundings of a contact."""
+    x, _, sign = arm_of(y, side)
+    return abs(sign * (x - y[X_O]) - y[U_L + side]) <= TOLD * abs(y[U_L + side])
+
+
+@inlined
 def move(flights: Flights, state: State, t: float) -> None:
-    """Move the state on by t s; u has its own digits where a flight is short and the places have no finer ones."""
+    """Move the state on by t s; u has its own digits where a flight is short and the places have no finer ones.
+
+    They never have where they did not tell u at the begin.
+    """
     y = state.y
     u_l, u_r = y[U_L], y[U_R]
+    told_l, told_r = places_tell(y, LEFT), places_tell(y, RIGHT)
     y[X_L], y[V_L], away_l = fly(flights.left, t)
     y[X_R], y[V_R], away_r = fly(flights.right, t)
     y[X_O], y[V_O], away = fly(flights.object, t)
     write_penetrations(y)
-    if not (math.isnan(away_l - away) or abs(y[X_L]) + abs(y[X_O]) < abs(u_l)):
+    if not (math.isnan(away_l - away) or (told_l and abs(y[X_L]) + abs(y[X_O]) < abs(u_l))):
         y[U_L] = u_l + (away_l - away)
-    if not (math.isnan(away - away_r) or abs(y[X_O]) + abs(y[X_R]) < abs(u_r)):
+    if not (math.isnan(away - away_r) or (told_r and abs(y[X_O]) + abs(y[X_R]) < abs(u_r))):
         y[U_R] = u_r + (away - away_r)
     keep_resting(state)
 

@@ -58,6 +58,7 @@ from grasp_ros.physics.layout import (
     Work,
 )
 
+EARLY, AFTER = 0.1, 4.0  # part of a step of which few nodes tell, and parts up to a release in the step after that
 SOON = 1e-3  # of a step: an event so early may hang on a relaxation that the step does not resolve
 NOISY = 1e-3  # part of e at which what is left of a relaxation hides the course of e between the nodes
 
@@ -121,11 +122,18 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
     return slip_candidate(tables, plant, STAGES - 1, 1.0, (rounding, rounding), work)
 
 
+@inlined
+def is_release(candidate: Candidate, s: float) -> bool:
+    """Whether it is a release at s that takes time."""
+    return candidate.what == Transition.RELEASE and candidate.when == s and s > 0.0
+
+
 @kernel
 def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: Output) -> float:
     """The implicit step of h s to its first event, whose transitions it makes, or to its end.
 
-    Returns its time in s; 0 if the search for the first event does not end.
+    Returns its time in s; 0 if the search for the first event does not end, -t if a release at about t is so early
+    that the nodes hardly see the force before it.
     """
     out.work[Work.CONTACT_STEPS] += 1
     c, at, y = tables.c, tables.at, state.y
@@ -138,6 +146,9 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
         wait(out, 4.0)
         return 0.0
     s = min(1.0, left.when, right.when, slide.when)
+    if s < EARLY and (is_release(left, s) or is_release(right, s)):
+        out.work[Work.REJECTED_STEPS] += 1
+        return -s * h
     if s < SOON:
         wait(out, 4.0)
     else:
@@ -183,10 +194,13 @@ def creep(
     out = Output(grid, rows, events, filled, work)
     reached = out.filled[Filled.OUTPUTS]
     before, modes = energy_level(plant, state, 0.0), (mode[LEFT], mode[RIGHT])
-    h = implicit_step(tables, plant, state, settings, until(state.clock, end), out)
-    if h == 0.0:
-        return Outcome.GO_ON
-    t = squeezed_segment(tables, plant, state, h, out)
+    span, t = until(state.clock, end), -1.0
+    while t < 0.0:
+        h = implicit_step(tables, plant, state, settings, span, out)
+        if h == 0.0:
+            return Outcome.GO_ON
+        t = squeezed_segment(tables, plant, state, h, out)
+        span = -AFTER * t
     if t == 0.0:
         return Outcome.GO_ON
     outcome = check_segment(plant, state, settings, before, energy_level(plant, state, t), t, 0, modes)

@@ -13,6 +13,7 @@ import math
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import rate_lanes
 from grasp_ros.exact.records import Array, Plant, Settings, Start
+from grasp_ros.exact.rest import DOUBT
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -117,7 +118,8 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
         if slips and abs(a_o) * plant.bodies[OBJECT, MASS] <= doubt:
             a_o = 0.0
         c[following + V_O] = share * a_o
-        wait_alike(c, plant, k, k + 2 * POWERS < begin_l, k + 2 * POWERS < begin_r, abs(force_l) + abs(force_r))
+        force = abs(force_l) + abs(force_r)
+        wait_alike(c, plant, k, share, k + 2 * POWERS < begin_l, k + 2 * POWERS < begin_r, force)
         c[following + X_L], c[following + X_R] = share * c[i + V_L], share * c[i + V_R]
         c[following + X_O] = share * c[i + V_O]
         if k + POWERS >= begin_l:
@@ -127,18 +129,24 @@ def expand_start(start: Start, plant: Plant, y: Array, n: int, left: int, right:
 
 
 @inlined
-def wait_alike(c: Array, plant: Plant, k: int, left: bool, right: bool, force: float) -> None:
-    """Both bodies of a pair move alike until its u begins; what tells them apart is rounding.
+def wait_alike(c: Array, plant: Plant, k: int, share: float, left: bool, right: bool, force: float) -> None:
+    """Both bodies of a pair move alike until its u begins, if what tells them apart is rounding.
 
     A strong damper would enlarge it. What they have in common is known best from the body whose terms are smaller; if
-    all three move alike, from the object.
+    all three move alike, from the object. If it is no rounding, the force of the other pair has overtaken it.
     """
     i, following = LANES * k, LANES * (k + POWERS)
     one = 1.0 if k == 0 else 0.0
-    if left != right:
-        v, x, body = (V_L, X_L, plant.bodies[LEFT]) if left else (V_R, X_R, plant.bodies[RIGHT])
-        if sizes(body, one, c[i + x], c[i + v], 0.0) < sizes(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force):
-            c[following + V_O] = c[following + v]
+    size_o = sizes(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force)
+    size_l = sizes(plant.bodies[LEFT], one, c[i + X_L], c[i + V_L], 0.0)
+    size_r = sizes(plant.bodies[RIGHT], one, c[i + X_R], c[i + V_R], 0.0)
+    per = DOUBT * abs(share)
+    left = left and abs(c[following + V_L] - c[following + V_O]) <= per * (size_l + size_o)
+    right = right and abs(c[following + V_R] - c[following + V_O]) <= per * (size_r + size_o)
+    if left and not right and size_l < size_o:
+        c[following + V_O] = c[following + V_L]
+    if right and not left and size_r < size_o:
+        c[following + V_O] = c[following + V_R]
     if left:
         c[following + V_L] = c[following + V_O]
     if right:
