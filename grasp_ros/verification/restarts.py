@@ -177,10 +177,9 @@ def _go(run: Trajectory, state: Array, inputs: Array, offsets: Array, product: P
 def _end_beside_nudged(run: Trajectory, start: Array, product: Product) -> tuple[Array, Array]:
     """The end (6,) of a whole run from a state, and what roundings of the start and at each event make of it."""
     system, seconds = run.scene.system, np.array([run.scene.duration])
-    moved = largest(run.state)
-    size = moved + TINY
+    size = largest(run.state)
     size[[COLUMN[body] + part for body in system.absent for part in (0, 1)]] = 0.0
-    end, *nudged = (_go(run, start + nudge * moved * PATTERN, np.zeros(3), seconds, product)[0]
+    end, *nudged = (_go(run, start + nudge * size * PATTERN, np.zeros(3), seconds, product)[0]
                     for nudge in (0.0, NUDGE, -NUDGE))
     grown = np.maximum(*(np.abs(other - end) for other in nudged)) * (EPS / NUDGE)
     return end, (grown + EPS * size) * (walk(run, 1) + len(run.event_table)) + TINY
