@@ -82,6 +82,12 @@ def jump(plant: Plant, y: Array, side: Body, way: float, t: float) -> float:
 
 
 @inlined
+def left_open(mode: int, u: float) -> float:
+    """What roundings have left of u, m, of a pair that was open; at its touch the arm goes back by it."""
+    return u if mode == Pair.OPEN and u > 0.0 else 0.0
+
+
+@inlined
 def energy_level(plant: Plant, state: State, t: float) -> Level:
     """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
     y, given = state.y, plant.given
@@ -163,7 +169,8 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
-    rounding += jump(plant, state.y, LEFT, before.left, t) + jump(plant, state.y, RIGHT, before.right, t)
+    way_l, way_r = before.left + left_open(modes[0], before.u_l), before.right + left_open(modes[1], before.u_r)
+    rounding += jump(plant, state.y, LEFT, way_l, t) + jump(plant, state.y, RIGHT, way_r, t)
     if rise > rounding:
         return Outcome.ENERGY_RISES
     fall = -rise - rounding
