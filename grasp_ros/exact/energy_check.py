@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, arm_of, reduced_mass
+from grasp_ros.exact.kinematics import apart, approach, arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.exact.taylor_step import STILL
 from grasp_ros.physics.body_energy import body_energy
@@ -55,17 +55,6 @@ def level_of(body: Array, x: float, v: float, way: float, t: float) -> tuple[flo
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
     return value, size
-
-
-@inlined
-def apart(y: Array, side: Body) -> float:
-    """Distance in m between the place of an arm and where object and u say that it is.
-
-    Both are carried beside each other, with roundings of the whole way, which may have been much longer than the places
-    are now.
-    """
-    x, _, sign = arm_of(y, side)
-    return abs(sign * (x - y[X_O]) - y[U_L + side])
 
 
 @kernel

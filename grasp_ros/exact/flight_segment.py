@@ -10,6 +10,7 @@ from grasp_ros.exact.flight_events import first_root, motion_at, pair_in_flight
 from grasp_ros.exact.friction import slide_in_flight
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import (
+    apart,
     approach,
     arm_of,
     keep_resting,
@@ -121,8 +122,7 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
 @inlined
 def places_tell(y: Array, side: Body) -> bool:
     """Whether the places of a pair say about what its u is: they may be apart by the roundings of a contact."""
-    x, _, sign = arm_of(y, side)
-    return abs(sign * (x - y[X_O]) - y[U_L + side]) <= TOLD * abs(y[U_L + side])
+    return apart(y, side) <= TOLD * abs(y[U_L + side])
 
 
 @inlined

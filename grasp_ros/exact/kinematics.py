@@ -43,6 +43,17 @@ def arm_of(y: Array, side: Body) -> tuple[float, float, float]:
     return (y[X_L], y[V_L], 1.0) if side == LEFT else (y[X_R], y[V_R], -1.0)
 
 
+@inlined
+def apart(y: Array, side: Body) -> float:
+    """Distance in m between the place of an arm and where object and u say that it is.
+
+    Both are carried beside each other, with roundings of the whole way, which may have been much longer than the places
+    are now.
+    """
+    x, _, sign = arm_of(y, side)
+    return abs(sign * (x - y[X_O]) - y[U_L + side])
+
+
 @kernel
 def velocity_lane(body: Body) -> int:
     """Place of a body's velocity in the state; its position stands before it."""

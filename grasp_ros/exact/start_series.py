@@ -135,6 +135,8 @@ def wait_alike(c: Array, plant: Plant, k: int, share: float, left: bool, right: 
     A strong damper would enlarge it. What they have in common is known best from the body whose terms are smaller; if
     all three move alike, from the object. If it is no rounding, the force of the other pair has overtaken it.
     """
+    if not (left or right):
+        return
     i, following = LANES * k, LANES * (k + POWERS)
     one = 1.0 if k == 0 else 0.0
     size_o = sizes(plant.bodies[OBJECT], one, c[i + X_O], c[i + V_O], force)
