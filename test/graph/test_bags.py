@@ -15,16 +15,18 @@ from processes import DEADLINE, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
+from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.comparison import compare_recording
+from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT
 from grasp_ros.physics.model import impact_forces
-from grasp_ros.scene.topics import LYAPUNOV_NAMES
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real processes
@@ -161,7 +163,7 @@ def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
 ) -> None:
     peer, executor = node
     clients = {name: AsyncParameterClient(peer, name) for name in ("left_controller", "plant")}
-    graph = Graph(scene.load("case_01", ["time.duration_s=6"]), tmp_path / "run", ACCURACY)
+    graph = Graph(scene.load("case_01", ["time.duration_s=100"]), tmp_path / "run", ACCURACY)  # stopped when asked
 
     def answer(name: str, number: Parameter) -> Any:
         future = clients[name].set_parameters([number])
@@ -184,9 +186,12 @@ def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
         fixed = answer("plant", Parameter("object.mass_kg", value=4.0))
         assert not fixed.successful
         assert "does not change in a run" in fixed.reason
-        graph.wait([])
+        states: list[JointState] = []  # the nodes answer before the first tick, too
+        peer.create_subscription(JointState, JOINT_STATES.name, states.append, messages.qos(JOINT_STATES))
+        wait_for(lambda: executor.spin_once(timeout_sec=0.05) or len(states) > 100, "the ticks with the new gain")
     finally:
-        graph.stop()
+        statuses = graph.stop()
+    assert set(statuses.values()) == {0}
     recording = bag.read(graph.bag)
     assert list(recording.changes.values()) == [{gain: 9.0}]
     assert compare_recording(recording).equal
