@@ -34,6 +34,7 @@ from grasp_ros.physics.layout import (
     Pair,
 )
 
+DIED_OUT = 1e-150  # m; of less, squares and products have left the range of numbers, and what moves it is not followed
 UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
 ROUNDINGS = 128.0  # of the sum of all terms: flights, impacts and differences of positions
 NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
@@ -127,8 +128,8 @@ def may_be_damped(plant: Plant, fall: float, size: float, t: float) -> bool:
 def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
     """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
 
-    A body goes no faster than the energy `size` allows. What is STILL beside the fastest motion is not followed. What u
-    was `before`, roundings of a longer way may have left.
+    A body goes no faster than the energy `size` allows. What is STILL beside the fastest motion, or has DIED_OUT, is
+    not followed. What u was `before`, roundings of a longer way may have left.
     """
     u = state.y[U_L + side]
     if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):
@@ -136,7 +137,7 @@ def penetrates(plant: Plant, state: State, side: Body, before: float, size: floa
     fastest = math.sqrt(size / plant.given[side, MASS]) + math.sqrt(size / plant.given[OBJECT, MASS])
     way = abs(arm_of(state.y, side)[0]) + abs(state.y[X_O]) + t * fastest
     still = STILL * t * (abs(state.y[V_L]) + abs(state.y[V_O]) + abs(state.y[V_R]))
-    return u > ROUNDINGS * EPS * way + still + UNDERFLOW
+    return u > ROUNDINGS * EPS * way + still + DIED_OUT
 
 
 @inlined

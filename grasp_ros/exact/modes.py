@@ -38,7 +38,7 @@ from __future__ import annotations
 from grasp_ros.exact.friction import apply_friction, lift_friction, push_on_object
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, velocity_lane
-from grasp_ros.exact.outputs import record
+from grasp_ros.exact.outputs import record, try_soon
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
 from grasp_ros.exact.rest import NEVER, begins_anew, is_negligible, leaning, parts, turn_back
 from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
@@ -61,12 +61,9 @@ TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together
 LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
 
 
-# Consistent initialisation: modes from the state.
-
-
 @kernel
 def mode_of(plant: Plant, state: State, side: Body) -> Pair:
-    """Mode of a pair from its motion: at u = 0 and at u' = -1/p by the first derivative that decides."""
+    """Consistent mode of a pair: at u = 0 and at u' = -1/p by the first derivative of its motion that decides."""
     y = state.y
     if plant.pairs[side, HERTZIAN] == 0.0:
         return Pair.ABSENT
@@ -133,9 +130,6 @@ def mode_at_tick(plant: Plant, state: State, side: Body) -> Pair:
     return mode_of(plant, state, side) if leaves else mode
 
 
-# Rules between segments.
-
-
 @kernel
 def settle_object(plant: Plant, state: State, out: Output) -> None:
     """Give the object its mode anew, and record it if it sticks or slips."""
@@ -192,9 +186,6 @@ def let_leave(plant: Plant, state: State, settings: Settings) -> None:
     mode[LEFT] = mode[RIGHT] = Pair.LEAVING
 
 
-# Transitions at the end of a segment.
-
-
 @inlined
 def make_transitions(plant: Plant, state: State, left: Candidate, right: Candidate, slide: SlideCandidate, end: float,
                      out: Output) -> None:
@@ -231,10 +222,11 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
         return
     if kind == Transition.TOUCH:
         turn_back(state, side)
-    if kind == Transition.RELEASE:
-        mode[side] = Pair.OPEN
+    if kind == Transition.CLAMP:
+        mode[side] = Pair.CLAMPED
+        try_soon(out)
     else:
-        mode[side] = Pair.CLAMPED if kind == Transition.CLAMP else Pair.CONTACT
+        mode[side] = Pair.OPEN if kind == Transition.RELEASE else Pair.CONTACT
     record(state, side, kind, y[U_L + side], d, out)
 
 

@@ -22,6 +22,7 @@ from grasp_ros.physics.layout import (
 
 SPARE = 8  # events that one segment can have: three per pair, and two of the object
 STATES = 6  # columns of an output: x and v of each body
+AGAIN = 16  # contact steps until the next trial of an implicit one, where a pair has lost its force
 
 
 @kernel
@@ -35,6 +36,13 @@ def record(state: State, body: Body, kind: Transition, u: float, d: float, out: 
     row[EVENT_KIND] = kind.value
     row[EVENT_U] = u
     row[EVENT_RATE] = d
+
+
+@inlined
+def try_soon(out: Output) -> None:
+    """Forget that trials of implicit steps have failed: they had a pair to follow that is without force now."""
+    out.filled[Filled.PENALTY] = min(out.filled[Filled.PENALTY], AGAIN)
+    out.filled[Filled.WAIT] = min(out.filled[Filled.WAIT], AGAIN)
 
 
 @inlined
