@@ -50,6 +50,14 @@ def test_what_a_longer_way_has_left_of_u_is_no_touch_that_a_short_segment_missed
 
 
 @SIDES
+@pytest.mark.parametrize(("u", "expected"), [(1e-149, Outcome.PENETRATES), (1e-151, Outcome.GO_ON)])
+def test_what_has_died_out_is_no_missed_touch(side: Body, u: float, expected: Outcome) -> None:
+    b = bench(side, u, 0.0, Pair.OPEN, beside=(-u, 0.0))  # nothing else is there, or moves
+    begin = Level(0.0, 0.0, 0.0, 0.0, -u, -u)
+    assert check_segment(b.plant, b.state, b.settings, begin, begin, 1e-9, 0, OPEN) == expected
+
+
+@SIDES
 @pytest.mark.parametrize(("change", "expected"), [
     (1e-9, Outcome.ENERGY_RISES), (-1e-9, Outcome.ENERGY_FALLS), (1e-16, Outcome.GO_ON), (-1e-16, Outcome.GO_ON)])
 def test_energy_comes_from_nowhere_and_goes_nowhere(side: Body, change: float, expected: Outcome) -> None:

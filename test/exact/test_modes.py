@@ -26,6 +26,7 @@ from grasp_ros.exact.modes import (
     mode_of,
     settle_resting,
 )
+from grasp_ros.exact.outputs import AGAIN
 from grasp_ros.exact.records import Candidate, SlideCandidate, Start, Tables
 from grasp_ros.physics.layout import (
     FORCE,
@@ -39,6 +40,7 @@ from grasp_ros.physics.layout import (
     V_O,
     X_O,
     Body,
+    Filled,
     Pair,
     Slide,
     Transition,
@@ -88,6 +90,23 @@ def clamp(b: Bench, side: Body) -> None:
     crossing, none = Candidate(1.0, Transition.CLAMP), Candidate(math.inf, Transition.TOUCH)
     left, right = (crossing, none) if side == LEFT else (none, crossing)
     make_transitions(b.plant, b.state, left, right, NO_SLIDE, 1.0, b.out)
+
+
+@SIDES
+@pytest.mark.parametrize(("kind", "mode", "u", "d"), [
+    (Transition.CLAMP, Pair.CONTACT, 0.01, -2.0), (Transition.REENTRY, Pair.CLAMPED, 0.01, -2.0),
+    (Transition.TOUCH, Pair.OPEN, 0.0, 1.0), (Transition.RELEASE, Pair.CONTACT, 0.0, -1.0),
+])
+def test_only_a_clamp_shortens_the_wait_for_an_implicit_step(
+    side: Body, kind: Transition, mode: Pair, u: float, d: float
+) -> None:
+    """What failed before had to follow a pair that is without force now; what waits less goes on waiting."""
+    for waiting in (1000, 3):
+        b = bench(side, u, d, mode)
+        b.out.filled[[Filled.WAIT, Filled.PENALTY]] = waiting
+        make_transition(b.plant, b.state, side, kind, False, b.out)
+        expected = min(waiting, AGAIN) if kind == Transition.CLAMP else waiting
+        assert b.out.filled[[Filled.WAIT, Filled.PENALTY]].tolist() == [expected, expected]
 
 
 @SIDES
