@@ -73,7 +73,7 @@ def jump(plant: Plant, y: Array, side: Body, way: float, t: float) -> float:
 
 @inlined
 def left_open(mode: int, u: float) -> float:
-    """What roundings have left of u, m, of a pair that was open; at its touch the arm goes back by it."""
+    """What roundings had left of u, m, of a pair that was open; if it touches, the arm goes back by it."""
     return u if mode == Pair.OPEN and u > 0.0 else 0.0
 
 

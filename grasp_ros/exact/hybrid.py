@@ -38,7 +38,7 @@ def advance(
     Parameters
     ----------
     c, f, at, size, row, start_c, start_f : arrays
-        Workspace, `records.Tables`; its size sets the order.
+        Workspace, `records.Tables`; its size sets the highest order.
     given, bodies, pairs, coulomb : arrays (3, 4), (3, 4), (2, 2), and float in N
         `records.Plant`.
     y, mode, clock : arrays (8,), (3,) and (3,)

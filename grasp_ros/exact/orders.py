@@ -1,7 +1,7 @@
 """How many terms the series of a Taylor step has.
 
-Source of the orders: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order
-Taylor methods, Experimental Mathematics 14 (2005), sections 3.1 and 3.2.
+Source: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order Taylor
+methods, Experimental Mathematics 14 (2005), section 3.1.
 """
 
 from __future__ import annotations

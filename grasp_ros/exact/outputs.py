@@ -22,7 +22,7 @@ from grasp_ros.physics.layout import (
 
 SPARE = 8  # events that one segment can have: three per pair, and two of the object
 STATES = 6  # columns of an output: x and v of each body
-AGAIN = 16  # contact steps until the next trial of an implicit one, where a pair has lost its force
+AGAIN = 16  # contact steps at most until the next trial of an implicit one, where a pair has clamped
 
 
 @kernel
@@ -40,7 +40,7 @@ def record(state: State, body: Body, kind: Transition, u: float, d: float, out: 
 
 @inlined
 def try_soon(out: Output) -> None:
-    """Forget that trials of implicit steps have failed: they had a pair to follow that is without force now."""
+    """Let trials of implicit steps that failed count as few: they had a pair to follow that is without force now."""
     out.filled[Filled.PENALTY] = min(out.filled[Filled.PENALTY], AGAIN)
     out.filled[Filled.WAIT] = min(out.filled[Filled.WAIT], AGAIN)
 

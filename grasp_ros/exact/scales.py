@@ -48,7 +48,10 @@ def rate_bound(bodies: Array) -> float:
 
 @kernel
 def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
-    """What the accuracy of a run rests on; the workspace holds series of this order."""
+    """What the accuracy of a run rests on; the workspace holds series of the `highest` order, that with both pairs.
+
+    Its terms must have fallen by two thirds of the order with one pair: later, they are large beside what moves.
+    """
     one = lower_order(highest)
     both = new_order(tolerance, highest, max(lower_order(one), LEAST))
     return Settings(tolerance, new_order(tolerance, one, one), both, rate_bound(given))

@@ -11,9 +11,6 @@ The coefficients are also the dense output, and bounds on them prove where an ev
 
 With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g (1 + p u'). An order waits only for the newest
 coefficients of the velocities, and they pass through one product; w, u = w^2 and g are known one order ahead.
-
-Source of the step size: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by
-means of high-order Taylor methods, Experimental Mathematics 14 (2005), sections 3.1 and 3.2.
 """
 
 import itertools

@@ -1,4 +1,8 @@
-"""One Taylor step in regularised time: its series, its unit, and the length for which it neglects nothing."""
+"""One Taylor step in regularised time: its series, its unit, and the length for which it neglects nothing.
+
+Source of the length: A. Jorba, M. Zou, A software package for the numerical integration of ODEs by means of high-order
+Taylor methods, Experimental Mathematics 14 (2005), section 3.2.
+"""
 
 from __future__ import annotations
 
@@ -78,8 +82,8 @@ def growth_up_to(c: Array, inverse: Lanes, n: int) -> float:
 def step_size(c: Array, inverse: Lanes, order: Order) -> float:
     """Step in s / unit at which the first neglected term of a lane is the tolerated part of its size, or inf.
 
-    The terms of a high order must fall on the way, too: 52 of an exponential function neglect nothing at eight time
-    constants, but some of them are thousands of times as large as their sum.
+    The terms of a high order must fall on the way, too: 52 of an exponential function neglect nothing at ten time
+    constants, but some of them are thousands of times as large as what moves.
     """
     n = order.number
     last = sizes(c, n)

@@ -26,13 +26,13 @@ class Profile(NamedTuple):
 
     scene: str
     accuracy: float
-    order: int  # of the series
+    order: int  # of the series with one side in contact
     flights: int
     contact_steps: int
     call: float  # `simulation.simulate` with all outputs
     outputs: float  # the integrator alone, with all outputs
     end: float  # the integrator alone, last state only
-    expansion: float  # of one Taylor step
+    expansion: float  # of one Taylor step with one side in contact
 
     @property
     def expansions(self) -> float:

@@ -42,7 +42,7 @@ def time_spent(records: Sequence[Record], profiles: Sequence[Profile]) -> str:
     for p in profiles:
         shares = [p.call - p.outputs, p.outputs - p.end, p.expansions, p.end - p.expansions]
         rows.append([p.scene, f"{p.accuracy:.0e}", f"{1e3 * p.call:.3g} ms", *(f"{s / p.call:.0%}" for s in shares),
-                     f"{p.contact_steps} of order {p.order}, {1e9 * p.expansion:.0f} ns each"])
+                     f"{p.contact_steps}, with one side of order {p.order}, {1e9 * p.expansion:.0f} ns each"])
     rivals = {name: _fastest(here, [ODEINT]) for name, here in by_scene(records).items()}
     measured = [(p, rival) for p in profiles if (rival := rivals.get(p.scene)) is not None]
     return "\n\n".join([
@@ -50,8 +50,8 @@ def time_spent(records: Sequence[Record], profiles: Sequence[Profile]) -> str:
         table(["scene", "accuracy", "one call", "Python around it", "outputs", "Taylor expansions",
                 "steps, events, flights", "Taylor steps"], rows),
         prose("""Medians, in turn. Python around it is what `simulate` does beside the integrator: checks, arrays and
-        the record. An expansion is timed by itself, with one side in contact; with both it costs up to twice as much,
-        and that difference stands in the column after it."""),
+        the record. An expansion is timed by itself, with one side in contact; with both it has half as many
+        orders more, each of which costs up to twice as much, and that difference stands in the column after it."""),
         *([odeint(measured)] if measured else []),
     ])
 

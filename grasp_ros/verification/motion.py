@@ -238,10 +238,11 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
     lost, doubt = detail.integral(taken[:, 1:-1])
     late = EPS * detail.pieces.end * power
     unit = EPS * (unit + lost) + late + doubt + _wander(detail, taken) + TINY
-    known = resolved & _resolved(detail, taken, unit) & np.isfinite(unit)  # squares may leave the range of numbers
+    within_range = np.isfinite(unit)  # squares may leave the range of numbers
+    known = resolved & _resolved(detail, taken, unit) & within_range
     within = sum(pair.sudden * np.abs(pair.d).max(axis=1) for pair in pairs)  # a rounding of the time
     error = np.abs(level + lost) / (unit + np.where(known, 0.0, ALL * (lost + within)))
-    return Ledger("energy", np.where(np.isfinite(unit), error, 0.0), known)
+    return Ledger("energy", np.where(within_range, error, 0.0), known)
 
 
 def _loss_noise(detail: Detail, pair: Impacts) -> Array:

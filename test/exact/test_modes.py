@@ -101,12 +101,12 @@ def test_only_a_clamp_shortens_the_wait_for_an_implicit_step(
     side: Body, kind: Transition, mode: Pair, u: float, d: float
 ) -> None:
     """What failed before had to follow a pair that is without force now; what waits less goes on waiting."""
-    for waiting in (1000, 3):
+    for waiting, penalty in ((1000, 2000), (3, 1000), (1000, 3)):
         b = bench(side, u, d, mode)
-        b.out.filled[[Filled.WAIT, Filled.PENALTY]] = waiting
+        b.out.filled[[Filled.WAIT, Filled.PENALTY]] = waiting, penalty
         make_transition(b.plant, b.state, side, kind, False, b.out)
-        expected = min(waiting, AGAIN) if kind == Transition.CLAMP else waiting
-        assert b.out.filled[[Filled.WAIT, Filled.PENALTY]].tolist() == [expected, expected]
+        most = AGAIN if kind == Transition.CLAMP else 2000
+        assert b.out.filled[[Filled.WAIT, Filled.PENALTY]].tolist() == [min(waiting, most), min(penalty, most)]
 
 
 @SIDES
