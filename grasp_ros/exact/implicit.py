@@ -22,6 +22,7 @@ from grasp_ros.exact.collocation import (
 )
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, reduced_mass, velocity_lane
+from grasp_ros.exact.outputs import wait
 from grasp_ros.exact.radau import DERIVATIVE, FIRST, STAGES, TO_LEGENDRE, TO_POWERS, times
 from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.scales import STIFF, relaxation, slow_relaxation
@@ -44,7 +45,6 @@ from grasp_ros.physics.layout import (
     V_R,
     X_O,
     Body,
-    Filled,
     Pair,
     Work,
 )
@@ -165,13 +165,6 @@ def velocity_scale(plant: Plant, state: State) -> float:
             if plant.pairs[side, DISSIPATION] > 0.0:
                 slowest = min(slowest, 1.0 / plant.pairs[side, DISSIPATION])
     return max(scale, slowest)
-
-
-@kernel
-def wait(out: Output, steps: float) -> None:
-    """After a trial that failed, leave some contact steps to the Taylor series, and twice as many after the next."""
-    out.filled[Filled.PENALTY] = min(max(2 * out.filled[Filled.PENALTY], int(steps), 4), 1 << 20)
-    out.filled[Filled.WAIT] = out.filled[Filled.PENALTY]
 
 
 @kernel

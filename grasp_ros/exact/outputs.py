@@ -1,4 +1,4 @@
-"""What a run writes: states at the output times, events, and the budgets that limit it."""
+"""What a run writes: states at the output times, events, and the budgets and waits that limit it."""
 
 from __future__ import annotations
 
@@ -36,6 +36,13 @@ def record(state: State, body: Body, kind: Transition, u: float, d: float, out: 
     row[EVENT_KIND] = kind.value
     row[EVENT_U] = u
     row[EVENT_RATE] = d
+
+
+@kernel
+def wait(out: Output, steps: float) -> None:
+    """After a failed implicit step, leave some contact steps to the Taylor series, and twice as many after the next."""
+    out.filled[Filled.PENALTY] = min(max(2 * out.filled[Filled.PENALTY], int(steps), 4), 1 << 20)
+    out.filled[Filled.WAIT] = out.filled[Filled.PENALTY]
 
 
 @inlined

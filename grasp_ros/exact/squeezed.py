@@ -16,12 +16,12 @@ from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, moti
 from grasp_ros.exact.contact import write_state
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.friction import push_on_object, slide_in_contact, slip_candidate
-from grasp_ros.exact.implicit import expand_row, implicit_step, wait
+from grasp_ros.exact.implicit import expand_row, implicit_step
 from grasp_ros.exact.jit import door, inlined, kernel
 from grasp_ros.exact.kinematics import keep_resting
 from grasp_ros.exact.modes import make_transitions
 from grasp_ros.exact.observer import leave_step, notify
-from grasp_ros.exact.outputs import due
+from grasp_ros.exact.outputs import due, wait
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.radau import FIRST, STAGES
 from grasp_ros.exact.records import (
