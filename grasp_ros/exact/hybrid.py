@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from grasp_ros.exact.clock import until
 from grasp_ros.exact.contact import contact_segment
+from grasp_ros.exact.creeping import is_squeezed
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.flight_segment import flight_segment
 from grasp_ros.exact.jit import door
@@ -15,7 +16,7 @@ from grasp_ros.exact.loop import answer_end, close_interval, enter_interval, ope
 from grasp_ros.exact.modes import let_leave, settle_resting
 from grasp_ros.exact.outputs import may_go_on, write_reached
 from grasp_ros.exact.records import Array, Integers, Level, Loop, Output, Plant, Start, State, Tables
-from grasp_ros.exact.scales import is_squeezed, new_settings
+from grasp_ros.exact.scales import new_settings
 from grasp_ros.exact.start import must_start, start_segment
 from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Outcome, Pair, Place
 
@@ -88,7 +89,7 @@ def advance(
         if must_start(state):
             t = start_segment(tables, plant, state, settings, span, out)
         elif state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
-            if is_squeezed(plant, state, span, out):
+            if is_squeezed(plant, state, settings, span, out):
                 return Outcome.SQUEEZED
             t = contact_segment(tables, plant, state, settings, span, out)
         else:

@@ -1,7 +1,7 @@
 """One implicit step: how long it may be, its error, and the polynomials in t that stand for it.
 
 The last Legendre coefficients of the polynomials tell their error. A relaxation that is not over spoils them at any
-length; then the slower pair, if it is the one, is resolved, or some Taylor steps come first.
+length; then that of the slower pair, a swing and a creep are resolved, if that is it, or some Taylor steps come first.
 """
 
 from __future__ import annotations
@@ -20,18 +20,17 @@ from grasp_ros.exact.collocation import (
     collocate,
     motion_of,
 )
+from grasp_ros.exact.creeping import LENGTH, least_step, longest_step, resolved_rate, slow_relaxation
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, reduced_mass, velocity_lane
+from grasp_ros.exact.kinematics import other, reduced_mass, velocity_lane
 from grasp_ros.exact.outputs import wait
 from grasp_ros.exact.radau import DERIVATIVE, FIRST, STAGES, TO_LEGENDRE, TO_POWERS, times
 from grasp_ros.exact.records import Array, Output, Plant, Settings, State, Tables
-from grasp_ros.exact.scales import STIFF, relaxation, slow_relaxation
 from grasp_ros.physics.layout import (
     CHECK,
     DAMPING,
     DISSIPATION,
     EPS,
-    HERTZIAN,
     LANES,
     LEFT,
     MASS,
@@ -49,22 +48,9 @@ from grasp_ros.physics.layout import (
     Work,
 )
 
-LENGTH = 3.0  # of a step, in units of the fastest rate that must be resolved
 FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
 ROUNDINGS = 32.0  # times what is allowed: so much error may be rounding of what a step gains, and go with its length
 JUMP = 8.0  # times as much as the last coefficients weighs what is left of a relaxation at the begin
-
-
-@kernel
-def creep_rate(plant: Plant, state: State, side: Body) -> float:
-    """Rate in 1/s that an implicit step has to resolve of a pair: its slow one where it relaxes, its own otherwise."""
-    u, d, pair = state.y[U_L + side], approach(state.y, side), plant.pairs[side]
-    if state.mode[side] != Pair.CONTACT:
-        return 0.0
-    fast = relaxation(plant, state, side)
-    stiffness = 1.5 * pair[HERTZIAN] * math.sqrt(u) / reduced_mass(plant.bodies, side)
-    slow = 1.5 / (pair[DISSIPATION] * u) if fast * fast > stiffness else fast + math.sqrt(stiffness)
-    return slow + 5.0 * abs(d) / u
 
 
 @kernel
@@ -102,6 +88,14 @@ def write_lane(tables: Tables, lane: int, begin: float, h: float, rate: float) -
     return max(last, abs(tables.row[0] - rate))
 
 
+@inlined
+def handed_on(plant: Plant, state: State, side: Body, beside: Approach) -> float:
+    """Velocity in m/s of which the object has roundings: its part of the other arm, if that pair relaxes here."""
+    arm = other(side)
+    share = reduced_mass(plant.bodies, arm) / plant.bodies[OBJECT, MASS]
+    return share * abs(state.y[velocity_lane(arm)]) if beside.stiff else 0.0
+
+
 @kernel
 def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: Approach, beside: Approach, start: Begin
                ) -> float:
@@ -122,7 +116,8 @@ def write_side(tables: Tables, plant: Plant, state: State, side: Body, pair: App
         return last / max(start.scale, abs(pair.e))
     v_end = start.v + f[V_NODES + STAGES - 1]
     d_end = pair.rate * (f[nodes + STAGES - 1] - pair.offset)
-    moving, creeping = max(abs(start.v), abs(state.y[v])), 1024.0 * pair.rate * largest if pair.stiff else 0.0
+    creeping = 1024.0 * pair.rate * largest if pair.stiff else 0.0
+    moving = max(abs(start.v), abs(state.y[v]), handed_on(plant, state, side, beside))
     first = max(moving, creeping)
     moving = max(moving, abs(v_end), abs(v_end + pair.sign * d_end))
     scale = max(min(max(moving, creeping), pair.u / h), 0.25 * moving)
@@ -170,14 +165,13 @@ def velocity_scale(plant: Plant, state: State) -> float:
 @kernel
 def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """Length in s of an implicit step, whose polynomials it writes; 0 where Taylor steps are cheaper."""
-    fastest = max(relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT))
-    slower = slow_relaxation(plant, state)
-    creeping = creep_rate(plant, state, LEFT) + creep_rate(plant, state, RIGHT)
-    h, scale = min(span, LENGTH / (settings.rate + creeping)), velocity_scale(plant, state)
+    slower = max(slow_relaxation(plant, state), resolved_rate(plant, state, settings.rate, False))
+    least = least_step(plant, state)
+    h, scale = longest_step(plant, state, settings.rate, span), velocity_scale(plant, state)
     allowed = FINEST + 100.0 * settings.tolerance
     longest = h
     error = before = math.inf
-    while fastest * h > STIFF:
+    while h > least:
         start = Begin(h, state.y[X_O], state.y[V_O], scale)
         left, right = motion_of(plant, state, LEFT, h), motion_of(plant, state, RIGHT, h)
         error = math.inf

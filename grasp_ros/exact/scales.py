@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.bits import near_inverse, power_of_two_root
-from grasp_ros.exact.impact import elastic_force, stored_energy
+from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass, relative_motion
 from grasp_ros.exact.orders import LEAST, RADIUS, lower_order, new_order, order_for
-from grasp_ros.exact.records import NEITHER, Array, Integers, Output, Plant, Settings, State, Step
+from grasp_ros.exact.records import NEITHER, Array, Integers, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -23,7 +23,6 @@ from grasp_ros.physics.layout import (
     U_L,
     U_R,
     Body,
-    Filled,
     Pair,
 )
 
@@ -33,7 +32,6 @@ KNOWN = 2.0**-30  # of the velocities: below it u' is too little of them for a q
 YOUNG, LATER = 0.25, 0.75  # parts of both pairs' time and of the other's age that the age of a pair that grows is below
 LEAST_GROWTH, MOST_GROWTH = 0.6, 0.9  # of 1 - 1/n, where u is like t^n: w_l w_r suits n = 1 and 2
 DECAYS = 5.0  # time constants of a damper in a step
-STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
 
 
 @kernel
@@ -177,47 +175,3 @@ def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Ste
         return Step(highest, unit, left, right, NEITHER)
     order = order_for(settings.tolerance, highest, reach_of_span(state, left, right, unit, span))
     return Step(order, unit, left, right, NEITHER)
-
-
-@inlined
-def relaxation(plant: Plant, state: State, side: Body) -> float:
-    """Rate p H u^1.5 / mu at which u' of a pair in contact relaxes, 1/s; 0 without contact."""
-    u, pair = state.y[U_L + side], plant.pairs[side]
-    if state.mode[side] != Pair.CONTACT or not u > 0.0:
-        return 0.0
-    return pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u) / reduced_mass(plant.bodies, side)
-
-
-@kernel
-def slow_relaxation(plant: Plant, state: State) -> float:
-    """Rate in 1/s of the slower one of both relaxations; a light object hands the force of one pair on to the other."""
-    left, right = relaxation(plant, state, LEFT), relaxation(plant, state, RIGHT)
-    if not min(left, right) > 0.0:
-        return 0.0
-    mass = plant.bodies[OBJECT, MASS]
-    a, b = mass / plant.bodies[LEFT, MASS], mass / plant.bodies[RIGHT, MASS]
-    own = 1.0 - 1.0 / ((1.0 + a) * (1.0 + b)) if a + b > 1e-8 else a + b
-    total = left + right
-    product = own * (left * right)  # in this order, for mirror images
-    return 2.0 * product / (total + math.sqrt(max(total * total - 4.0 * product, 0.0)))
-
-
-@inlined
-def is_squeezed(plant: Plant, state: State, span: float, out: Output) -> bool:
-    """Whether a contact relaxes so fast that an implicit step may be worth its price; a trial that failed waits."""
-    if not (relaxes(plant, state, LEFT, span) or relaxes(plant, state, RIGHT, span)):
-        return False
-    out.filled[Filled.WAIT] -= 1
-    return out.filled[Filled.WAIT] < 0
-
-
-@inlined
-def relaxes(plant: Plant, state: State, side: Body, span: float) -> bool:
-    """Whether `relaxation` times the span is beyond STIFF, without its quotient and its root."""
-    loss, hertzian, u = plant.pairs[side, DISSIPATION], plant.pairs[side, HERTZIAN], state.y[U_L + side]
-    if loss == 0.0 or state.mode[side] != Pair.CONTACT:
-        return False
-    m, m_o = plant.bodies[side, MASS], plant.bodies[OBJECT, MASS]
-    pressed = loss * hertzian * u * span  # times sqrt(u) / mu; mu is no less than half of the smaller mass
-    fast = pressed * pressed * u > (0.25 * STIFF * STIFF) * min(m, m_o) ** 2
-    return fast and relaxation(plant, state, side) * span > STIFF

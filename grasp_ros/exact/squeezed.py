@@ -146,7 +146,7 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
         wait(out, 4.0)
         return 0.0
     s = min(1.0, left.when, right.when, slide.when)
-    if s < EARLY and (is_release(left, s) or is_release(right, s)):
+    if s < EARLY and s * h > 0.0 and (is_release(left, s) or is_release(right, s)):
         out.work[Work.REJECTED_STEPS] += 1
         return -s * h
     if s < SOON:

@@ -132,6 +132,8 @@ MIXED = {
     "one side": Squeeze((3e3, 1e3), force=(5.0, 0.0, 0.0), x=(-0.1, 0.0, 0.3)),
     "beside an ordinary contact": Squeeze((3e3, 0.5), 1e5, (3.0, 0.0, -3.0), (-0.1, 0.0, 0.3)),
     "clamped": Squeeze((3e3, 1e3), force=(-1.0, 0.0, -5.0), x=(-0.01, 0.0, 0.3), v=(1.0, 0.0, -3.0)),
+    "light object": Squeeze((3.0, 2.0), 1e6, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (47.0, 3e-3, 450.0),
+                            (0.0, 0.0), damping=0.0),
     "friction": Squeeze((1e3, 1e3), force=(5.0, 0.0, -2.0), x=(-0.1, 0.0, 0.3), coulomb=2.0),
 }
 
@@ -146,6 +148,37 @@ def test_states_and_events_against_taylor_steps(name: str, monkeypatch: pytest.M
     assert np.abs(states - expected).max() < 1e-13
     assert kinds(result) == kinds(other)
     assert result.event_table[:, 0] == pytest.approx(other.event_table[:, 0], rel=0, abs=1e-12)
+
+
+def test_a_slow_touch_beside_a_deep_pair_keeps_its_energy() -> None:
+    """An implicit step must not begin at a touch: the energy of an arm that hits what friction holds is known."""
+    speed, hertzian = 1e-8, 1e7
+    scene = Squeeze((0.0, 10.0), 1e7, (0.0, 0.0, -1e4), (-speed * 0.01, 0.0, -0.01), (speed, 0.0, 0.0),
+                    (1.0, 1.0, 1.0), (0.0, 0.0), coulomb=1e6, damping=0.0)
+    result = scene.start()
+    states = result.advance(0.03, np.linspace(0.015, 0.03, 4))
+    depth = states[:, 0] - states[:, 2]
+    assert (depth > 0.0).all()
+    level = 0.5 * states[:, 1] ** 2 + 0.4 * hertzian * depth**2.5
+    assert np.abs(level / (0.5 * speed**2) - 1.0).max() < 1e-13
+
+
+def test_a_light_object_that_swings_no_more_costs_few_steps() -> None:
+    """Taylor steps follow its swing between two heavy arms for thousands of steps after it has died out."""
+    result = MIXED["light object"]._replace(mass=(47.0, 1e-4, 450.0)).start()
+    result.advance(2.0)
+    assert sorted(kinds(result)) == [(side, Transition.RELEASE) for side in (LEFT, RIGHT)]
+    assert result.work[Work.CONTACT_STEPS] < 400  # 233656 of Taylor
+
+
+def test_a_light_arm_beside_one_that_creeps_costs_few_steps() -> None:
+    """The object has roundings of the velocity of the arm that creeps beside it: they are no relaxation."""
+    scene = Squeeze((1.5, 1.5), 1e9, (0.0, 0.0, 0.0), (-0.01, -0.01, -5.0), mass=(1e-3, 5.0, 1.0),
+                    stiffness=(50.0, 0.0), damping=0.2)
+    result = scene.start(max_work=10**5)
+    result.advance(0.5)
+    assert result.status is Status.DONE
+    assert result.work[Work.CONTACT_STEPS] < 8000
 
 
 def test_the_scenes_have_the_events() -> None:

@@ -19,20 +19,25 @@ SCENES, ANSWERS = read(DIRECTORY), answers(DIRECTORY)
 FUZZED = DIRECTORY.parent / "fuzzed"
 FUZZED_SCENES, FUZZED_ANSWERS = read(FUZZED), answers(FUZZED)
 FEW = 10.0  # roundings
-FLUTTER = {"deep_huge_p_stalled": 250.0}  # 1 + p u' is below the rounding of p u': it clamps and re-enters at first
 CHEAP = ("through_the_finger", "together", "free_fall", "pressed_for_a_moment")
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_motion_is_right_within_roundings(name: str) -> None:
     found = verdict(SCENES[name], ANSWERS[name])
-    assert found.error <= FLUTTER.get(name, LIMIT), f"{name}: {found.status}, error in roundings {found.error:.3g}"
+    assert found.error <= LIMIT, f"{name}: {found.status}, error in roundings {found.error:.3g}"
 
 
 @pytest.mark.parametrize("name", FUZZED_ANSWERS)
 def test_what_the_fuzzing_found_is_right_within_few_roundings(name: str) -> None:
     found = verdict(FUZZED_SCENES[name], FUZZED_ANSWERS[name])
     assert found.error <= FEW, f"{name}: {found.status}, error in roundings {found.error:.3g}"
+
+
+def test_a_pair_whose_factor_is_rounding_flutters_for_few_steps() -> None:
+    """1 + p u' is below the rounding of p u': Taylor steps clamp and re-enter until an implicit one passes over it."""
+    scene = SCENES["deep_huge_p_stalled"]
+    assert len(simulate(scene, grid=[0.0, scene.duration]).events) < 15  # 4 are true; 1713 by Taylor steps
 
 
 def test_every_scene_has_its_answer() -> None:
