@@ -20,7 +20,7 @@ from grasp_ros.exact.collocation import (
     collocate,
     motion_of,
 )
-from grasp_ros.exact.creeping import LENGTH, least_step, longest_step, resolved_rate, slow_relaxation
+from grasp_ros.exact.creeping import LENGTH, least_step, longest_step, relaxation, resolved_rate, slow_relaxation
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import other, reduced_mass, velocity_lane
 from grasp_ros.exact.outputs import wait
@@ -90,10 +90,16 @@ def write_lane(tables: Tables, lane: int, begin: float, h: float, rate: float) -
 
 @inlined
 def handed_on(plant: Plant, state: State, side: Body, beside: Approach) -> float:
-    """Velocity in m/s of which the object has roundings: its part of the other arm, if that pair relaxes here."""
+    """Velocity in m/s of which the object has roundings: its part of the other arm, if that pair relaxes here.
+
+    Held by the pair on this side as well, it goes with the one that brakes it more.
+    """
     arm = other(side)
-    share = reduced_mass(plant.bodies, arm) / plant.bodies[OBJECT, MASS]
-    return share * abs(state.y[velocity_lane(arm)]) if beside.stiff else 0.0
+    if not beside.stiff:
+        return 0.0
+    mass, there = reduced_mass(plant.bodies, arm), relaxation(plant, state, arm)
+    here = relaxation(plant, state, side) * (reduced_mass(plant.bodies, side) / mass)
+    return there / (here + there) * (mass / plant.bodies[OBJECT, MASS]) * abs(state.y[velocity_lane(arm)])
 
 
 @kernel

@@ -15,13 +15,14 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.cases.case import Product
 from grasp_ros.verification.relations import SWAPPED, mirrored, scaled
-from grasp_ros.verification.roundings import TINY, UNDERFLOW, largest
+from grasp_ros.verification.roundings import TINY, largest
 
 UNITS = 4.0, 2.0, 0.5  # of length, time and mass
 PERIODS = 16, 64, 256  # control periods in runs that tend to continuous feedback
 LONGEST = 1e4  # s, of such runs: a control period has its limit
 NOISE, FAR = 1e-10, 0.2  # distances from it, relative, that say nothing
 FALLS = 0.5  # part of the distance that may be left at a sixteenth of the period
+SHALLOW = 1e-85  # m or m/s: below, what a touch moves, like u^3.5, may be denormal, and in other units other numbers
 FEW, SOME = 10, 100  # events and contact steps, beyond which a distance may grow by itself
 
 
@@ -39,7 +40,7 @@ def mirror(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
 
 def units(run: Trajectory, product: Product, smallest: float) -> Iterator[tuple[str, float]]:
     """States and events in other units, O7, to the bit."""
-    if smallest < UNDERFLOW:
+    if smallest < SHALLOW:
         return
     length, time, mass = UNITS
     try:
