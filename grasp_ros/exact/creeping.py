@@ -12,6 +12,7 @@ from grasp_ros.exact.impact import elastic_force
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, reduced_mass, surface_factor
 from grasp_ros.exact.records import Output, Plant, Settings, State
+from grasp_ros.exact.rest import ROUNDINGS
 from grasp_ros.physics.layout import (
     DISSIPATION,
     HERTZIAN,
@@ -27,18 +28,23 @@ from grasp_ros.physics.layout import (
 
 STIFF = 500.0  # relaxations within an implicit step from which on it is no dearer than the Taylor steps
 FEW = 4.0  # the same where Taylor steps flutter
-UNRESOLVED = 4.0  # roundings of 1 + p u' that tell nothing
 LENGTH = 3.0  # of an implicit step, in units of the fastest rate that must be resolved
 PRESSED = 0.1  # of 1/p: a pair with a slower u' may follow its load; one that parts without a load is faster
 
 
 @inlined
-def relaxation(plant: Plant, state: State, side: Body) -> float:
-    """Rate p H u^1.5 / mu at which u' of a pair in contact relaxes, 1/s; 0 without contact."""
+def brake(plant: Plant, state: State, side: Body) -> float:
+    """Damping coefficient p H u^1.5 of a pair in contact, N s/m, (6); 0 without contact."""
     u, pair = state.y[U_L + side], plant.pairs[side]
     if state.mode[side] != Pair.CONTACT or not u > 0.0:
         return 0.0
-    return pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u) / reduced_mass(plant.bodies, side)
+    return pair[DISSIPATION] * elastic_force(pair[HERTZIAN], u)
+
+
+@inlined
+def relaxation(plant: Plant, state: State, side: Body) -> float:
+    """Rate p H u^1.5 / mu at which u' of a pair in contact relaxes, 1/s; 0 without contact."""
+    return brake(plant, state, side) / reduced_mass(plant.bodies, side)
 
 
 @kernel
@@ -94,7 +100,7 @@ def longest_step(plant: Plant, state: State, own: float, span: float) -> float:
 def is_unresolved(plant: Plant, state: State, side: Body) -> bool:
     """Whether 1 + p u' of a pair in contact is rounding, where Taylor steps may flutter: clamp and re-enter."""
     closed = state.mode[side] == Pair.CONTACT and plant.pairs[side, DISSIPATION] > 0.0
-    return closed and surface_factor(plant, state.y, side, UNRESOLVED) == 0.0
+    return closed and surface_factor(plant, state.y, side, ROUNDINGS) == 0.0
 
 
 @kernel

@@ -20,7 +20,7 @@ from grasp_ros.exact.collocation import (
     collocate,
     motion_of,
 )
-from grasp_ros.exact.creeping import LENGTH, least_step, longest_step, relaxation, resolved_rate, slow_relaxation
+from grasp_ros.exact.creeping import LENGTH, brake, least_step, longest_step, resolved_rate, slow_relaxation
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import other, reduced_mass, velocity_lane
 from grasp_ros.exact.outputs import wait
@@ -94,12 +94,11 @@ def handed_on(plant: Plant, state: State, side: Body, beside: Approach) -> float
 
     Held by the pair on this side as well, it goes with the one that brakes it more.
     """
-    arm = other(side)
     if not beside.stiff:
         return 0.0
-    mass, there = reduced_mass(plant.bodies, arm), relaxation(plant, state, arm)
-    here = relaxation(plant, state, side) * (reduced_mass(plant.bodies, side) / mass)
-    return there / (here + there) * (mass / plant.bodies[OBJECT, MASS]) * abs(state.y[velocity_lane(arm)])
+    arm = other(side)
+    there, share = brake(plant, state, arm), reduced_mass(plant.bodies, arm) / plant.bodies[OBJECT, MASS]
+    return there / (brake(plant, state, side) + there) * share * abs(state.y[velocity_lane(arm)])
 
 
 @kernel

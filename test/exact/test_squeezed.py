@@ -153,7 +153,7 @@ def test_states_and_events_against_taylor_steps(name: str, monkeypatch: pytest.M
 def test_a_slow_touch_beside_a_deep_pair_keeps_its_energy() -> None:
     """An implicit step must not begin at a touch: the energy of an arm that hits what friction holds is known."""
     speed, hertzian = 1e-8, 1e7
-    scene = Squeeze((0.0, 10.0), 1e7, (0.0, 0.0, -1e4), (-speed * 0.01, 0.0, -0.01), (speed, 0.0, 0.0),
+    scene = Squeeze((0.0, 10.0), hertzian, (0.0, 0.0, -1e4), (-speed * 0.01, 0.0, -0.01), (speed, 0.0, 0.0),
                     (1.0, 1.0, 1.0), (0.0, 0.0), coulomb=1e6, damping=0.0)
     result = scene.start()
     states = result.advance(0.03, np.linspace(0.015, 0.03, 4))
