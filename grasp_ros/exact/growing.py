@@ -5,15 +5,16 @@ reach a part of its age, however long nothing else happens. With z = sqrt(u) of 
 
     dt = 2 P ds,   P = u / u',   so that   dz/ds = z:
 
-s is the logarithm of z. Powers of t are exponential functions of it, whose series converge everywhere.
+s is the logarithm of z. Powers of t are exponential functions of it, whose series converge everywhere, with terms of
+one sign.
 """
 
 from __future__ import annotations
 
 from grasp_ros.exact.fused import fma
 from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.kinematics import other
-from grasp_ros.exact.records import Array
+from grasp_ros.exact.kinematics import other, reduced_mass
+from grasp_ros.exact.records import NEITHER, Array, Plant, Step
 from grasp_ros.exact.series import FACTORS, FIRST, ONE, SECOND, UPPER, accelerations, convolve, per_mass, put
 from grasp_ros.physics.layout import (
     CHECK,
@@ -21,6 +22,7 @@ from grasp_ros.physics.layout import (
     HERTZIAN,
     LANES,
     LEFT,
+    MASS,
     OBJECT,
     RIGHT,
     V_L,
@@ -32,10 +34,24 @@ from grasp_ros.physics.layout import (
     Body,
 )
 
+FOLLOWS = 2.0**-7  # of the momentum that the object gains: the arm of a pair that grows counts as gaining no less
+
 Two = tuple[float, float]
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
 Five = tuple[float, float, float, float, float]
+
+
+@kernel
+def arm_shares(plant: Plant, step: Step) -> Two:
+    """Parts of the object's motion by which the left and the right arm count as moving at least.
+
+    A pair that grows pushes its arm with a high power of t. Digits of that tell nothing until the object feels it.
+    """
+    if step.growing == NEITHER:
+        return 0.0, 0.0
+    share = FOLLOWS * reduced_mass(plant.bodies, step.growing) / plant.bodies[step.growing, MASS]
+    return (share, 0.0) if step.growing == LEFT else (0.0, share)
 
 
 @kernel

@@ -53,3 +53,9 @@ def order_for(tolerance: float, highest: Order, reach: float) -> Order:
         return highest
     number = max(2 * math.ceil(0.5 * (math.log(tolerance) / math.log(part) - 1.0)), LEAST)
     return new_order(tolerance, number, min(number, highest.early)) if number < highest.number else highest
+
+
+@inlined
+def without_early(order: Order) -> Order:
+    """An order of series whose terms may grow first: those of exponential functions that grow have one sign."""
+    return Order(order.number, order.first, order.number)

@@ -8,7 +8,7 @@ from grasp_ros.exact.bits import near_inverse, power_of_two_root
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass, relative_motion
-from grasp_ros.exact.orders import LEAST, RADIUS, lower_order, new_order, order_for
+from grasp_ros.exact.orders import LEAST, RADIUS, lower_order, new_order, order_for, without_early
 from grasp_ros.exact.records import NEITHER, Array, Integers, Plant, Settings, State, Step
 from grasp_ros.exact.rest import impact_beside
 from grasp_ros.physics.layout import (
@@ -168,7 +168,7 @@ def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Ste
     if left and right:
         growing = growing_side(plant, state, w_l, rate_l, w_r, rate_r)
         if growing != NEITHER:
-            return Step(highest, 1.0, left, right, growing)
+            return Step(without_early(highest), 1.0, left, right, growing)
     fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
     unit = near_inverse(fastest) if fastest > 0.0 else 1.0
     if outlasts(state.y, w_l, w_r, unit, span, RADIUS * highest.first):
