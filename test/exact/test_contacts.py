@@ -88,15 +88,15 @@ def test_the_last_impact_of_a_damped_chain_comes_late() -> None:
 
 @pytest.mark.parametrize("mirror", [False, True])
 @pytest.mark.parametrize("p", [0.0, 0.1])
-@pytest.mark.parametrize(("object_mass", "softer"), [(1.0, 1.0), (1e3, 1.0), (1.0, 1e6), (1e-3, 1e12), (1e3, 1e12)])
-def test_a_touching_chain_takes_ten_steps_a_contact(object_mass: float, softer: float, p: float, mirror: bool) -> None:
+@pytest.mark.parametrize(("object_mass", "softer"), [(1.0, 1.0), (1e3, 1.0), (1.0, 1e6), (1e-3, 1e12), (1e3, 1e20)])
+def test_a_touching_chain_takes_few_steps_a_contact(object_mass: float, softer: float, p: float, mirror: bool) -> None:
     """The second contact begins at rest, with t^3.5, and may stay young for many decades of time."""
     contacts, start = (Contact(1e4, p), Contact(1e4 / softer, 0.1)), [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     if mirror:
         contacts, start = contacts[::-1], [0.0, 0.0, 0.0, 0.0, 0.0, -1.0]
     result = run(Grasp(FREE, FREE, *contacts, object_mass), start, 10.0)
     assert kinds(result)[0] == ("RELEASE", RIGHT if mirror else LEFT)
-    assert done(result).work[Work.CONTACT_STEPS] <= 20
+    assert done(result).work[Work.CONTACT_STEPS] <= 14
 
 
 def test_most_drawn_touching_chains_take_ten_steps_a_swing() -> None:
