@@ -50,6 +50,7 @@ from grasp_ros.physics.layout import (
 
 FINEST = 64.0 * EPS  # part of the velocities that the last coefficients of a step may have
 ROUNDINGS = 32.0  # times what is allowed: so much error may be rounding of what a step gains, and go with its length
+BRIEF = 0.25  # of the least length: a step that rounding limits spares positions the roundings of many others
 JUMP = 8.0  # times as much as the last coefficients weighs what is left of a relaxation at the begin
 
 
@@ -171,12 +172,12 @@ def velocity_scale(plant: Plant, state: State) -> float:
 def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, out: Output) -> float:
     """Length in s of an implicit step, whose polynomials it writes; 0 where Taylor steps are cheaper."""
     slower = max(slow_relaxation(plant, state), resolved_rate(plant, state, settings.rate, False))
-    least = least_step(plant, state)
+    least, brief = least_step(plant, state), 1.0
     h, scale = longest_step(plant, state, settings.rate, span), velocity_scale(plant, state)
     allowed = FINEST + 100.0 * settings.tolerance
     longest = h
     error = before = math.inf
-    while h > least:
+    while h > brief * least:
         start = Begin(h, state.y[X_O], state.y[V_O], scale)
         left, right = motion_of(plant, state, LEFT, h), motion_of(plant, state, RIGHT, h)
         error = math.inf
@@ -188,7 +189,7 @@ def implicit_step(tables: Tables, plant: Plant, state: State, settings: Settings
         shorter = h * min(max(0.7 * error ** (-1.0 / (STAGES - 1)), 0.1), 0.7)
         if error > 0.03 * before or (error == math.inf and h < longest):  # not what the polynomials neglect
             if error < ROUNDINGS * max(1.0, EPS * abs(tables.f[V_NODES + STAGES - 1]) / (allowed * scale)):
-                shorter = 0.5 * h / error
+                shorter, brief = 0.5 * h / error, BRIEF
             elif slower * shorter > LENGTH:
                 shorter = LENGTH / slower
             else:
