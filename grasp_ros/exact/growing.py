@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from grasp_ros.exact.fused import fma
 from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.kinematics import other, reduced_mass
-from grasp_ros.exact.records import NEITHER, Array, Plant, Step
+from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.records import Array
 from grasp_ros.exact.series import FACTORS, FIRST, ONE, SECOND, UPPER, accelerations, convolve, per_mass, put
 from grasp_ros.physics.layout import (
     CHECK,
@@ -22,7 +22,6 @@ from grasp_ros.physics.layout import (
     HERTZIAN,
     LANES,
     LEFT,
-    MASS,
     OBJECT,
     RIGHT,
     V_L,
@@ -34,24 +33,10 @@ from grasp_ros.physics.layout import (
     Body,
 )
 
-FOLLOWS = 2.0**-7  # of the momentum that the object gains: the arm of a pair that grows counts as gaining no less
-
 Two = tuple[float, float]
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
 Five = tuple[float, float, float, float, float]
-
-
-@kernel
-def arm_shares(plant: Plant, step: Step) -> Two:
-    """Parts of the object's motion by which the left and the right arm count as moving at least.
-
-    A pair that grows pushes its arm with a high power of t. Digits of that tell nothing until the object feels it.
-    """
-    if step.growing == NEITHER:
-        return 0.0, 0.0
-    share = FOLLOWS * reduced_mass(plant.bodies, step.growing) / plant.bodies[step.growing, MASS]
-    return (share, 0.0) if step.growing == LEFT else (0.0, share)
 
 
 @kernel

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from grasp_ros.exact.bits import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
-from grasp_ros.exact.growing import arm_shares, expand_growing
+from grasp_ros.exact.growing import expand_growing
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import own_size, rate_lanes
 from grasp_ros.exact.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
@@ -143,12 +143,12 @@ def inverse(size: float) -> float:
 
 
 @inlined
-def length(tables: Tables, pulled: tuple[float, float, float], shares: tuple[float, float], step: Step,
-           settings: Settings, reach: float) -> float:
-    """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`.
+def length(tables: Tables, pulled: tuple[float, float, float], step: Step, settings: Settings, reach: float) -> float:
+    """Step in s / unit at which what is neglected is `tolerance` times what moves within `reach`; `pulled`: of `pulls`.
 
-    pulled, shares: of `pulls` and `arm_shares`. Velocities move by the step's own motion, and no less than by the
-    rounding of the terms of their equation; positions with them. The product has a test of its own.
+    Velocities move by the step's own motion, and no less than by the rounding of the terms of their equation;
+    positions with them.
+    The product has a test of its own.
     """
     c = tables.c
     t, v_l, x_o, v_o, _, v_r, z_l, z_r = motion_sizes(c, reach)
@@ -156,7 +156,7 @@ def length(tables: Tables, pulled: tuple[float, float, float], shares: tuple[flo
     pull_l, pull_o, pull_r = pulled
     v_l, v_o, v_r = max(v_l, doubt * pull_l), max(v_o, doubt * pull_o), max(v_r, doubt * pull_r)
     still = STILL * max(v_l, v_o, v_r)
-    v_l, v_o, v_r = max(v_l, still, shares[0] * v_o), max(v_o, still), max(v_r, still, shares[1] * v_o)
+    v_l, v_o, v_r = max(v_l, still), max(v_o, still), max(v_r, still)
     x_o = max(x_o, t * v_o)
     z_l = depth_size(c[Z_L], step.left, z_l, t * (v_l + v_o))
     z_r = depth_size(c[Z_R], step.right, z_r, t * (v_o + v_r))
@@ -173,14 +173,14 @@ def fitted_step(tables: Tables, plant: Plant, state: State, settings: Settings, 
     where they vanish, the end of the span or a release ends the step. One that has been changed is changed until the
     step is about 1, so that it is the same however far off it was.
     """
-    pulled, shares = pulls(plant, state.y), arm_shares(plant, step)  # quotients after the series would be waited for
+    pulled = pulls(plant, state.y)  # before the series: quotients after it would be waited for
     fits = 0
     for turn in range(MAX_UNITS):
         begin_series(tables, state)
         expand(tables, plant, step)
         h = 1.0
         for _ in range(2):
-            h = length(tables, pulled, shares, step, settings, h)
+            h = length(tables, pulled, step, settings, h)
             if BELOW < h < ABOVE or not 0.0 < h < math.inf:
                 break
         fits += FAR_BELOW < h < FAR_ABOVE

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from grasp_ros.exact.growing import arm_shares
 from grasp_ros.exact.orders import higher_order, lower_order, series_order
 from grasp_ros.exact.polynomial import curvatures, invert_time, lane_range, values
 from grasp_ros.exact.records import NEITHER, Order, Plant, Settings, Start, State, Step, Tables
@@ -254,11 +253,6 @@ def motion(name: str) -> tuple[Plant, State]:
     return Plant(BODIES, BODIES.copy(), PAIRS, 0.0), State(y, np.array([*mode, Slide.FREE]), np.zeros(3))
 
 
-def length_of(tables: Tables, plant: Plant, state: State, step: Step, settings: Settings, reach: float) -> float:
-    """The length of a step with its series."""
-    return length(tables, pulls(plant, state.y), arm_shares(plant, step), step, settings, reach)
-
-
 def settings_of(tolerance: float) -> Settings:
     """What follows from a tolerance."""
     return new_settings(tolerance, higher_order(series_order(tolerance)), BODIES)
@@ -274,9 +268,9 @@ def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[
     tables.f[:] = np.nan
     begin_series(tables, state)
     expand_step(tables, plant, step)
-    h = length_of(tables, plant, state, step, settings, 1.0)
+    h = length(tables, pulls(plant, state.y), step, settings, 1.0)
     if not BELOW < h < ABOVE:
-        h = length_of(tables, plant, state, step, settings, h)
+        h = length(tables, pulls(plant, state.y), step, settings, h)
     return tables, step, h
 
 
@@ -290,7 +284,6 @@ def test_a_step_neglects_little_of_what_moves_in_each_lane(name: str) -> None:
         best = expand(name, 60, unit=step.unit)
         moved = np.abs(best[1:6] * h ** np.arange(1, 6)[:, None]).max(axis=0)
         moved[X_O] = max(moved[X_O], moved[TIME] * moved[V_O])
-        moved[[V_L, V_R]] = np.maximum(moved[[V_L, V_R]], np.array(arm_shares(motion(name)[0], step)) * moved[V_O])
         error, beyond = (np.abs(at(table, s) - at(best, s))[LANES_OF_MOTION] / moved[LANES_OF_MOTION]
                          for s in (h, 2.0 * h))
         assert error.max() <= 30.0 * tolerance
@@ -339,7 +332,7 @@ def test_terms_of_a_high_order_do_not_cancel() -> None:
         step, tables = new_step(plant, state, settings._replace(both=order), np.inf), new_tables(settings.one.number)
         begin_series(tables, state)
         expand_step(tables, plant, step)
-        accepted_length(tables, step, length_of(tables, plant, state, step, settings, 1.0), settings,
+        accepted_length(tables, step, length(tables, pulls(plant, state.y), step, settings, 1.0), settings,
                         np.zeros(len(Work), dtype=np.int64))
         terms.append(tables.size[V_R] / abs(tables.at[V_R] - tables.c[V_R]))
     assert terms[0] < 300.0
@@ -416,7 +409,7 @@ def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -
     step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.one.number)
     begin_series(tables, state)
     expand_step(tables, plant, step)
-    h = length(tables, pulls(plant, y), (0.0, 0.0), step, settings, 1.0)
+    h = length(tables, pulls(plant, y), step, settings, 1.0)
     assert 0.25 < h < 4.0
     duration = 2.9432751843247047 * depth / speed
     table = tables.c[: LANES * (step.order.number + 1)].reshape(-1, LANES)

@@ -41,7 +41,7 @@ def test_a_pair_whose_factor_is_rounding_flutters_for_few_steps() -> None:
 
 
 @pytest.mark.parametrize(("name", "steps"), [("chain_1", 27), ("chain_friction_5", 26),
-                                             ("chain_set_point_friction_1", 32), ("chain_friction_4", 32)])
+                                             ("chain_set_point_friction_1", 34), ("chain_friction_4", 32)])
 def test_a_pair_that_grows_over_decades_of_time_takes_steps_of_several_times_its_age(name: str, steps: int) -> None:
     """Beside a pair that is much harder; 31, 40, 49 and 44 by steps of about its age."""
     scene = SCENES[name]
