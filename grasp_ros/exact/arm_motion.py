@@ -1,7 +1,7 @@
 """The motion of an arm in an implicit step: its accelerations at the nodes, from what tells them best.
 
 From forces a slow arm keeps digits that v_o and u' do not have. But H u^1.5 (1 + p u') has lost its own where 1 + p u'
-nearly vanishes. Then v_o and u' tell the arm, or, of one that is heavier than the object, what moves the object.
+nearly vanishes. Then v_o and u' tell the arm, or, of one that is heavier than all beside it, what moves the others.
 """
 
 from __future__ import annotations
@@ -17,26 +17,23 @@ from grasp_ros.physics.layout import DAMPING, FORCE, MASS, OBJECT, STIFFNESS, Bo
 
 
 @inlined
-def grip(pair: Approach, h: float) -> float:
-    """The mass, in kg, that an impact moves within the step as u' asks; of what is lighter it has lost the motion."""
-    return float(h * pair.share * elastic_force(pair.hertzian, max(pair.u, 0.0)) / pair.rate)
-
-
-@inlined
 def speed(pair: Approach, start: Begin) -> float:
     """What roundings of u' are relative to, m/s."""
     return max(pair.rate * max(abs(pair.e - pair.offset), pair.offset), abs(start.v))
 
 
 @inlined
-def by_object(bodies: Array, side: Body, pair: Approach, beside: Approach, start: Begin) -> bool:
-    """Whether the motion of the object tells the impact on a heavier arm best: that of the other pair has its digits.
+def doubt(bodies: Array, side: Body, pair: Approach, start: Begin) -> float:
+    """Impulse in N s, by EPS, that roundings of u' leave open: of an arm, or of what moves as u' asks if less."""
+    grip = start.h * pair.share * elastic_force(pair.hertzian, max(pair.u, 0.0)) / pair.rate
+    return float(min(bodies[side, MASS], grip) * speed(pair, start))
 
-    Its roundings give the object no more speed than those of u' have.
-    """
-    mass, h = bodies[OBJECT, MASS], start.h
-    known = grip(beside, h) * speed(beside, start) <= mass * speed(pair, start)
-    return bool(bodies[side, MASS] > mass and grip(pair, h) > mass and known)
+
+@inlined
+def by_object(bodies: Array, side: Body, pair: Approach, beside: Approach, start: Begin) -> bool:
+    """Whether the motions of the object and of the pair beside tell an impact better than its own u'."""
+    others = max(bodies[OBJECT, MASS] * speed(pair, start), doubt(bodies, other(side), beside, start))
+    return bool(others < doubt(bodies, side, pair, start))
 
 
 @inlined
@@ -46,11 +43,31 @@ def place_at(f: Array, start: Begin, j: int) -> float:
 
 
 @inlined
-def push_of_object(f: Array, middle: Array, side: Body, beside: Approach, start: Begin, j: int) -> float:
+def by_pair(f: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
+    """Acceleration of an arm at a node, m/s^2, from v_o and u'."""
+    faster = pair.sign * (pair.rate * times(DERIVATIVE, j, f, E_NODES + side * STAGES, pair.e))
+    return float((times(DERIVATIVE, j, f, V_NODES, 0.0) + faster) / start.h)
+
+
+@inlined
+def push_of_pair(f: Array, bodies: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
+    """Force of a pair on the object at a node, N; of one that relaxes within the step, from the motion of its arm."""
+    if not pair.stiff:
+        return float(pair.sign * impact_at(f, side, pair, start.h, j))
+    body, x = bodies[side], place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, start.h, j)
+    faster = pair.rate * (f[E_NODES + side * STAGES + j] - pair.offset)
+    v = start.v + f[V_NODES + j] + pair.sign * faster
+    own = body[FORCE] - body[STIFFNESS] * x - body[DAMPING] * v
+    return float(own - body[MASS] * by_pair(f, side, pair, start, j))
+
+
+@inlined
+def push_of_object(f: Array, bodies: Array, side: Body, beside: Approach, start: Begin, j: int) -> float:
     """Force of a side on the object at a node, N, from the motion of the object and the pair beside."""
+    middle = bodies[OBJECT]
     inertia = middle[MASS] / start.h * times(DERIVATIVE, j, f, V_NODES, 0.0)
     own = middle[FORCE] - middle[DAMPING] * (start.v + f[V_NODES + j]) - middle[STIFFNESS] * place_at(f, start, j)
-    return float((inertia - own) - beside.sign * impact_at(f, other(side), beside, start.h, j))
+    return float((inertia - own) - push_of_pair(f, bodies, other(side), beside, start, j))
 
 
 @inlined
@@ -59,17 +76,10 @@ def by_forces(f: Array, bodies: Array, side: Body, pair: Approach, beside: Appro
     """Acceleration of an arm at a node, m/s^2, without that of its damper; `told` by the object, or by the impact."""
     body, x = bodies[side], place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, start.h, j)
     if told:
-        push = push_of_object(f, bodies[OBJECT], side, beside, start, j)
+        push = push_of_object(f, bodies, side, beside, start, j)
     else:
         push = pair.sign * impact_at(f, side, pair, start.h, j)
     return float((body[FORCE] - body[STIFFNESS] * x - push) / body[MASS])
-
-
-@inlined
-def by_pair(f: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
-    """Acceleration of an arm at a node, m/s^2, from v_o and u'."""
-    faster = pair.sign * (pair.rate * times(DERIVATIVE, j, f, E_NODES + side * STAGES, pair.e))
-    return float((times(DERIVATIVE, j, f, V_NODES, 0.0) + faster) / start.h)
 
 
 @kernel

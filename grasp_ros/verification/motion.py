@@ -241,7 +241,8 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
     within_range = np.isfinite(unit)  # squares may leave the range of numbers
     known = resolved & _resolved(detail, taken, unit) & within_range
     within = sum(pair.sudden * np.abs(pair.d).max(axis=1) for pair in pairs)  # a rounding of the time
-    error = np.abs(level + lost) / (unit + np.where(known, 0.0, ALL * (lost + within)))
+    most = taken.max(axis=1) * (detail.pieces.end - detail.pieces.begin)  # the nodes may lie behind all of the loss
+    error = np.abs(level + lost) / (unit + np.where(known, 0.0, ALL * (most + within)))
     return Ledger("energy", np.where(within_range, error, 0.0), known)
 
 
