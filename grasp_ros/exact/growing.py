@@ -5,8 +5,8 @@ reach a part of its age, however long nothing else happens. With z = sqrt(u) of 
 
     dt = 2 P ds,   P = u / u',   so that   dz/ds = z:
 
-s is the logarithm of z. Powers of t are exponential functions of it, whose series converge everywhere, with terms of
-one sign.
+s is the logarithm of z. Powers of t are exponential functions of it, whose series converge everywhere, and whose terms
+have one sign: they may be large on the way, unlike those of a relaxation.
 """
 
 from __future__ import annotations

@@ -57,5 +57,5 @@ def order_for(tolerance: float, highest: Order, reach: float) -> Order:
 
 @inlined
 def without_early(order: Order) -> Order:
-    """An order of series whose terms may grow first: those of exponential functions that grow have one sign."""
+    """The same order without the rule for early terms: of series whose terms have one sign, and cannot cancel."""
     return Order(order.number, order.first, order.number)
