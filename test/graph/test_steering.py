@@ -46,8 +46,9 @@ def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
         refused = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
         assert (refused.returncode, refused.stdout) == (1, "")
         assert "not paused; allowed: step of a paused plant" in refused.stderr
-        last = int(plant.expect("pause", True, "paused at tick").split()[-1])
-    return directory, [*plant.lengths, last + 1]
+        plant.tick = int(plant.expect("pause", True, "paused at tick").split()[-1])
+        plant.settle()  # it is paused as soon as this tick is answered
+    return directory, [*plant.lengths, plant.tick + 1]
 
 
 def test_random_steering_leaves_a_bag_that_verifies(steered: tuple[Path, list[int]]) -> None:
