@@ -50,14 +50,20 @@ def by_pair(f: Array, side: Body, pair: Approach, start: Begin, j: int) -> float
 
 
 @inlined
+def own_force(f: Array, body: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
+    """Force on an arm at a node, N, without those of its damper and of the impact."""
+    x = place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, start.h, j)
+    return float(body[FORCE] - body[STIFFNESS] * x)
+
+
+@inlined
 def push_of_pair(f: Array, bodies: Array, side: Body, pair: Approach, start: Begin, j: int) -> float:
     """Force of a pair on the object at a node, N; of one that relaxes within the step, from the motion of its arm."""
     if not pair.stiff:
         return float(pair.sign * impact_at(f, side, pair, start.h, j))
-    body, x = bodies[side], place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, start.h, j)
     faster = pair.rate * (f[E_NODES + side * STAGES + j] - pair.offset)
-    v = start.v + f[V_NODES + j] + pair.sign * faster
-    own = body[FORCE] - body[STIFFNESS] * x - body[DAMPING] * v
+    v, body = start.v + f[V_NODES + j] + pair.sign * faster, bodies[side]
+    own = own_force(f, body, side, pair, start, j) - body[DAMPING] * v
     return float(own - body[MASS] * by_pair(f, side, pair, start, j))
 
 
@@ -73,13 +79,9 @@ def push_of_object(f: Array, bodies: Array, side: Body, beside: Approach, start:
 @inlined
 def by_forces(f: Array, bodies: Array, side: Body, pair: Approach, beside: Approach, start: Begin, told: bool, j: int
               ) -> float:
-    """Acceleration of an arm at a node, m/s^2, without that of its damper; `told` by the object, or by the impact."""
-    body, x = bodies[side], place_at(f, start, j) + pair.sign * penetration_at(f, side, pair, start.h, j)
-    if told:
-        push = push_of_object(f, bodies, side, beside, start, j)
-    else:
-        push = pair.sign * impact_at(f, side, pair, start.h, j)
-    return float((body[FORCE] - body[STIFFNESS] * x - push) / body[MASS])
+    """Acceleration of an arm at a node, m/s^2, without that of its damper; `told` by the others, or by the impact."""
+    push = push_of_object(f, bodies, side, beside, start, j) if told else push_of_pair(f, bodies, side, pair, start, j)
+    return float((own_force(f, bodies[side], side, pair, start, j) - push) / bodies[side, MASS])
 
 
 @kernel

@@ -124,8 +124,8 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
 
 @inlined
 def is_release(candidate: Candidate, s: float) -> bool:
-    """Whether it is a release at s that takes time."""
-    return candidate.what == Transition.RELEASE and candidate.when == s and s > 0.0
+    """Whether it is a release at s."""
+    return candidate.what == Transition.RELEASE and candidate.when == s
 
 
 @kernel
