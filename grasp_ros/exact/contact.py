@@ -32,6 +32,7 @@ from grasp_ros.exact.records import (
 )
 from grasp_ros.exact.roots import first_rise
 from grasp_ros.exact.scales import new_step, within_decay
+from grasp_ros.exact.sums import add_ways
 from grasp_ros.exact.taylor_step import accepted_length, fitted_step
 from grasp_ros.physics.layout import (
     DISSIPATION,
@@ -61,6 +62,7 @@ from grasp_ros.physics.layout import (
 )
 
 ALONE = np.int64(-1)  # no second lane
+CANCELS = 16.0  # times what it begins with: terms so large leave their roundings in what a relaxation ends with
 
 
 @inlined
@@ -119,17 +121,38 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
 
 
 @inlined
+def is_blurred(tables: Tables, n: int, side: Body, candidate: Candidate, s: float) -> bool:
+    """Whether u' crosses -1/p at s, where it has the roundings of terms far larger than itself."""
+    if candidate.when != s or candidate.what not in (Transition.CLAMP, Transition.REENTRY):
+        return False
+    front, back = rate_lanes(side)
+    total = 0.0
+    for k in range(n, -1, -1):
+        total = total * s + abs(tables.c[LANES * k + front] - tables.c[LANES * k + back])
+    return total > CANCELS * abs(tables.c[front] - tables.c[back])
+
+
+@inlined
+def clear_end(tables: Tables, n: int, left: Candidate, right: Candidate, h: float) -> float:
+    """Where a step of length h ends for its pairs: at their first event, or half-way if that is blurred from here."""
+    s = min(h, left.when, right.when)
+    if s < h and (is_blurred(tables, n, LEFT, left, s) or is_blurred(tables, n, RIGHT, right, s)):
+        s *= 0.5
+    return s
+
+
+@inlined
 def penetration(z: float, touching: bool) -> float:
     """u of a pair from its lane; w^2, never negative, in contact."""
     return z * z if touching else z
 
 
 @inlined
-def write_state(at: Array, u_l: float, u_r: float, y: Array) -> None:
-    """Positions and velocities from the values of the lanes and from u."""
-    y[X_L], y[V_L] = at[X_O] + u_l, at[V_L]
-    y[X_O], y[V_O] = at[X_O], at[V_O]
-    y[X_R], y[V_R] = at[X_O] - u_r, at[V_R]
+def write_state(at: Array, x_o: float, u_l: float, u_r: float, y: Array) -> None:
+    """Positions and velocities from x_o and u, and from the values of the lanes."""
+    y[X_L], y[V_L] = x_o + u_l, at[V_L]
+    y[X_O], y[V_O] = x_o, at[V_O]
+    y[X_R], y[V_R] = x_o - u_r, at[V_R]
 
 
 @inlined
@@ -141,7 +164,7 @@ def deliver(tables: Tables, step: Step, s: float, t: float, how: tuple[Placing, 
     while tau < t:
         row = out.rows[out.filled[Filled.OUTPUTS]]
         values_and_ways(tables.c, step.order.number, invert_time(tables, step, tau, s, t), at)
-        write_state(at, penetration(at[Z_L], step.left), penetration(at[Z_R], step.right), row)
+        write_state(at, at[X_O], penetration(at[Z_L], step.left), penetration(at[Z_R], step.right), row)
         place_beside(at, how, free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
@@ -160,7 +183,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when):
         return math.nan
-    s = min(h, left.when, right.when)
+    s = clear_end(tables, n, left, right, h)
     if s < h:
         values_and_ways(c, n, s, at)
     slide = SlideCandidate(math.inf, Slide.FREE)
@@ -178,8 +201,8 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
         values_and_ways(c, n, s, at)
     how = (placing(tables, plant, y, LEFT, step.left, s, t), placing(tables, plant, y, RIGHT, step.right, s, t))
     free = (free_flight(plant, y, LEFT, how[0]), free_flight(plant, y, RIGHT, how[1]))
-    y[U_L], y[U_R] = penetration(at[Z_L], step.left), penetration(at[Z_R], step.right)
-    write_state(at, y[U_L], y[U_R], y)
+    add_ways(state, at, step.left, step.right)
+    write_state(at, y[X_O], y[U_L], y[U_R], y)
     place_beside(at, how, free, t, y)
     part_beside(plant, how, free, t, y)
     keep_resting(state)

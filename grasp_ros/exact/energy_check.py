@@ -35,6 +35,7 @@ from grasp_ros.physics.layout import (
 )
 
 DIED_OUT = 1e-150  # m; of less, squares and products have left the range of numbers, and what moves it is not followed
+OVERFLOWS = 1e150  # J; beyond, squares and products of what moves in contact leave the range of numbers
 UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
 ROUNDINGS = 128.0  # of the sum of all terms: flights, impacts and differences of positions
 NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
@@ -145,14 +146,15 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
                   modes: tuple[int, int]) -> Outcome:
     """Whether a segment of t s, which began with both pairs in `modes`, can be believed.
 
-    It must be finite, not stalled, without a touch that was missed, and its energy may neither rise nor fall by more
-    than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come.
+    It must be finite, its contacts, too, not stalled, without a touch that was missed, and its energy may neither rise
+    nor fall by more than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come.
     """
-    if not math.isfinite(state.y.sum()):
+    rise, size = after.value - before.value, max(after.size, before.size)
+    touches = modes[0] == Pair.CONTACT or modes[1] == Pair.CONTACT
+    if not math.isfinite(state.y.sum()) or (touches and size > OVERFLOWS):
         return Outcome.NOT_FINITE
     if math.isnan(t) or idle > MAX_IDLE:
         return Outcome.STALLED
-    rise, size = after.value - before.value, max(after.size, before.size)
     if penetrates(plant, state, LEFT, before.u_l, size, t) or penetrates(plant, state, RIGHT, before.u_r, size, t):
         return Outcome.PENETRATES
     rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + UNDERFLOW

@@ -17,6 +17,7 @@ from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import arm_of
 from grasp_ros.exact.modes import begin_interval
 from grasp_ros.exact.records import Array, Integers, Loop, Output, Plant, State
+from grasp_ros.exact.sums import forget
 from grasp_ros.physics.layout import FORCE, LEFT, OBJECT, RIGHT, Answer, Filled, Outcome, Place
 
 
@@ -66,6 +67,7 @@ def open_interval(plant: Plant, state: State, own: Array, loop: Loop, filled: In
     k = loop.place[Place.INTERVAL]
     state.clock[0], state.clock[1], state.clock[2] = 0.0, 0.0, loop.begins[k]
     filled[Filled.WAIT], filled[Filled.PENALTY] = 0, 0
+    forget(state)
     if loop.inputs.shape[0] > 0:
         if loop.answers.shape[0] > 0 and not answer(state, loop, k):
             return False

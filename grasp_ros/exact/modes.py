@@ -41,6 +41,7 @@ from grasp_ros.exact.kinematics import approach, is_closed, is_resting, velocity
 from grasp_ros.exact.outputs import record, try_soon
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
 from grasp_ros.exact.rest import NEVER, begins_anew, is_negligible, leaning, parts, turn_back
+from grasp_ros.exact.sums import forget
 from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
 from grasp_ros.physics.layout import (
     EPS,
@@ -191,6 +192,8 @@ def make_transitions(plant: Plant, state: State, left: Candidate, right: Candida
                      out: Output) -> None:
     """Make all transitions within a few roundings of the end; lost forces hide no more what pushes a stuck object."""
     last = end * TOGETHER
+    if min(left.when, right.when, slide.when) <= last:
+        forget(state)
     leaves_l = left.when <= last and left.what == Transition.CLAMP and glides(plant, state, LEFT)
     leaves_r = right.when <= last and right.what == Transition.CLAMP and glides(plant, state, RIGHT)
     if left.when <= last:

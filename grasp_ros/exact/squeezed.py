@@ -39,6 +39,7 @@ from grasp_ros.exact.records import (
 )
 from grasp_ros.exact.roots import first_rise
 from grasp_ros.exact.scales import new_settings
+from grasp_ros.exact.sums import forget
 from grasp_ros.physics.layout import (
     DISSIPATION,
     EPS,
@@ -48,6 +49,7 @@ from grasp_ros.physics.layout import (
     RIGHT,
     U_L,
     U_R,
+    X_O,
     Body,
     Filled,
     Outcome,
@@ -101,7 +103,7 @@ def deliver(tables: Tables, h: float, t: float, how: tuple[Placing, Placing], fr
     while tau < t:
         row = out.rows[out.filled[Filled.OUTPUTS]]
         values(tables.c, STAGES, tau / h, tables.at)
-        write_state(tables.at, tables.at[U_L], tables.at[U_R], row)
+        write_state(tables.at, tables.at[X_O], tables.at[U_L], tables.at[U_R], row)
         place_beside(tables.at, how, free, tau, row)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
@@ -160,10 +162,11 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     deliver(tables, h, t, how, free, state, out)
     values(c, STAGES, s, at)
     y[U_L], y[U_R] = at[U_L], at[U_R]
-    write_state(at, y[U_L], y[U_R], y)
+    write_state(at, at[X_O], y[U_L], y[U_R], y)
     place_beside(at, how, free, t, y)
     part_beside(plant, how, free, t, y)
     keep_resting(state)
+    forget(state)
     tick(state.clock, t)
     leave_step(tables, s, h)
     notify(out, Segment.CREEP, t)
@@ -175,7 +178,7 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
 def creep(
     c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
     given: Array, bodies: Array, pairs: Array, coulomb: float,
-    y: Array, mode: Integers, clock: Array,
+    y: Array, mode: Integers, rest: Array, clock: Array,
     end: float, tolerance: float, max_work: int,
     grid: Array, rows: Array, events: Array, filled: Integers, work: Integers,
 ) -> int:
@@ -189,7 +192,7 @@ def creep(
         A `layout.Outcome`: GO_ON, or why the step cannot be believed; `rows` holds nothing of it then.
     """
     tables = Tables(c, f, at, size, size, Start(start_c, start_f))  # this row is long enough at any accuracy
-    plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, clock)
+    plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, rest, clock)
     settings = new_settings(tolerance, row.shape[0] - 1, given)
     out = Output(grid, rows, events, filled, work)
     reached = out.filled[Filled.OUTPUTS]

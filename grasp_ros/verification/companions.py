@@ -110,12 +110,18 @@ def _left_of_distance(run: Trajectory, product: Product, rate: float) -> float |
 
 
 def _cancelled(run: Trajectory) -> float:
-    """Speed in m/s that roundings of a feedback around its set-point bring."""
+    """Speed in m/s that roundings of a feedback around its set-point bring, or of impacts that balance each other."""
     system, speed = run.scene.system, 0.0
+    mass, duration = system.bodies[:, MASS], run.scene.duration
+    motion = np.abs(np.nan_to_num(penetration(run.state))).max(axis=1)
+    for side in system.contacts:
+        (hertzian, loss), (depth, rate) = system.pairs[side], motion[2 * side : 2 * side + 2]
+        force = hertzian * depth**1.5 * (1.0 + loss * rate)
+        speed = max(speed, 16.0 * EPS * force * duration / min(mass[side], mass[OBJECT]))
     for side, law in system.laws.items():
         place = np.abs(run.state[:, COLUMN[side]]).max() + abs(law.set_point)
         force = abs(law.position_gain) * place + abs(law.feed_forward)
-        speed = max(speed, 16.0 * EPS * force * run.scene.duration / system.bodies[side, MASS])
+        speed = max(speed, 16.0 * EPS * force * duration / mass[side])
     return speed
 
 

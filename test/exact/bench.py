@@ -99,7 +99,7 @@ def bench(
     out = Output(np.zeros(0), np.zeros((0, 6)), np.zeros((SPARE, 5)), np.zeros(len(Filled), dtype=np.int64),
                  np.zeros(len(Work), dtype=np.int64))
     settings = new_settings(TOLERANCE, higher_order(ORDER), given)
-    return Bench(plant, State(y, modes, np.array([time, 0.0, 0.0])), settings, out)
+    return Bench(plant, State(y, modes, np.zeros(8), np.array([time, 0.0, 0.0])), settings, out)
 
 
 def bits(values: Array) -> bytes:

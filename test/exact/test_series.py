@@ -250,7 +250,7 @@ def motion(name: str) -> tuple[Plant, State]:
     x_o, v_l, v_o, v_r, u_l, u_r = START[name]
     y = np.array([x_o + u_l, v_l, x_o, v_o, x_o - u_r, v_r, u_l, u_r])
     mode = [Pair.CONTACT if touching else Pair.OPEN for touching in sides(name)]
-    return Plant(BODIES, BODIES.copy(), PAIRS, 0.0), State(y, np.array([*mode, Slide.FREE]), np.zeros(3))
+    return Plant(BODIES, BODIES.copy(), PAIRS, 0.0), State(y, np.array([*mode, Slide.FREE]), np.zeros(8), np.zeros(3))
 
 
 def settings_of(tolerance: float) -> Settings:
@@ -404,7 +404,8 @@ def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -
     depth = (5 * 0.5 * speed**2 / (4 * 1e4)) ** 0.4
     u = 0.1 * depth if both else 0.0
     y = np.array([u, speed, 0.0, 0.0, -u if both else 1.0, -speed, u, u if both else -1.0])
-    state = State(y, np.array([Pair.CONTACT, Pair.CONTACT if both else Pair.OPEN, Slide.FREE]), np.zeros(3))
+    modes = np.array([Pair.CONTACT, Pair.CONTACT if both else Pair.OPEN, Slide.FREE])
+    state = State(y, modes, np.zeros(8), np.zeros(3))
     plant, settings = Plant(bodies, bodies, pairs, 0.0), settings_of(1e-14)._replace(rate=0.0)
     step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.one.number)
     begin_series(tables, state)
