@@ -10,7 +10,8 @@ from exact.bench import bench
 from grasp_ros.exact.energy_check import check_segment, energy_level
 from grasp_ros.exact.records import Level
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import DAMPING, LEFT, RIGHT, U_L, Body, Outcome, Pair
+from grasp_ros.physics.layout import DAMPING, EPS, HERTZIAN, LEFT, RIGHT, U_L, X_O, Body, Outcome, Pair
+from grasp_ros.physics.system import COLUMN
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 OPEN = (Pair.OPEN, Pair.OPEN)
@@ -109,6 +110,30 @@ def test_a_pair_without_force_loses_what_it_stored_and_no_more(side: Body, mode:
     u = (0.02, -1.0) if side == LEFT else (-1.0, 0.02)
     for lost, expected in ((0.9 * stored, Outcome.GO_ON), (1.1 * stored, Outcome.ENERGY_FALLS)):
         begin = Level(after.value + lost, after.size + lost, 0.0, 0.0, *u)
+        assert check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, modes) == expected
+
+
+@SIDES
+@pytest.mark.parametrize(("mode", "expected"), [(Pair.CONTACT, Outcome.NOT_FINITE), (Pair.OPEN, Outcome.GO_ON)])
+def test_a_contact_whose_squares_leave_the_range_of_numbers_is_stopped(side: Body, mode: Pair, expected: Outcome
+                                                                       ) -> None:
+    b = bench(side, -0.1, 1e76, mode)
+    level = energy_level(b.plant, b.state, 0.0)
+    modes = (Pair(int(b.state.mode[LEFT])), Pair(int(b.state.mode[RIGHT])))
+    assert check_segment(b.plant, b.state, b.settings, level, level, 0.01, 0, modes) == expected
+
+
+@SIDES
+def test_an_arm_at_zero_has_the_roundings_of_the_object_that_it_touches(side: Body) -> None:
+    """What they are under its spring may come in a segment, and no more."""
+    depth, sign = 1e-3, 1.0 if side == LEFT else -1.0
+    b = bench(side, depth, 0.0, Pair.CONTACT, stiffness=1e12)
+    b.state.y[COLUMN[side]], b.state.y[X_O] = 0.0, -sign * depth
+    b.plant.pairs[:, HERTZIAN] = 1e-9
+    after, modes = energy_level(b.plant, b.state, 0.01), (Pair(int(b.state.mode[LEFT])), Pair(int(b.state.mode[RIGHT])))
+    for roundings, expected in ((1.0, Outcome.GO_ON), (100.0, Outcome.ENERGY_RISES)):
+        came = 1e12 * (roundings * EPS * depth) ** 2
+        begin = after._replace(value=after.value - came)
         assert check_segment(b.plant, b.state, b.settings, begin, after, 0.01, 0, modes) == expected
 
 
