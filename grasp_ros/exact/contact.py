@@ -62,7 +62,7 @@ from grasp_ros.physics.layout import (
 )
 
 ALONE = np.int64(-1)  # no second lane
-CANCELS = 16.0  # times what it begins with: terms so large leave their roundings in what a relaxation ends with
+CANCELS = 16.0  # times u' at either end: terms so large leave their roundings in what a relaxation ends with
 
 
 @inlined
@@ -121,22 +121,21 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
 
 
 @inlined
-def is_blurred(tables: Tables, n: int, side: Body, candidate: Candidate, s: float) -> bool:
+def is_blurred(tables: Tables, plant: Plant, n: int, side: Body, candidate: Candidate, s: float) -> bool:
     """Whether u' crosses -1/p at s, where it has the roundings of terms far larger than itself."""
     if candidate.when != s or candidate.what not in (Transition.CLAMP, Transition.REENTRY):
         return False
-    front, back = rate_lanes(side)
-    total = 0.0
+    (front, back), slow, total = rate_lanes(side), 1.0 / plant.pairs[side, DISSIPATION], 0.0
     for k in range(n, -1, -1):
         total = total * s + abs(tables.c[LANES * k + front] - tables.c[LANES * k + back])
-    return total > CANCELS * abs(tables.c[front] - tables.c[back])
+    return total > CANCELS * max(abs(tables.c[front] - tables.c[back]), slow)
 
 
 @inlined
-def clear_end(tables: Tables, n: int, left: Candidate, right: Candidate, h: float) -> float:
+def clear_end(tables: Tables, plant: Plant, n: int, left: Candidate, right: Candidate, h: float) -> float:
     """Where a step of length h ends for its pairs: at their first event, or half-way if that is blurred from here."""
     s = min(h, left.when, right.when)
-    if s < h and (is_blurred(tables, n, LEFT, left, s) or is_blurred(tables, n, RIGHT, right, s)):
+    if s < h and (is_blurred(tables, plant, n, LEFT, left, s) or is_blurred(tables, plant, n, RIGHT, right, s)):
         s *= 0.5
     return s
 
@@ -183,7 +182,7 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     right = pair_candidate(tables, plant, state, n, RIGHT, h, out.work)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when):
         return math.nan
-    s = clear_end(tables, n, left, right, h)
+    s = clear_end(tables, plant, n, left, right, h)
     if s < h:
         values_and_ways(c, n, s, at)
     slide = SlideCandidate(math.inf, Slide.FREE)

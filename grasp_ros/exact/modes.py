@@ -35,12 +35,13 @@ clamps before, or an object at rest slips by it; so does a pair whose force has 
 
 from __future__ import annotations
 
+from grasp_ros.exact.anew import begin_anew
 from grasp_ros.exact.friction import apply_friction, lift_friction, push_on_object
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.kinematics import approach, is_closed, is_resting, velocity_lane
 from grasp_ros.exact.outputs import record, try_soon
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
-from grasp_ros.exact.rest import NEVER, begins_anew, is_negligible, leaning, parts, turn_back
+from grasp_ros.exact.rest import NEVER, is_negligible, leaning, parts, turn_back
 from grasp_ros.exact.sums import forget
 from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
 from grasp_ros.physics.layout import (
@@ -161,8 +162,8 @@ def waits(state: State, side: Body) -> bool:
 @inlined
 def settle_resting(plant: Plant, state: State, out: Output) -> None:
     """Pairs at u = u' = 0: what acts now may press them together, one of them the other, too."""
-    waits_l = waits(state, LEFT) or begins_anew(plant, state, LEFT)
-    waits_r = waits(state, RIGHT) or begins_anew(plant, state, RIGHT)
+    begin_anew(plant, state)
+    waits_l, waits_r = waits(state, LEFT), waits(state, RIGHT)
     if not (waits_l or waits_r):
         return
     for _ in range(2):

@@ -21,7 +21,6 @@ from grasp_ros.exact.kinematics import (
     reduced_mass,
     relative_motion,
     surface_factor,
-    velocity_lane,
 )
 from grasp_ros.exact.records import Array, Leaning, Plant, State
 from grasp_ros.physics.layout import (
@@ -205,26 +204,6 @@ def parts(plant: Plant, y: Array, side: Body) -> bool:
     change = max(t * a, 0.5 * t * (t * jerk))  # in this order, because squares underflow
     clamps = 0.0 < surface_factor(plant, y, side, ROUNDINGS) < CLAMPS * loss * change
     return bool(TURNS * change < -d and not clamps)
-
-
-@kernel
-def begins_anew(plant: Plant, state: State, side: Body) -> bool:
-    """Put a contact back to u = 0 that is so young that u, u' and what moves them are rounding of the bodies' motion.
-
-    Its u' would stay lost, while roundings of the accelerations, step after step, take u away. Returns whether it is.
-    """
-    if state.mode[side] != Pair.CONTACT or approach(state.y, side) != 0.0:
-        return False
-    y, lane = state.y, velocity_lane(side) - 1
-    u, (push, pace) = y[U_L + side], impact_beside(plant, state, side)
-    if not 0.0 < u <= EPS * abs(y[X_O]) or push != 0.0 or pace != 0.0:
-        return False
-    a, size = difference(plant, y, side, 2)
-    force = elastic_force(plant.pairs[side, HERTZIAN], u)
-    if abs(a) + force / reduced_mass(plant.bodies, side) > DOUBT * size:
-        return False
-    y[U_L + side], y[lane] = 0.0, y[X_O]
-    return True
 
 
 @inlined

@@ -1,9 +1,9 @@
 """Mutation check of the automaton: `python test/exact/mutants.py [part of a name]`, some minutes.
 
-Deletes or negates every branch of `grasp_ros.exact.modes`, `rest` and `surface` in turn, drops every operand of an
-`and` or `or`, one side of every loop over both sides, and every statement that calls or stores something. A test of the
-file of the same name, test_modes.py ..., must fail for each of these mutants, but for those that do what the original
-does; they are listed with the reason. Everything runs uncompiled, each mutant in a fork.
+Deletes or negates every branch of `grasp_ros.exact.modes`, `rest`, `anew` and `surface` in turn, drops every operand of
+an `and` or `or`, one side of every loop over both sides, and every statement that calls or stores something. A test of
+the file of the same name, test_modes.py ..., must fail for each of these mutants, but for those that do what the
+original does; they are listed with the reason. Everything runs uncompiled, each mutant in a fork.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ os.environ["NUMBA_DISABLE_JIT"] = "1"
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 ROOM = "grasp_ros.exact"
-MODULES = ("modes", "rest", "surface")
+MODULES = ("modes", "rest", "anew", "surface")
 EQUIVALENT: dict[str, str] = {
     "impact_beside: drop u <= 0.0: state.mode[beside] != Pair.CONTACT or u <= 0.0": "at u = 0 all terms are 0",
     **{f"make_transitions: drop {side}.when <= last: {side}.when <= last and {side}.what == Transition.CLAMP and"

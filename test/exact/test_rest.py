@@ -11,14 +11,13 @@ from exact.bench import bench
 from mpmath import mp, mpf
 from oracles import flight
 
-from grasp_ros.exact.kinematics import other, velocity_lane
+from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Leaning, Plant, State
 from grasp_ros.exact.rest import (
     DOUBT,
     HIGHEST,
     NEVER,
     UNDECIDED,
-    begins_anew,
     certain_time,
     difference,
     impact_beside,
@@ -40,7 +39,6 @@ from grasp_ros.physics.layout import (
     RIGHT,
     STIFFNESS,
     U_L,
-    X_O,
     Body,
     Pair,
     Slide,
@@ -416,25 +414,3 @@ def test_a_pair_parts_where_nothing_but_its_force_can_turn_it_back(
 ) -> None:
     b = bench(side, u, d, Pair.CONTACT, **options)  # type: ignore[arg-type]
     assert parts(b.plant, b.state.y, side) is expected
-
-
-PUSHES = {"beside": (0.01, 0.0), "beside_mode": Pair.CONTACT, "p": 0.0}  # at an instant
-BEGINS_TO_PUSH = {"beside": (0.01, -2.0), "beside_mode": Pair.CONTACT}  # u' = -1/p
-
-
-@SIDES
-@pytest.mark.parametrize(("u", "options", "anew"), [
-    (1e-17, {}, True), (1e-15, {}, False), (0.0, {}, False), (1e-17, {"d": 1e-18}, False),
-    (1e-17, {"mode": Pair.CLAMPED}, False), (1e-17, {"push": 1.001}, False), (1e-17, {"push": 0.999}, False),
-    (1e-17, {"hertzian": 1e15}, False), (1e-17, PUSHES, False), (1e-17, BEGINS_TO_PUSH, False)])
-def test_a_contact_of_which_only_rounding_is_left_begins_anew(side: Body, u: float, options: dict[str, Any],
-                                                              anew: bool) -> None:
-    """Arm and object fall side by side, 1 m away from 0, with u below or above the rounding of that."""
-    how = {"d": 0.0, "mode": Pair.CONTACT, "push": 1.0, "object_push": 1.0, **options}
-    hertzian = how.pop("hertzian", 1e4)
-    b = bench(side, u, **how)
-    b.plant.pairs[side, HERTZIAN] = hertzian
-    b.state.y[[velocity_lane(side) - 1, X_O]] = 1.0 + u, 1.0
-    assert begins_anew(b.plant, b.state, side) is anew
-    assert b.state.y[U_L + side] == (0.0 if anew else u)
-    assert b.state.y[velocity_lane(side) - 1] == (1.0 if anew else 1.0 + u)
