@@ -45,6 +45,7 @@ from grasp_ros.exact.start_series import (
     leads,
     reach_of,
 )
+from grasp_ros.exact.sums import forget
 from grasp_ros.physics.layout import (
     EPS,
     FORCE,
@@ -233,6 +234,7 @@ def start_segment(tables: Tables, plant: Plant, state: State, settings: Settings
     for lane in range(LANES):
         state.y[lane] = tables.at[lane]
     keep_resting(state)
+    forget(state)
     tick(state.clock, t)
     leave_step(tables, h, scale)
     notify(out, Segment.START, t)
