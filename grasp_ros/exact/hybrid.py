@@ -25,7 +25,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Outcome, Pair, Place
 def advance(
     c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
     given: Array, bodies: Array, pairs: Array, coulomb: float,
-    y: Array, mode: Integers, rest: Array, clock: Array,
+    y: Array, mode: Integers, carry: Array, clock: Array,
     tolerance: float, max_work: int,
     grid: Array, rows: Array, events: Array, filled: Integers, work: Integers,
     own: Array, lengths: Array, begins: Array, bounds: Integers, place: Integers, inputs: Array, external: Array,
@@ -42,7 +42,7 @@ def advance(
         Workspace, `records.Tables`; its size sets the highest order.
     given, bodies, pairs, coulomb : arrays (3, 4), (3, 4), (2, 2), and float in N
         `records.Plant`.
-    y, mode, rest, clock : arrays (8,), (3,), (8,) and (3,)
+    y, mode, carry, clock : arrays (8,), (3,), (8,) and (3,)
         `records.State`, updated in place.
     tolerance : float
         First neglected Taylor term, relative to the impact.
@@ -61,7 +61,7 @@ def advance(
         A `layout.Outcome`. After SQUEEZED the next step is one of `squeezed.creep`. If it is none of DONE,
         EVENTS_FULL, WORK_USED, SQUEEZED and NO_COMMAND, `rows` holds nothing of the segment that failed.
     """
-    tables, state = Tables(c, f, at, size, row, Start(start_c, start_f)), State(y, mode, rest, clock)
+    tables, state = Tables(c, f, at, size, row, Start(start_c, start_f)), State(y, mode, carry, clock)
     plant = Plant(given, bodies, pairs, coulomb)
     settings = new_settings(tolerance, row.shape[0] - 1, given)
     loop = Loop(lengths, begins, bounds, place, inputs, external, answers, callee, laws, normals, waiting)

@@ -88,7 +88,7 @@ class Integrator:
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._continuous, self._accuracy = system, continuous, accuracy
         self._max_events, self._max_work = max_events, max_work
-        self._clock, self._rest = np.zeros(3), np.zeros(LANES)
+        self._clock, self._carry = np.zeros(3), np.zeros(LANES)
         self._given = system.closed_loop if continuous else system.bodies.copy()
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
@@ -103,7 +103,7 @@ class Integrator:
     def watch(self, wanted: Wanted, bound: float) -> Watcher:
         """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
         plant = Plant(*self._plant)
-        self._watcher = Watcher(plant, State(self._y, self._mode, self._rest, self._clock), wanted)
+        self._watcher = Watcher(plant, State(self._y, self._mode, self._carry, self._clock), wanted)
         self._watcher.set_system(self._system, self._continuous)
         self._watcher.begin(bound)
         return self._watcher
@@ -200,7 +200,7 @@ class Integrator:
             while self.status is Status.DONE:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
                 most = min(self._spent + BREATH, self._max_work)
-                own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, self._rest, self._clock)
+                own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, self._carry, self._clock)
                 if outcome == Outcome.SQUEEZED:
                     k = int(loop.place[Place.INTERVAL])
                     outcome = creep(*own, loop.lengths[k], self._accuracy, most, grid[: loop.bounds[k + 1]], out,

@@ -59,7 +59,7 @@ class Room(NamedTuple):
     pairs: Array  # (2, 2)
     y: Array  # (8,)
     mode: Integers  # (3,)
-    rest: Array  # (8,)
+    carry: Array  # (8,)
     clock: Array  # (3,)
     events: Array  # (m, 5)
     filled: Integers
@@ -166,7 +166,7 @@ def run_rows(door: Any, tables: Tables, loop: Loop, rows: Rows, room: Room, watc
         while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
             outcome = door(
                 tables.c, tables.f, tables.at, tables.size, tables.row, tables.start.c, tables.start.f,
-                room.given, room.bodies, room.pairs, rows.coulomb[i], room.y, room.mode, room.rest, room.clock,
+                room.given, room.bodies, room.pairs, rows.coulomb[i], room.y, room.mode, room.carry, room.clock,
                 limits.tolerance, limits.max_work, room.times, room.rows, room.events, room.filled, room.work,
                 room.force, loop.lengths, loop.begins, loop.bounds, loop.place, loop.inputs, loop.external,
                 loop.answers, loop.callee, loop.laws, loop.normals, loop.waiting,
@@ -197,9 +197,9 @@ def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted,
     max_events, max_work : int
         Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too.
     """
-    y, mode, rest, clock = np.zeros(8), np.zeros(3, dtype=np.int64), np.zeros(8), np.zeros(3)
+    y, mode, carry, clock = np.zeros(8), np.zeros(3, dtype=np.int64), np.zeros(8), np.zeros(3)
     given, bodies, pairs = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((2, 2))
-    watcher = Watcher(Plant(given, bodies, pairs, 0.0), State(y, mode, rest, clock), wanted)
+    watcher = Watcher(Plant(given, bodies, pairs, 0.0), State(y, mode, carry, clock), wanted)
     filled = np.zeros(len(Filled), dtype=np.int64)
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
     watch = Watch(watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]))
@@ -207,7 +207,7 @@ def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted,
     with workspace(accuracy) as (tables, events):
         if wanted:
             watcher.attach(filled, tables)
-        room = Room(given, bodies, pairs, y, mode, rest, clock, events, filled, np.zeros(len(Work), dtype=np.int64),
+        room = Room(given, bodies, pairs, y, mode, carry, clock, events, filled, np.zeros(len(Work), dtype=np.int64),
                     np.zeros(3), np.zeros(0), np.zeros((0, 6)))
         done = run_rows(door(), tables, loop, rows, room, watch, limits)
     return int(done)

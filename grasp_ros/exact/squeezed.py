@@ -178,7 +178,7 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
 def creep(
     c: Array, f: Array, at: Array, size: Array, row: Array, start_c: Array, start_f: Array,
     given: Array, bodies: Array, pairs: Array, coulomb: float,
-    y: Array, mode: Integers, rest: Array, clock: Array,
+    y: Array, mode: Integers, carry: Array, clock: Array,
     end: float, tolerance: float, max_work: int,
     grid: Array, rows: Array, events: Array, filled: Integers, work: Integers,
 ) -> int:
@@ -192,7 +192,7 @@ def creep(
         A `layout.Outcome`: GO_ON, or why the step cannot be believed; `rows` holds nothing of it then.
     """
     tables = Tables(c, f, at, size, size, Start(start_c, start_f))  # this row is long enough at any accuracy
-    plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, rest, clock)
+    plant, state = Plant(given, bodies, pairs, coulomb), State(y, mode, carry, clock)
     settings = new_settings(tolerance, row.shape[0] - 1, given)
     out = Output(grid, rows, events, filled, work)
     reached = out.filled[Filled.OUTPUTS]

@@ -21,19 +21,19 @@ SHORT = 0.125  # of a place: a longer way has roundings like those of the sum
 def forget(state: State) -> None:
     """Begin sums anew: the state has come here in another way."""
     for lane in range(LANES):
-        state.rest[lane] = 0.0
+        state.carry[lane] = 0.0
 
 
 @inlined
 def add(state: State, lane: int, way: float, end: float) -> None:
     """Move a place of the state on by a way, to about `end`."""
-    y, rest = state.y, state.rest
-    way += rest[lane]
+    y, carry = state.y, state.carry
+    way += carry[lane]
     if abs(way) <= SHORT * abs(y[lane]):
         end = y[lane] + way
-        rest[lane] = way - (end - y[lane])  # exact, because the way is shorter
+        carry[lane] = way - (end - y[lane])  # exact, because the way is shorter
     else:
-        rest[lane] = 0.0
+        carry[lane] = 0.0
     y[lane] = end
 
 
@@ -45,7 +45,7 @@ def add_depth(state: State, at: Array, side: Body, touching: bool) -> None:
     if touching:
         add(state, u, way * (2.0 * end - way), end * end)
     else:
-        state.y[u], state.rest[u] = end, 0.0
+        state.y[u], state.carry[u] = end, 0.0
 
 
 @inlined

@@ -170,8 +170,8 @@ def now(b: Bench, left: float, right: float, slide: float) -> Bench:
 @pytest.mark.parametrize(("times", "left"), [((1.0, 2.0, 2.0), 0.0), ((2.0, 2.0, 1.0), 0.0), ((2.0, 2.0, 2.0), 1e-20)])
 def test_an_event_begins_sums_of_places_anew(times: tuple[float, float, float], left: float) -> None:
     b = bench(LEFT, 0.0, 1.0, slide=Slide.RIGHTWARD, coulomb=1.0)
-    b.state.rest[:] = 1e-20
-    assert (now(b, *times).state.rest == left).all()
+    b.state.carry[:] = 1e-20
+    assert (now(b, *times).state.carry == left).all()
 
 
 def test_events_within_a_few_roundings_happen_together_and_others_do_not() -> None:

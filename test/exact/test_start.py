@@ -103,12 +103,12 @@ def segment(name: str, side: Body, tolerance: float = 1e-16) -> tuple[Bench, Ben
 def start_for(b: Bench, span: float, tolerance: float = 1e-16) -> float:
     """The start segment of at most `span` seconds; its length."""
     assert must_start(b.state)
-    b.state.rest[:] = 1e-20
+    b.state.carry[:] = 1e-20
     settings = new_settings(tolerance, b.settings.both.number, b.plant.given)._replace(rate=b.settings.rate)
     found = float(start_segment(new_tables(b.settings.one.number), b.plant, b.state, settings, span, b.out))
     assert [b.state.y[U_L + side] for side, _ in b.events] in ([], [0.0])  # it ends with its first event
     assert b.out.work[Work.CONTACT_STEPS] == 1
-    assert not b.state.rest.any()  # of places that are gone
+    assert not b.state.carry.any()  # of places that are gone
     return found
 
 

@@ -50,23 +50,23 @@ def test_a_depth_goes_as_far_as_many_equal_steps(side: Body) -> None:
 
 def test_a_pair_that_does_not_touch_is_where_its_lane_says() -> None:
     state = state_of(0.5, 0.5, 0.0)
-    state.rest[U_L] = state.rest[U_R] = 1e-18
+    state.carry[U_L] = state.carry[U_R] = 1e-18
     at = lanes(state, {X_O: 0.0, U_R: 0.0})
     at[U_L], at[LANES + U_L] = -0.1, 1e-17
     add_ways(state, at, False, True)
-    assert (state.y[U_L], state.rest[U_L]) == (-0.1, 0.0)
-    assert state.rest[U_R] == 1e-18
+    assert (state.y[U_L], state.carry[U_L]) == (-0.1, 0.0)
+    assert state.carry[U_R] == 1e-18
 
 
 def test_a_long_way_begins_a_sum_anew() -> None:
     state = state_of(1.0, 1.0, 1.0)
-    state.rest[X_O] = 1e-17
+    state.carry[X_O] = 1e-17
     add_ways(state, lanes(state, {X_O: -0.9, U_L: 0.0, U_R: 0.0}), True, True)
-    assert (state.y[X_O], state.rest[X_O]) == (1.0 - 0.9, 0.0)
+    assert (state.y[X_O], state.carry[X_O]) == (1.0 - 0.9, 0.0)
 
 
 def test_nothing_is_left_once_it_is_forgotten() -> None:
     state = state_of(1.0, 1.0, 1.0)
-    state.rest[:] = 1e-17
+    state.carry[:] = 1e-17
     forget(state)
-    assert not state.rest.any()
+    assert not state.carry.any()
