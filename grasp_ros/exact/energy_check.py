@@ -126,11 +126,12 @@ def may_be_damped(plant: Plant, fall: float, size: float, t: float) -> bool:
 
 
 @inlined
-def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
+def penetrates(plant: Plant, state: State, side: Body, before: float, told: float, size: float, t: float) -> bool:
     """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
 
     A body goes no faster than the energy `size` allows. What is STILL beside the fastest motion, or has DIED_OUT, is
-    not followed. What u was `before`, roundings of a longer way may have left.
+    not followed. What u was `before`, roundings of a longer way may have left. So they may have the m by which the
+    places `told` another u: near 0 it is they that tell it.
     """
     u = state.y[U_L + side]
     if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):
@@ -138,7 +139,7 @@ def penetrates(plant: Plant, state: State, side: Body, before: float, size: floa
     fastest = math.sqrt(size / plant.given[side, MASS]) + math.sqrt(size / plant.given[OBJECT, MASS])
     way = abs(arm_of(state.y, side)[0]) + abs(state.y[X_O]) + t * fastest
     still = STILL * t * (abs(state.y[V_L]) + abs(state.y[V_O]) + abs(state.y[V_R]))
-    return u > ROUNDINGS * EPS * way + still + DIED_OUT
+    return u > ROUNDINGS * EPS * way + told + still + DIED_OUT
 
 
 @inlined
@@ -155,7 +156,8 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
         return Outcome.NOT_FINITE
     if math.isnan(t) or idle > MAX_IDLE:
         return Outcome.STALLED
-    if penetrates(plant, state, LEFT, before.u_l, size, t) or penetrates(plant, state, RIGHT, before.u_r, size, t):
+    if (penetrates(plant, state, LEFT, before.u_l, before.left, size, t)
+            or penetrates(plant, state, RIGHT, before.u_r, before.right, size, t)):
         return Outcome.PENETRATES
     rounding = (ROUNDINGS * EPS + NEGLECTED * settings.tolerance) * size + UNDERFLOW
     driven = plant.given[LEFT, DAMPING] < 0.0 or plant.given[RIGHT, DAMPING] < 0.0

@@ -51,6 +51,16 @@ def test_what_a_longer_way_has_left_of_u_is_no_touch_that_a_short_segment_missed
 
 
 @SIDES
+@pytest.mark.parametrize(("told", "expected"), [(2e-18, Outcome.GO_ON), (5e-19, Outcome.PENETRATES)])
+def test_what_the_places_told_otherwise_is_no_missed_touch(side: Body, told: float, expected: Outcome) -> None:
+    b = bench(side, 1e-18, 0.0, Pair.OPEN)
+    level = energy_level(b.plant, b.state, 1e-9)
+    apart = {"left": told, "right": 0.0} if side == LEFT else {"left": 0.0, "right": told}
+    begin = level._replace(u_l=-1e-9, u_r=-1e-9, **apart)
+    assert check_segment(b.plant, b.state, b.settings, begin, level, 1e-9, 0, OPEN) == expected
+
+
+@SIDES
 @pytest.mark.parametrize(("u", "expected"), [(1e-149, Outcome.PENETRATES), (1e-151, Outcome.GO_ON)])
 def test_what_has_died_out_is_no_missed_touch(side: Body, u: float, expected: Outcome) -> None:
     b = bench(side, u, 0.0, Pair.OPEN, beside=(-u, 0.0))  # nothing else is there, or moves
