@@ -30,7 +30,8 @@ from grasp_ros.physics.layout import (
     Body,
 )
 
-SHORT = 0.25  # of the time constants: there the power series keeps all digits
+SHORT, FAR_SHORT = 0.25, 1.0  # of the time constants: there the power series keeps all digits; where rest is FAR
+FAR = 4.0  # times the place: a rest position whose roundings would take digits of a flight that hardly moves
 FLIGHT_ORDER = np.int64(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
 
 
@@ -78,7 +79,7 @@ def fly(flight: Flight, t: float) -> tuple[float, float, float]:
     if regime == Regime.DRIFT:
         away = t * (v + 0.5 * t * push)
         return x + away, v + t * push, away
-    if t * (2.0 * abs(sigma) + math.sqrt(omega0_2)) < SHORT:
+    if t * (2.0 * abs(sigma) + math.sqrt(omega0_2)) < (FAR_SHORT if abs(x_e) > FAR * abs(x) else SHORT):
         away, v = short_flight(v, push, sigma, omega0_2, t)
         return x + away, v, away
     if regime == Regime.UNDER:

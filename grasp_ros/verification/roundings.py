@@ -76,7 +76,8 @@ def sizes(detail: Detail) -> Sizes:
     In a contact an arm has the roundings of x_o, by which its spring drives it.
     """
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
-    own = _with_way(detail, largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True)))
+    own = largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True))
+    own = largest_in_segment(detail, _with_way(detail, own))  # a touch at its end puts the arm where x_o and u say
     touching, taken = np.zeros(len(own), dtype=bool), detail.bodies[..., DAMPING].copy()
     for side in detail.run.scene.system.contacts:
         hertzian, loss = detail.run.scene.system.pairs[side]
