@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from grasp_ros.exact.impact import elastic_force
 from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.kinematics import approach, reduced_mass, velocity_lane
+from grasp_ros.exact.kinematics import approach, reduced_mass
 from grasp_ros.exact.records import Plant, State
 from grasp_ros.exact.rest import DOUBT, difference, impact_beside
+from grasp_ros.exact.sums import meet
 from grasp_ros.physics.layout import EPS, HERTZIAN, LEFT, RIGHT, U_L, X_O, Body, Pair
 
 
@@ -29,12 +30,6 @@ def is_left_alone(plant: Plant, state: State, side: Body) -> bool:
 
 
 @inlined
-def put_back(state: State, side: Body) -> None:
-    """Let a pair touch at u = 0."""
-    state.y[U_L + side], state.y[velocity_lane(side) - 1] = 0.0, state.y[X_O]
-
-
-@inlined
 def begin_anew(plant: Plant, state: State) -> None:
     """Put contacts that are lost back to u = 0, unless another one pushes them that is not.
 
@@ -44,6 +39,6 @@ def begin_anew(plant: Plant, state: State) -> None:
     anew_l = left and (right or is_left_alone(plant, state, LEFT))
     anew_r = right and (left or is_left_alone(plant, state, RIGHT))
     if anew_l:
-        put_back(state, LEFT)
+        meet(state, LEFT)
     if anew_r:
-        put_back(state, RIGHT)
+        meet(state, RIGHT)

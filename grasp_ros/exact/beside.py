@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from grasp_ros.exact.flight import fly, launch
 from grasp_ros.exact.jit import inlined
-from grasp_ros.exact.kinematics import arm_of
-from grasp_ros.exact.records import Array, Flight, Placing, Plant, Regime, Tables
+from grasp_ros.exact.kinematics import arm_of, velocity_lane
+from grasp_ros.exact.records import Array, Flight, Placing, Plant, Regime, State, Tables
+from grasp_ros.exact.sums import add, put
 from grasp_ros.physics.layout import (
     DAMPING,
     EPS,
@@ -80,6 +81,28 @@ def place_beside(at: Array, how: tuple[Placing, Placing], free: tuple[Flight, Fl
 
 
 @inlined
+def end_beside(state: State, at: Array, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float) -> None:
+    """Put arms where they are at the end of a segment of t s, as `place_beside`, with what roundings leave out."""
+    object_way = at[LANES + X_O]
+    end_arm(state, LEFT, how[0], free[0], object_way + at[LANES + Z_L], t)
+    end_arm(state, RIGHT, how[1], free[1], object_way - at[LANES + Z_R], t)
+
+
+@inlined
+def end_arm(state: State, side: Body, how: Placing, free: Flight, way: float, t: float) -> None:
+    """Put an arm where it is at the end of a segment."""
+    x = velocity_lane(side) - 1
+    if how == Placing.BY_GAP:
+        state.carry[x] = 0.0  # object and gap have their own
+        return
+    end = free.x + way
+    if how == Placing.BY_FLIGHT:
+        end, state.y[x + 1], way = fly(free, t)
+    state.y[x] = free.x
+    add(state, x, way, end)
+
+
+@inlined
 def gap_shows(row: Array, how: Placing, t: float, x_before: float, x: float, x_o: float, u: float) -> bool:
     """Whether places tell u of an arm better than a series, or no worse.
 
@@ -94,9 +117,11 @@ def gap_shows(row: Array, how: Placing, t: float, x_before: float, x: float, x_o
 
 
 @inlined
-def part_beside(plant: Plant, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float, y: Array) -> None:
+def part_beside(plant: Plant, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float, state: State
+                ) -> None:
     """Let u of arms follow their places after t s where these show it, or roundings of the series add up in it."""
+    y = state.y
     if gap_shows(plant.bodies[LEFT], how[0], t, free[0].x, y[X_L], y[X_O], y[U_L]):
-        y[U_L] = y[X_L] - y[X_O]
+        put(state, U_L, y[X_L] - y[X_O])
     if gap_shows(plant.bodies[RIGHT], how[1], t, free[1].x, y[X_R], y[X_O], y[U_R]):
-        y[U_R] = y[X_O] - y[X_R]
+        put(state, U_R, y[X_O] - y[X_R])

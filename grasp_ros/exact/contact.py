@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.beside import free_flight, part_beside, place_beside, placing
+from grasp_ros.exact.beside import end_beside, free_flight, part_beside, place_beside, placing
 from grasp_ros.exact.clock import tick
 from grasp_ros.exact.friction import slide_in_contact
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.kinematics import keep_resting, rate_lanes
-from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.modes import TOGETHER, make_transitions
 from grasp_ros.exact.observer import leave_orders, leave_step, notify
 from grasp_ros.exact.outputs import due
 from grasp_ros.exact.polynomial import NOISE, invert_time, lane_range, values_and_ways
@@ -123,7 +123,7 @@ def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: 
 @inlined
 def is_blurred(tables: Tables, plant: Plant, n: int, side: Body, candidate: Candidate, s: float) -> bool:
     """Whether u' crosses -1/p at s, where it has the roundings of terms far larger than itself."""
-    if candidate.when != s or candidate.what not in (Transition.CLAMP, Transition.REENTRY):
+    if candidate.when > s * TOGETHER or candidate.what not in (Transition.CLAMP, Transition.REENTRY):
         return False
     (front, back), slow, total = rate_lanes(side), 1.0 / plant.pairs[side, DISSIPATION], 0.0
     for k in range(n, -1, -1):
@@ -202,8 +202,8 @@ def contact_segment(tables: Tables, plant: Plant, state: State, settings: Settin
     free = (free_flight(plant, y, LEFT, how[0]), free_flight(plant, y, RIGHT, how[1]))
     add_ways(state, at, step.left, step.right)
     write_state(at, y[X_O], y[U_L], y[U_R], y)
-    place_beside(at, how, free, t, y)
-    part_beside(plant, how, free, t, y)
+    end_beside(state, at, how, free, t)
+    part_beside(plant, how, free, t, state)
     keep_resting(state)
     deliver(tables, step, s, t, how, free, state, out)
     tick(state.clock, t)

@@ -16,7 +16,6 @@ from grasp_ros.exact.kinematics import (
     keep_resting,
     next_derivative,
     own_acceleration,
-    write_penetrations,
 )
 from grasp_ros.exact.modes import TOGETHER, make_transitions
 from grasp_ros.exact.observer import notify
@@ -24,6 +23,7 @@ from grasp_ros.exact.outputs import due, write_row
 from grasp_ros.exact.polynomial import values
 from grasp_ros.exact.records import Array, Candidate, Flights, Integers, Motion, Output, Plant, Settings, State, Tables
 from grasp_ros.exact.rest import parting_time
+from grasp_ros.exact.sums import add, put
 from grasp_ros.physics.layout import (
     DAMPING,
     LEFT,
@@ -46,6 +46,8 @@ from grasp_ros.physics.layout import (
 )
 
 TOLD = 2.0**-20  # of a gap
+PARTS = 2.0**44  # of a flight, beyond which a rounding of the time may be longer than one
+STEEP = 1e16  # rate in 1/s whose powers leave the range of numbers
 
 
 @inlined
@@ -99,6 +101,14 @@ def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, spa
 
 
 @inlined
+def fly_all(flights: Flights, t: float, at: Array) -> None:
+    """Positions and velocities of all bodies after t s, in their places of the state."""
+    at[X_L], at[V_L], _ = fly(flights.left, t)
+    at[X_O], at[V_O], _ = fly(flights.object, t)
+    at[X_R], at[V_R], _ = fly(flights.right, t)
+
+
+@inlined
 def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flights: Flights, t: float, out: Output
             ) -> None:
     """Write the states at the output times before the end t of a flight.
@@ -108,12 +118,15 @@ def deliver(tables: Tables, plant: Plant, state: State, settings: Settings, flig
     rate, part, begin = settings.rate, -1.0, 0.0
     tau = due(state, out)
     while tau < t:
-        own = math.floor(tau * 2.0 * rate)
-        if own != part:
-            part = own
-            begin = part / (2.0 * rate) if part > 0.0 else 0.0
-            expand_flight(plant.bodies, flights, begin, tables.c)
-        values(tables.c, FLIGHT_ORDER, tau - begin, tables.at)
+        if rate < STEEP and tau * 2.0 * rate < PARTS:
+            own = math.floor(tau * 2.0 * rate)
+            if own != part:
+                part = own
+                begin = part / (2.0 * rate) if part > 0.0 else 0.0
+                expand_flight(plant.bodies, flights, begin, tables.c)
+            values(tables.c, FLIGHT_ORDER, tau - begin, tables.at)
+        else:
+            fly_all(flights, tau, tables.at)
         write_row(out, out.filled[Filled.OUTPUTS], tables.at)
         out.filled[Filled.OUTPUTS] += 1
         tau = due(state, out)
@@ -134,14 +147,20 @@ def move(flights: Flights, state: State, t: float) -> None:
     y = state.y
     u_l, u_r = y[U_L], y[U_R]
     told_l, told_r = places_tell(y, LEFT), places_tell(y, RIGHT)
-    y[X_L], y[V_L], away_l = fly(flights.left, t)
-    y[X_R], y[V_R], away_r = fly(flights.right, t)
-    y[X_O], y[V_O], away = fly(flights.object, t)
-    write_penetrations(y)
-    if not (math.isnan(away_l - away) or (told_l and abs(y[X_L]) + abs(y[X_O]) < abs(u_l))):
-        y[U_L] = u_l + (away_l - away)
-    if not (math.isnan(away - away_r) or (told_r and abs(y[X_O]) + abs(y[X_R]) < abs(u_r))):
-        y[U_R] = u_r + (away - away_r)
+    x_l, y[V_L], away_l = fly(flights.left, t)
+    x_r, y[V_R], away_r = fly(flights.right, t)
+    x_o, y[V_O], away = fly(flights.object, t)
+    add(state, X_L, away_l, x_l)
+    add(state, X_R, away_r, x_r)
+    add(state, X_O, away, x_o)
+    if math.isnan(away_l - away) or (told_l and abs(y[X_L]) + abs(y[X_O]) < abs(u_l)):
+        put(state, U_L, y[X_L] - y[X_O])
+    else:
+        add(state, U_L, away_l - away, u_l + (away_l - away))
+    if math.isnan(away - away_r) or (told_r and abs(y[X_O]) + abs(y[X_R]) < abs(u_r)):
+        put(state, U_R, y[X_O] - y[X_R])
+    else:
+        add(state, U_R, away - away_r, u_r + (away - away_r))
     keep_resting(state)
 
 

@@ -19,7 +19,7 @@ from grasp_ros.exact.workspace import workspace
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import FORCE, LANES, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
+from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -88,7 +88,7 @@ class Integrator:
         self.work = np.zeros(len(Work), dtype=np.int64)
         self._system, self._continuous, self._accuracy = system, continuous, accuracy
         self._max_events, self._max_work = max_events, max_work
-        self._clock, self._carry = np.zeros(3), np.zeros(LANES)
+        self._clock, self._carry = np.zeros(3), np.zeros(8)
         self._given = system.closed_loop if continuous else system.bodies.copy()
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()

@@ -8,6 +8,7 @@ from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.jit import inlined, kernel
 from grasp_ros.exact.records import Array, Motion, PairFlight, Plant, Rates, State
 from grasp_ros.exact.roots import LARGE, SMALL, safe_step
+from grasp_ros.exact.sums import meet
 from grasp_ros.physics.layout import (
     DAMPING,
     DISSIPATION,
@@ -85,9 +86,11 @@ def keep_resting(state: State) -> None:
     """A pair at rest stays one: what arm and object differ by after a segment is rounding."""
     y, mode = state.y, state.mode
     if mode[LEFT] == Pair.RESTING:
-        y[X_L], y[V_L], y[U_L] = y[X_O], y[V_O], 0.0
+        meet(state, LEFT)
+        y[V_L] = y[V_O]
     if mode[RIGHT] == Pair.RESTING:
-        y[X_R], y[V_R], y[U_R] = y[X_O], y[V_O], 0.0
+        meet(state, RIGHT)
+        y[V_R] = y[V_O]
 
 
 @kernel

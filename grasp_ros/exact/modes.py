@@ -42,7 +42,7 @@ from grasp_ros.exact.kinematics import approach, is_closed, is_resting, velocity
 from grasp_ros.exact.outputs import record, try_soon
 from grasp_ros.exact.records import Candidate, Output, Plant, Settings, SlideCandidate, State
 from grasp_ros.exact.rest import NEVER, is_negligible, leaning, parts, turn_back
-from grasp_ros.exact.sums import forget
+from grasp_ros.exact.sums import meet
 from grasp_ros.exact.surface import DRIFT, glides, has_glided, leave_gliding, surface_side
 from grasp_ros.physics.layout import (
     EPS,
@@ -52,7 +52,6 @@ from grasp_ros.physics.layout import (
     RIGHT,
     U_L,
     V_O,
-    X_O,
     Body,
     Pair,
     Slide,
@@ -193,8 +192,6 @@ def make_transitions(plant: Plant, state: State, left: Candidate, right: Candida
                      out: Output) -> None:
     """Make all transitions within a few roundings of the end; lost forces hide no more what pushes a stuck object."""
     last = end * TOGETHER
-    if min(left.when, right.when, slide.when) <= last:
-        forget(state)
     leaves_l = left.when <= last and left.what == Transition.CLAMP and glides(plant, state, LEFT)
     leaves_r = right.when <= last and right.what == Transition.CLAMP and glides(plant, state, RIGHT)
     if left.when <= last:
@@ -216,8 +213,7 @@ def make_transition(plant: Plant, state: State, side: Body, kind: Transition, le
     """
     y, mode, d = state.y, state.mode, approach(state.y, side)
     if kind in (Transition.TOUCH, Transition.RELEASE):
-        y[U_L + side] = 0.0
-        y[velocity_lane(side) - 1] = y[X_O]  # the places agree but for rounding
+        meet(state, side)  # the places agree but for rounding
     if kind == Transition.TOUCH and d <= 0.0:
         y[velocity_lane(side)] = y[V_O]
         return

@@ -35,7 +35,7 @@ class State(NamedTuple):
 
     y: Array  # (8,) x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r; m and m/s
     mode: Integers  # (3,) Pair, Pair, Slide; frozen within a segment
-    carry: Array  # (8,) what roundings left out of y, see `sums`
+    carry: Array  # (8,) what roundings left out of the places and u of y, see `sums`
     clock: Array  # (3,) time since the begin of the interval, what its roundings left out, and that begin, s
 
 

@@ -110,12 +110,13 @@ def time_of_impulse(per_hertz: float, loss: float, order: float, a: float) -> fl
     """Power of two below the time t, in s, at which the impulse of u = a t^order is that of the motion itself.
 
     H u^(5/2) (1 + p u') = mu u'^2, without the numbers; per_hertz is mu / H. It compares exponents, and integers of
-    them: other units give the same time.
+    them: other units give the same time. That of a^2 is one of its own, because a unit of a may be half a power.
     """
-    twice, above = int(2.0 * order), exponent(a) + 1  # 2^above >= a
-    e = (4 * exponent(per_hertz * order * order) - 2 * above) // (twice + 8)
+    part = a * power_of_two(-exponent(a))  # from 1 to 2; a^2 leaves the range of numbers
+    twice, above = int(2.0 * order), 2 * exponent(a) + exponent(part * part) + 1  # 2^above >= a^2
+    e = (4 * exponent(per_hertz * order * order) - above) // (twice + 8)
     if loss > 0.0:
-        e = min(e, (4 * exponent(per_hertz * order / loss) - 6 * above) // (3 * twice + 4))
+        e = min(e, (4 * exponent(per_hertz * order / loss) - 3 * above) // (3 * twice + 4))
     return power_of_two(e)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.beside import free_flight, part_beside, place_beside
+from grasp_ros.exact.beside import end_beside, free_flight, part_beside, place_beside
 from grasp_ros.exact.clock import tick, until
 from grasp_ros.exact.collocation import E_NODES, SUMS, Approach, impact_at, motion_of
 from grasp_ros.exact.contact import write_state
@@ -61,6 +61,7 @@ from grasp_ros.physics.layout import (
 )
 
 EARLY, AFTER = 0.1, 4.0  # part of a step of which few nodes tell, and parts up to a release in the step after that
+GAINS = 16.0  # times 1/p: a u' of which a crossing of -1/p has too many roundings
 SOON = 1e-3  # of a step: an event so early may hang on a relaxation that the step does not resolve
 NOISY = 1e-3  # part of e at which what is left of a relaxation hides the course of e between the nodes
 
@@ -125,17 +126,22 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
 
 
 @inlined
-def is_release(candidate: Candidate, s: float) -> bool:
-    """Whether it is a release at s."""
-    return candidate.what == Transition.RELEASE and candidate.when == s
+def is_doubtful(tables: Tables, plant: Plant, state: State, side: Body, candidate: Candidate, s: float, h: float
+                ) -> bool:
+    """Whether an event early in a step, at s, is a release, or has the roundings of all that u' gains in the step."""
+    if candidate.when != s:
+        return False
+    if candidate.what in (Transition.CLAMP, Transition.REENTRY) and not motion_of(plant, state, side, h).stiff:
+        return abs(tables.f[E_NODES + side * STAGES + STAGES - 1]) * plant.pairs[side, DISSIPATION] > GAINS
+    return candidate.what == Transition.RELEASE
 
 
 @kernel
 def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: Output) -> float:
     """The implicit step of h s to its first event, whose transitions it makes, or to its end.
 
-    Returns its time in s; 0 if the search for the first event does not end, -t if a release at about t is so early
-    that the nodes hardly see the force before it.
+    Returns its time in s; 0 if the search for the first event does not end, -t if an event at about t is so early that
+    the nodes hardly see what is before it.
     """
     out.work[Work.CONTACT_STEPS] += 1
     c, at, y = tables.c, tables.at, state.y
@@ -148,7 +154,8 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
         wait(out, 4.0)
         return 0.0
     s = min(1.0, left.when, right.when, slide.when)
-    if s < EARLY and s * h > 0.0 and (is_release(left, s) or is_release(right, s)):
+    if s < EARLY and s * h > 0.0 and (is_doubtful(tables, plant, state, LEFT, left, s, h)
+                                      or is_doubtful(tables, plant, state, RIGHT, right, s, h)):
         out.work[Work.REJECTED_STEPS] += 1
         return -s * h
     if s < SOON:
@@ -163,10 +170,10 @@ def squeezed_segment(tables: Tables, plant: Plant, state: State, h: float, out: 
     values(c, STAGES, s, at)
     y[U_L], y[U_R] = at[U_L], at[U_R]
     write_state(at, at[X_O], y[U_L], y[U_R], y)
-    place_beside(at, how, free, t, y)
-    part_beside(plant, how, free, t, y)
-    keep_resting(state)
     forget(state)
+    end_beside(state, at, how, free, t)
+    part_beside(plant, how, free, t, state)
+    keep_resting(state)
     tick(state.clock, t)
     leave_step(tables, s, h)
     notify(out, Segment.CREEP, t)

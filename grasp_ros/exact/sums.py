@@ -1,9 +1,10 @@
-"""Sums of short steps in contact: what a rounding leaves out of a place is added in the next step, as in the clock.
+"""Sums of short ways: what a rounding leaves out of a place is added with the next one, as in the clock.
 
 Steps of one length go equal ways, and then the roundings of their sums are equal, too: some hundred of them, each of
-which goes some hundred roundings of a place far, may leave it wrong by half as many roundings as there are steps.
-Velocities are rounded as they are: their errors die out with them, and where a pair keeps u' = -1/p but for rounding,
-a sum that follows what is below it would cross that again and again.
+which goes some hundred roundings of a place far, may leave it wrong by half as many roundings as there are steps. An
+arm that touches nothing is placed by the object and its gap: if only one of these kept what was left out, it would
+drift. Velocities are rounded as they are: their errors die out with them, and where a pair keeps u' = -1/p but for
+rounding, a sum that follows what is below it would cross that again and again.
 
 Source: N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed. (2002), section 4.3.
 """
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 from grasp_ros.exact.jit import inlined
 from grasp_ros.exact.records import Array, State
-from grasp_ros.physics.layout import LANES, LEFT, RIGHT, U_L, X_O, Body
+from grasp_ros.physics.layout import LANES, LEFT, RIGHT, U_L, X_L, X_O, X_R, Body
 
 SHORT = 0.125  # of a place: a longer way has roundings like those of the sum
 
@@ -20,13 +21,13 @@ SHORT = 0.125  # of a place: a longer way has roundings like those of the sum
 @inlined
 def forget(state: State) -> None:
     """Begin sums anew: the state has come here in another way."""
-    for lane in range(LANES):
+    for lane in range(len(state.carry)):
         state.carry[lane] = 0.0
 
 
 @inlined
 def add(state: State, lane: int, way: float, end: float) -> None:
-    """Move a place of the state on by a way, to about `end`."""
+    """Move a place of the state on by a way, nan if it is not known, to about `end`."""
     y, carry = state.y, state.carry
     way += carry[lane]
     if abs(way) <= SHORT * abs(y[lane]):
@@ -38,14 +39,28 @@ def add(state: State, lane: int, way: float, end: float) -> None:
 
 
 @inlined
+def put(state: State, lane: int, end: float) -> None:
+    """Put a place of the state where something else tells that it is."""
+    state.y[lane], state.carry[lane] = end, 0.0
+
+
+@inlined
+def meet(state: State, side: Body) -> None:
+    """Put an arm at u = 0: where the object is, with what is left out of that."""
+    x = X_L if side == LEFT else X_R
+    put(state, U_L + side, 0.0)
+    state.y[x], state.carry[x] = state.y[X_O], state.carry[X_O]
+
+
+@inlined
 def add_depth(state: State, at: Array, side: Body, touching: bool) -> None:
-    """Move u of a pair on, whose lane is w = sqrt(u) in contact; one that does not touch may follow its places."""
+    """Move u of a pair on, whose lane is w = sqrt(u) in contact."""
     u = U_L + side
     end, way = at[u], at[LANES + u]
     if touching:
         add(state, u, way * (2.0 * end - way), end * end)
     else:
-        state.y[u], state.carry[u] = end, 0.0
+        add(state, u, way, end)
 
 
 @inlined

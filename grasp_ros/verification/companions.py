@@ -113,9 +113,9 @@ def _cancelled(run: Trajectory) -> float:
     """Speed in m/s that roundings of a feedback around its set-point bring, or of impacts that balance each other."""
     system, speed = run.scene.system, 0.0
     mass, duration = system.bodies[:, MASS], run.scene.duration
-    motion = np.abs(np.nan_to_num(penetration(run.state))).max(axis=1)
+    depths, rates = _deepest(run), np.abs(np.nan_to_num(penetration(run.state)[1::2])).max(axis=1)
     for side in system.contacts:
-        (hertzian, loss), (depth, rate) = system.pairs[side], motion[2 * side : 2 * side + 2]
+        (hertzian, loss), depth, rate = system.pairs[side], depths[side], rates[side]
         force = hertzian * depth**1.5 * (1.0 + loss * rate)
         speed = max(speed, 16.0 * EPS * force * duration / min(mass[side], mass[OBJECT]))
     for side, law in system.laws.items():
@@ -123,6 +123,12 @@ def _cancelled(run: Trajectory) -> float:
         force = abs(law.position_gain) * place + abs(law.feed_forward)
         speed = max(speed, 16.0 * EPS * force * duration / mass[side])
     return speed
+
+
+def _deepest(run: Trajectory) -> Array:
+    """The largest penetration at an output time of each pair, (2,) in m; 0 of one that never touches."""
+    found: Array = np.maximum(np.nan_to_num(penetration(run.state)[::2]), 0.0).max(axis=1)
+    return found
 
 
 def _rate(mass: float, stiffness: float, damping: float) -> float:
@@ -135,7 +141,7 @@ def _fastest_rate(run: Trajectory) -> float:
     system = run.scene.system
     bodies = system.bodies[system.present]
     mass, fastest = bodies[:, MASS], [_rate(*row) for row in bodies[:, :FORCE].tolist()]
-    depths = np.nan_to_num(penetration(run.state)[::2]).max(axis=1)
+    depths = _deepest(run)
     for side in system.contacts:
         (hertzian, loss), speed = system.pairs[side], np.abs(run.event_table[:, 4]).max(initial=0.0)
         depth = max(depths[side], (1.25 * mass.max() * speed**2 / hertzian) ** 0.4)

@@ -178,3 +178,16 @@ def test_uncompiled_source_gives_the_same_numbers() -> None:
         outputs.append([float.fromhex(word) for word in finished.stdout.split()])
     assert len(outputs[0]) == len(outputs[1]) > 250
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-300])
+@pytest.mark.parametrize("body", ["left_arm", "right_arm"])
+def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
+    """Powers of c/m, and its product with the time, leave the range of numbers."""
+    arm = {"mass_kg": mass, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 1e3, "position_m": -0.3,
+           "velocity_m_per_s": 0.0}
+    scene = scenes.compose("creep", {body: arm, "time": {"duration_s": 1.0, "control_period_s": 0.001}})
+    run = simulate(scene, grid=np.linspace(0.0, 1.0, 9))
+    slow = 0.02 / (1.0 + np.sqrt(1.0 - 4e-5 * mass))  # 1/s; the fast part is over
+    creep = -0.3 * np.exp(-slow * run.t[1:]) / (1.0 - 1e-3 * mass * slow**2 / 0.01)
+    assert run.state[1:, 0 if body == "left_arm" else 4] == pytest.approx(creep, rel=1e-14)

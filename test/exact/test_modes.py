@@ -37,8 +37,11 @@ from grasp_ros.physics.layout import (
     OBJECT,
     RIGHT,
     U_L,
+    U_R,
     V_O,
+    X_L,
     X_O,
+    X_R,
     Body,
     Filled,
     Pair,
@@ -167,11 +170,19 @@ def now(b: Bench, left: float, right: float, slide: float) -> Bench:
     return b
 
 
-@pytest.mark.parametrize(("times", "left"), [((1.0, 2.0, 2.0), 0.0), ((2.0, 2.0, 1.0), 0.0), ((2.0, 2.0, 2.0), 1e-20)])
-def test_an_event_begins_sums_of_places_anew(times: tuple[float, float, float], left: float) -> None:
-    b = bench(LEFT, 0.0, 1.0, slide=Slide.RIGHTWARD, coulomb=1.0)
+@pytest.mark.parametrize(("times", "put"), [((1.0, 2.0, 2.0), {U_L: 0.0, X_L: 2e-20}), ((2.0, 2.0, 1.0), {}),
+                                            ((2.0, 1.0, 2.0), {U_R: 0.0, X_R: 2e-20}), ((2.0, 2.0, 2.0), {})])
+def test_an_event_keeps_what_sums_left_out_but_for_what_it_puts_elsewhere(
+    times: tuple[float, float, float], put: dict[int, float],
+) -> None:
+    """A touch puts u at 0 and the arm where the object is."""
+    b = bench(LEFT, 0.0, 1.0, beside=(0.0, 1.0), slide=Slide.RIGHTWARD, coulomb=1.0)
     b.state.carry[:] = 1e-20
-    assert (now(b, *times).state.carry == left).all()
+    b.state.carry[X_O] = 2e-20
+    expected = b.state.carry.copy()
+    for lane, value in put.items():
+        expected[lane] = value
+    assert (now(b, *times).state.carry == expected).all()
 
 
 def test_events_within_a_few_roundings_happen_together_and_others_do_not() -> None:

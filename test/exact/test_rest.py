@@ -383,10 +383,12 @@ def test_the_time_of_the_impulse_is_a_power_of_two_that_follows_the_units(order:
     u, rate = a * t**order, order * a * t ** (order - 1)
     impulse = hertzian * u**2.5 * (1.0 + loss * rate)
     assert 2.0**-60 < impulse / rate**2 < 4.0
-    metre, second = 4.0**3, 2.0**10
-    other_units = time_of_impulse(second**2 * math.sqrt(metre) / hertzian, loss * second / metre, order,
-                                  a * metre / second**order)
-    assert other_units == t * second
+    for a in np.geomspace(0.5, 2.0, 41):  # odd units of time make half powers of two of a
+        t = time_of_impulse(1.0 / hertzian, loss, order, float(a))
+        for metre, second in ((4.0**3, 2.0**10), (4.0, 2.0), (1.0, 2.0), (4.0, 0.5)):
+            other_units = time_of_impulse(second**2 * math.sqrt(metre) / hertzian, loss * second / metre, order,
+                                          float(a) * metre / second**order)
+            assert other_units == t * second
 
 
 @SIDES

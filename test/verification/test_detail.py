@@ -11,7 +11,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, compose
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification import fuzz, restarts
 from grasp_ros.verification.cases.case import Product
@@ -239,6 +239,22 @@ def test_another_law_is_seen_at_short_periods(first: Trajectory) -> None:
     stiff = fuzzed("periods_longer_than_a_swing")
     for run in (first, Product().run(stiff, [0.0, stiff.duration])):
         assert only(short_periods(run, OtherGain())) > FALLS
+
+
+def test_an_open_pair_does_not_hide_another_law() -> None:
+    """However hard it is: what is apart has no impact whose roundings could cancel."""
+    body = {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0}
+    arm = body | {"stiffness_N_per_m": 10.0, "damping_Ns_per_m": 0.2}
+    scene = compose("apart", {
+        "object": body, "left_arm": arm | {"position_m": -0.5}, "right_arm": arm | {"position_m": 0.5},
+        "right_feedback": {"position_gain_N_per_m": 5.0, "velocity_gain_Ns_per_m": 4.0},
+        "left_contact": {"hertz_N_per_m1_5": 1e12, "dissipation_s_per_m": 0.5},
+        "right_contact": {"hertz_N_per_m1_5": 1e12, "dissipation_s_per_m": 0.5},
+        "time": {"duration_s": 0.1, "control_period_s": 0.001},
+    })
+    run = Product().run(scene, [0.0, scene.duration])
+    assert len(run.events) == 0
+    assert only(short_periods(run, OtherGain())) > FALLS
 
 
 def test_a_motion_that_died_out_before_the_first_output_may_stall() -> None:
