@@ -17,11 +17,10 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
+from grasp_ros.simulation.losses import by_output_times, losses
 from grasp_ros.simulation.quantities import (
     SETTLED,
-    by_output_times,
     impact_forces_of,
-    losses,
     rests_at_zero,
     settled_distance,
     settling_times,

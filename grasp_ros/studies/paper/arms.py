@@ -10,7 +10,7 @@ import numpy as np
 
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.quantities import losses
+from grasp_ros.simulation.losses import losses
 from grasp_ros.studies.paper.cases import STANDARD, Cases, Start, started, with_values
 from grasp_ros.studies.paper.measures import measure
 from grasp_ros.studies.paper.motion import alone_settling, contacts_found, first_contact_error, run_of

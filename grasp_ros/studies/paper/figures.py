@@ -17,8 +17,9 @@ from matplotlib.figure import Figure as Drawing
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, plots, simulate
+from grasp_ros.simulation.losses import running_losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
-from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of, running_losses
+from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of
 from grasp_ros.studies.paper.cases import STANDARD, Figure, Start, start_of, started
 
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))

@@ -8,7 +8,8 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import ensemble, simulate
-from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of, losses, settled_distance
+from grasp_ros.simulation.losses import losses
+from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of, settled_distance
 from grasp_ros.studies.paper.cases import OFFSETS, Cases, moved, start_of
 from grasp_ros.studies.paper.measures import measure, seconds
 
