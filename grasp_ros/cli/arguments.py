@@ -77,7 +77,7 @@ def add_force(sub: argparse.ArgumentParser) -> None:
 
 
 def check_output(output: Path, force: bool, inputs: Sequence[str] = ()) -> None:
-    """Refuse to write over what is there, before the work; over an input in any case.
+    """Refuse to write over what is there, or where no directory is, before the work; over an input in any case.
 
     Raises
     ------
@@ -86,6 +86,7 @@ def check_output(output: Path, force: bool, inputs: Sequence[str] = ()) -> None:
     """
     with writing(output):
         if not (output.is_file() or output.is_dir()):
+            output.parent.stat()
             return  # new, a device or a pipe
         if output.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from grasp_ros.exact.integrator import Status
 from grasp_ros.graph.recording import Recording
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
@@ -36,8 +37,9 @@ def table(rows: Iterable[Row]) -> str:
     return printable("\n".join(f"{name:<{width}}  {value}" for name, value in rows))
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def describe_trajectory(trajectory: Trajectory) -> list[Row]:
-    """What happened in a simulation."""
+    """What happened in a simulation; inf and nan are shown as they are."""
     level = trajectory.energy
     method = METHODS[trajectory.method]
     foreign = [(f"{side} controller", name) for side, name in trajectory.controllers.items()]
@@ -46,13 +48,14 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled, bool(foreign))),
         *foreign,
         ("status", trajectory.stop or trajectory.status.value),
-        ("simulated", f"{trajectory.scene.duration:g} s, {len(trajectory.t)} output times"),
+        ("simulated", _simulated(trajectory)),
         ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
         ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
     ]
     if len(trajectory.t):
-        rows.append((f"energy of {PLANT_ALONE}" if foreign else "V_c at both ends", _ends(level.V_c)))
+        ends = "both ends" if trajectory.status is Status.DONE else "first and last output"
+        rows.append((f"energy of {PLANT_ALONE}" if foreign else f"V_c at {ends}", _ends(level.V_c)))
         rows += _amounts(trajectory)
     known = trajectory.scene.certificate_in_words(trajectory.sampled)
     rows.append(("certificate", "none: V_c needs the energy of every controller" if foreign else known))
@@ -60,6 +63,14 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
         rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
     return _with_words(trajectory.scene, rows)
+
+
+def _simulated(trajectory: Trajectory) -> str:
+    """How far the output times go, and how far they should."""
+    end, times = trajectory.scene.duration, f"{len(trajectory.t)} output times"
+    if trajectory.status is Status.DONE:
+        return f"{end:g} s, {times}"
+    return f"{trajectory.t[-1] if len(trajectory.t) else 0.0:g} s of {end:g} s, {times}"
 
 
 def _amounts(trajectory: Trajectory) -> list[Row]:

@@ -67,7 +67,7 @@ def begin(law: Law | type, what: str) -> Law:
     Raises
     ------
     Refused
-        If it cannot be called, or is a class that cannot be called without arguments.
+        If it cannot be called with four arguments, or is a class that cannot be called without.
     """
     begun: Any = law
     if isinstance(law, type):
@@ -81,4 +81,10 @@ def begin(law: Law | type, what: str) -> Law:
         law.reset()
     if not callable(begun):
         raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")
+    try:
+        inspect.signature(begun).bind(0, 0.0, 0.0, 0.0)
+    except ValueError:
+        pass  # some built-in callables do not tell what they take
+    except TypeError as error:
+        raise Refused(f"{what}: {begun!r}: {error}; allowed: {CALLABLE}") from None
     return begun  # type: ignore[no-any-return]

@@ -11,6 +11,12 @@ UNITS = {  # endings of keys; the longest that fits counts
 }
 
 
+def _short(number: float) -> str:
+    """A bound in few digits, but all that it has."""
+    text = f"{number:g}"
+    return text if float(text) == number else repr(number)
+
+
 class Parameter(NamedTuple):
     """One number of a scene, or one list of numbers."""
 
@@ -33,8 +39,8 @@ class Parameter(NamedTuple):
     def allowed(self) -> str:
         """The range in words."""
         kind = "a whole number" if self.whole else "a number"
-        span = f"{kind} {'>' if self.open_low else '>='} {self.low:g} and <= {self.high:g}"
-        return f"a list, each {span}" if self.several else span
+        span = f"{kind} {'>' if self.open_low else '>='} {_short(self.low)} and <= {_short(self.high)}"
+        return f"a list of at least one entry, each {span}" if self.several else span
 
     def accepts(self, value: Any) -> bool:
         """Whether a value from a file is of the right kind and in the range; NaN is in no range."""

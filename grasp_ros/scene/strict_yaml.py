@@ -74,7 +74,7 @@ def _mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
         if not isinstance(key, Hashable):
             raise Refused(f"{key!r} is a key; allowed: texts as keys")
         if key in result:
-            raise Refused(f"{key}: the key stands twice; allowed: once")
+            raise Refused(f"line {key_node.start_mark.line + 1}: {key}: the key stands twice; allowed: once")
         result[key] = loader.construct_object(value_node, deep=True)
     return result
 

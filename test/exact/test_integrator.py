@@ -180,7 +180,7 @@ def test_uncompiled_source_gives_the_same_numbers() -> None:
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-300])
+@pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-50])
 @pytest.mark.parametrize("body", ["left_arm", "right_arm"])
 def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
     """Powers of c/m, and its product with the time, leave the range of numbers."""

@@ -32,6 +32,8 @@ def refused(text: str, *words: str, settings: tuple[str, ...] = ()) -> None:
 
 @pytest.mark.parametrize(("section", "parameter"), EVERY, ids=IDS)
 def test_every_parameter_is_refused_outside_its_range(section: str, parameter: Parameter) -> None:
+    words = parameter.allowed.split()
+    assert (float(words[-4]), float(words[-1])) == (parameter.low, parameter.high)
     outside = [np.nextafter(parameter.high, math.inf).item(), 10.0 * parameter.high]
     below = parameter.low if parameter.open_low else np.nextafter(parameter.low, -math.inf).item()
     outside += [below, parameter.low - 1.0 - 10.0 * abs(parameter.low)]
@@ -42,8 +44,7 @@ def test_every_parameter_is_refused_outside_its_range(section: str, parameter: P
             f"{section}.{parameter.key}",
             repr(value),
             "allowed",
-            f"{parameter.low:g}",
-            f"{parameter.high:g}",
+            parameter.allowed,
         )
 
 

@@ -42,6 +42,10 @@ SENSOR = ("loop={}", "left_sensor.noise_seed=1")
         ("table", ("time.duration_s=12", "left_arm_table.force_N=[1,2,3]"),
          "left_arm_table.time_s: 12.0 comes when the run has ended: its force never acts"),
         ("table", ("time.duration_s=11.999",), "left_arm_table.time_s: 12.0 comes when the run has ended"),
+        ("table", ("time.duration_s=12", "left_arm_table.time_s=[1,12,13]", "left_arm_table.force_N=[1,0,5]"),
+         "left_arm_table.time_s: 13.0 comes when the run has ended: its force never acts"),
+        ("sine", ("time.control_period_s=2", "time.duration_s=2", "object_sine.frequency_Hz=0.25"),
+         "time.control_period_s: 2.0 is as long as the run: object_sine is one constant force"),
         ("sine", ("object_sine.amplitude_N=0",), "object_sine.amplitude_N: 0.0 has no effect"),
         ("sine", ("object_sine.frequency_Hz=500", f"object_sine.phase_rad={np.pi / 2}"),
          "object_sine.phase_rad: 1.5707963267948966 is 0 in the middle of every control period"),
@@ -62,6 +66,14 @@ def test_a_warning_names_the_key_and_what_may_be_meant(name: str, settings: tupl
     (warning,) = load(name, settings).warnings
     assert words in warning
     assert "; meant: " in warning
+
+
+@pytest.mark.parametrize(("side", "far"), [("left", "right"), ("right", "left")])
+def test_an_arm_that_passes_through_the_object_is_named(side: str, far: str) -> None:
+    (warning,) = scene_of("case_01", without=(f"{far}_contact",)).warnings
+    assert warning.startswith(f"{far}_arm: {{'mass_kg': ")
+    assert f"touches nothing: without {far}_contact it passes through the object, which the {side} arm hits" in warning
+    assert scene_of("case_01", without=("left_contact", "right_contact")).warnings == ()
 
 
 def test_both_arms_on_the_wrong_side_are_named() -> None:

@@ -10,7 +10,7 @@ from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import SIDES, Effect, Problem, Sections
 from grasp_ros.scene.parameter import Parameter
 
-MASS_KG = Parameter("mass_kg", 0.0, 1e9, "mass", open_low=True)
+MASS_KG = Parameter("mass_kg", 1e-50, 1e9, "mass")  # squares of k/m and c/m stay in the range of numbers
 MOTION = (
     Parameter("position_m", -1e9, 1e9, "initial position"),
     Parameter("velocity_m_per_s", -1e9, 1e9, "initial velocity"),

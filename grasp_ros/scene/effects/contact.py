@@ -35,8 +35,14 @@ def _force(side: int, system: System, _: int, state: Array) -> float:
 
 
 def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
-    """An arm may start inside the object, as every state of a run may be a start, but hardly beyond its other side."""
+    """An arm may start inside the object, as every state of a run may be a start, but hardly beyond its other side.
+
+    And where one arm hits the object, the other one is hardly meant to pass through it.
+    """
     at, far = SIDES[side], "right" if side == "left" else "left"
+    if f"{far}_arm" in sections and SIDES[far] not in system.contacts:
+        why = f"touches nothing: without {far}_contact it passes through the object, which the {side} arm hits"
+        yield Oddity(f"{far}_arm", sections[f"{far}_arm"], why, f"{far}_contact too, or no {far}_arm")
     depths = penetration(system.state)[0::2]
     depth, gap = float(depths[at]), float(-depths[SIDES[far]])
     key, value = f"{side}_arm.position_m", sections[f"{side}_arm"]["position_m"]

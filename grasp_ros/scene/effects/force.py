@@ -81,15 +81,21 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
     _add(section, ExternalForce(body, at, lambda end: range(1, end)), system)
 
 
+def _is_off(time: float, period: int) -> bool:
+    """Whether a time in s is no whole number of periods in ns."""
+    nanoseconds = round(time * NANOSECONDS)
+    return nanoseconds / NANOSECONDS != time or nanoseconds % period != 0
+
+
 def _off_tick(section: str, keys: tuple[str, ...], sections: Sections) -> Iterable[Problem]:
     """Times must be whole control periods."""
     period = period_ns(sections)
     for key in keys:
         value = sections[section][key]
         times = value if isinstance(value, tuple) else (value,)
-        whole = all(round(time * NANOSECONDS) / NANOSECONDS == time for time in times)
-        if not whole or any(round(time * NANOSECONDS) % period for time in times):
-            yield Problem(f"{section}.{key}", value, f"whole control periods of {period / NANOSECONDS:g} s")
+        off = next((time for time in times if _is_off(time, period)), None)
+        if off is not None:
+                yield Problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
 
 
 def _pulse_problems(section: str, sections: Sections) -> Iterable[Problem]:
@@ -136,6 +142,10 @@ def _odd_sine(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     amplitude, phase = numbers["amplitude_N"], numbers.get("phase_rad", 0.0)
     if amplitude == 0.0:
         yield Oddity(f"{section}.amplitude_N", 0.0, NO_EFFECT, "an amplitude above 0")
+    elif run_ns(sections) == period_ns(sections):
+        period = sections["time"]["control_period_s"]
+        why = f"is as long as the run: {section} is one constant force"
+        yield Oddity("time.control_period_s", period, why, "a part of time.duration_s")
     elif numbers["frequency_Hz"] == _highest(sections) and abs(math.cos(phase)) < ROUNDING:
         why = "is 0 in the middle of every control period: the force has no effect"
         yield Oddity(f"{section}.phase_rad", phase, why, "another phase, or a lower frequency_Hz")
@@ -150,8 +160,12 @@ def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     elif not any(forces[: len(forces) - len(late)]):
         first = next(time for time, force in late if force != 0.0)
         yield Oddity(key, first, NEVER, f"a begin {meant}")
-    elif late and (late[0][1] != 0.0 or round(late[0][0] * NANOSECONDS) > end):
-        yield Oddity(key, late[0][0], "comes when the run has ended: its force never acts", f"a last time {meant}")
+        return
+    for time, force in late:  # but for a 0 that closes the table at the end of the run
+        if force == 0.0 and round(time * NANOSECONDS) == end:
+            continue
+        yield Oddity(key, time, "comes when the run has ended: its force never acts", f"a last time {meant}")
+        return
 
 
 def _total(body: int, system: System, tick: int, _: Array) -> float:
