@@ -14,6 +14,7 @@ from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.segments import FIRST, INNER, Detail
 
 STEP = 5.0  # time constants of what damps within a step in contact
+MANY = 100.0  # roundings that u' may be from -1/p while the force is that of a pair that glides there
 TINY = 1e-280  # against 0 / 0, and for what underflows
 UNDERFLOW = 1e-100  # m or m/s: motions below lose digits in squares and powers 5/2, in other units others
 DIED_OUT = 1e-150  # m or m/s: nothing is said about the digits of such motions
@@ -180,7 +181,19 @@ def elapsed(detail: Detail) -> Array:
 
 def impacts(detail: Detail, size: Sizes) -> list[Impacts]:
     """All pairs that can push; the force is that of `physics.model`, whatever mode was recorded."""
-    return [_impact(detail, size, side) for side in detail.run.scene.system.contacts]
+    found = [_impact(detail, size, side) for side in detail.run.scene.system.contacts]
+    if len(found) < 2:
+        return found
+    left, right = found
+    return [left._replace(noise_d=left.noise_d + _handed_on(detail, right)),
+            right._replace(noise_d=right.noise_d + _handed_on(detail, left))]
+
+
+def _handed_on(detail: Detail, pair: Impacts) -> Array:
+    """Roundings of u' of a pair that the object has, (k, 1) in m/s: as far as it follows that pair's dissipation."""
+    rate = pair.by_d.max(axis=1, keepdims=True) / detail.bodies[:, None, OBJECT, MASS]
+    found: Array = pair.noise_d * np.minimum(1.0, rate * elapsed(detail)[:, 0])
+    return found
 
 
 def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
@@ -195,7 +208,7 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     near, doubt = np.maximum(u + noise, 0.0), contact.dissipation * noise_d + 2.0 * EPS  # of 1 + p u'
     slope, elastic = contact.hertzian * np.sqrt(near), contact.hertzian * (deep * np.sqrt(deep))
     by_u = 1.5 * slope * (np.maximum(damped, 0.0) + doubt)
-    by_d = np.where(damped >= -doubt, contact.dissipation * near * slope, 0.0)
+    by_d = np.where(damped >= -MANY * doubt, contact.dissipation * near * slope, 0.0)
     loss = np.where(damped >= 0.0, contact.dissipation * elastic * d * d, elastic * -d)
     masses = detail.bodies[:, side, MASS], detail.bodies[:, OBJECT, MASS]
     mu = masses[0] * masses[1] / (masses[0] + masses[1])
