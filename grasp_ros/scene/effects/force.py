@@ -95,7 +95,7 @@ def _off_tick(section: str, keys: tuple[str, ...], sections: Sections) -> Iterab
         times = value if isinstance(value, tuple) else (value,)
         off = next((time for time in times if _is_off(time, period)), None)
         if off is not None:
-                yield Problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
+            yield Problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
 
 
 def _pulse_problems(section: str, sections: Sections) -> Iterable[Problem]:
@@ -154,18 +154,15 @@ def _odd_sine(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
 def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     times, forces, end = sections[section]["time_s"], sections[section]["force_N"], run_ns(sections)
     late = [(time, force) for time, force in zip(times, forces, strict=True) if round(time * NANOSECONDS) >= end]
+    idle = [time for time, force in late if force != 0.0 or round(time * NANOSECONDS) > end]  # 0 at the end closes it
     key, meant = f"{section}.time_s", f"before time.duration_s, {end / NANOSECONDS!r}"
     if not any(forces):
         yield Oddity(f"{section}.force_N", 0.0, "is every force: they have no effect", "a force that is not 0")
     elif not any(forces[: len(forces) - len(late)]):
         first = next(time for time, force in late if force != 0.0)
         yield Oddity(key, first, NEVER, f"a begin {meant}")
-        return
-    for time, force in late:  # but for a 0 that closes the table at the end of the run
-        if force == 0.0 and round(time * NANOSECONDS) == end:
-            continue
-        yield Oddity(key, time, "comes when the run has ended: its force never acts", f"a last time {meant}")
-        return
+    elif idle:
+        yield Oddity(key, idle[0], "comes when the run has ended: its force never acts", f"a last time {meant}")
 
 
 def _total(body: int, system: System, tick: int, _: Array) -> float:
