@@ -18,6 +18,7 @@ MOST_DEPTH, MOST_NODES = 20, 50_000
 LONG = 60  # characters that a refusal shows of a name
 MISFITS = (ValueError, LookupError, AttributeError)  # what PyYAML raises for 2001-13-45, `!!bool x`, `!!timestamp x`
 _NUMERIC = {f"tag:yaml.org,2002:{kind}" for kind, _ in _RULES}
+_MERGE = "tag:yaml.org,2002:merge"  # of mappings, by a key <<: here a key like any other
 
 
 class _Loader(yaml.SafeLoader):
@@ -53,6 +54,15 @@ class _Loader(yaml.SafeLoader):
         self._depth -= 1
         return node
 
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except Refused:
+            raise
+        except MISFITS as error:
+            text = str(node.value)[:LONG]
+            raise Refused(f"line {node.start_mark.line + 1}: {text} cannot be read: {error}") from None
+
 
 class _Dumper(yaml.SafeDumper):
     """SafeDumper that quotes what the loader would take for a number."""
@@ -60,7 +70,7 @@ class _Dumper(yaml.SafeDumper):
 
 for _class in (_Loader, _Dumper):
     _class.yaml_implicit_resolvers = {
-        first: [rule for rule in rules if rule[0] not in _NUMERIC]
+        first: [rule for rule in rules if rule[0] not in {*_NUMERIC, _MERGE}]
         for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
     }
     for _kind, _pattern in _RULES:
@@ -99,8 +109,6 @@ def load(text: str) -> Any:
         raise
     except yaml.YAMLError as error:
         raise Refused(" ".join(str(error).split())) from None
-    except MISFITS as error:
-        raise Refused(f"a value cannot be read: {error}") from None
 
 
 def dump(document: Any) -> str:

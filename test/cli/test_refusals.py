@@ -24,7 +24,8 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     for name, content in {
         "file": b"x", "bytes.yaml": b"\xff\xfe\x00", "deep.yaml": b"[" * 20_000, "tag.yaml": b"title: !!bool x\n",
-        "date.yaml": b"title: 2001-13-45\n", "empty.npz": b"", "nomarks.md": b"x", "bytes.md": b"\xff",
+        "merge.yaml": b"<<: {title: x}\n", "date.yaml": b"title: 2001-13-45\n",
+        "digits.yaml": b"title: x\nreadings: " + b"1" * 5000, "empty.npz": b"", "nomarks.md": b"x", "bytes.md": b"\xff",
         "keys/journal.jsonl": b'{"a": 1}\n', "list/journal.jsonl": b"[]\n", "bytes/journal.jsonl": b"\xff\n",
         "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
     }.items():
@@ -64,7 +65,9 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate bytes.yaml", "bytes.yaml: 'utf-8' codec can't decode byte 0xff"),
         ("simulate deep.yaml", "deep.yaml: line 1: nested too deeply"),
         ("simulate tag.yaml", "tag.yaml: line 1: a tag, tag:yaml.org,2002:bool; allowed: none"),
-        ("simulate date.yaml", "date.yaml: a value cannot be read: month must be in 1..12"),
+        ("simulate digits.yaml", f"digits.yaml: line 2: {'1' * 60} cannot be read: Exceeds the limit"),
+        ("simulate merge.yaml", "merge.yaml: <<: unknown key with the value {'title': 'x'}; allowed: title"),
+        ("simulate date.yaml", "date.yaml: line 1: 2001-13-45 cannot be read: month must be in 1..12"),
         ("simulate case_01 --set left_arm.mass_kg=0", "left_arm.mass_kg: 0 is not allowed; allowed: a number >= 1e-50"),
         ("simulate case_01 --set left_arm.mass=1", "--set left_arm.mass=1: no such key; allowed: "),
         ("simulate case_01 --set mass", "--set mass: not understood; allowed: section.key=value"),

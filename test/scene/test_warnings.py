@@ -26,6 +26,13 @@ SENSOR = ("loop={}", "left_sensor.noise_seed=1")
         ("case_01", (*SENSOR, "left_sensor.position_noise_m=0"), "has no effect: it measures exactly"),
         ("case_02", (*SENSOR, "left_sensor.velocity_noise_m_per_s=1"), "gains of what it measures wrongly are 0"),
         ("case_01", ("loop={}", "left_actuator.limit_N=0"), "left_actuator.limit_N: 0.0 lets no force"),
+        ("case_01", ("loop={}", "left_actuator.limit_N=1", "left_feedback.feed_forward_N=-2"),
+         "left_actuator.limit_N: 1.0 is less than left_feedback.feed_forward_N alone"),
+        ("case_01", (*SENSOR, "left_sensor.position_step_m=2"), "left_sensor.position_step_m: 2.0 measures 0"),
+        ("case_01", ("loop={}", "right_feedback.velocity_gain_Ns_per_m=1e5"),
+         "is too long for right_feedback: while the right arm touches nothing, it swings 99 times as far every period"),
+        ("case_01", ("loop.delay_ticks=20", "left_feedback.velocity_gain_Ns_per_m=100"),
+         "time.control_period_s: 0.001 is too long for left_feedback"),
         ("case_01", ("loop.delay_ticks=0",), "loop.delay_ticks: 0 has no effect; meant: a delay above 0, or loop: {}"),
         ("case_01", ("loop.delay_ticks=50", "time.duration_s=0.05"), "loop.delay_ticks: 50 is the whole run of 50"),
         ("case_01", ("loop={}", "time.control_period_s=20"), "time.control_period_s: 20.0 is as long as the run"),
@@ -92,6 +99,8 @@ def test_both_arms_on_the_wrong_side_are_named() -> None:
             "feedback.set_point_m", "feedback.feed_forward_N"))),
         ("case_01", ("object_friction.coulomb_N=1", "object_friction.viscous_Ns_per_m=0")),
         ("case_01", (*SENSOR, "left_sensor.position_noise_m=0", "left_sensor.velocity_step_m_per_s=1e-3")),
+        ("case_01", ("loop={}", "left_actuator.limit_N=1", "left_feedback.velocity_gain_Ns_per_m=1e5")),  # is limited
+        ("case_01", ("loop={}", "time.control_period_s=2", "time.duration_s=20")),  # ten ticks beyond the limit
         ("pulse", ("time.duration_s=5.02",)),  # ends with the run
         ("table", ("time.duration_s=12",)),  # its last time is the end
         ("sine", ("object_sine.frequency_Hz=500",)),  # half the control frequency

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
+from grasp_ros.physics.control import Column
+from grasp_ros.physics.model import Arm
+from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import Effect, Oddity, Sections, period_ns, run_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES, Effect, Oddity, Sections, period_ns, run_ns
 from grasp_ros.scene.parameter import Parameter
 
 HELD = "commands are held over control periods and do work of their own"
+FAR = 6.0  # decades that a motion may grow in a run: studies of the limit of stability need fewer
+MOST_DELAY = 50  # control periods; the eigenvalues of longer loops take longer than the run
 
 
 def _build(sections: Sections, system: System) -> None:
@@ -32,6 +38,25 @@ def _odd(sections: Sections, system: System) -> Iterable[Oddity]:
     if system.delay >= ticks:
         why = f"is the whole run of {ticks} control periods or more: no command arrives"
         yield Oddity("loop.delay_ticks", system.delay, why, f"less than {ticks}")
+    elif system.delay <= MOST_DELAY:
+        yield from _unstable(sections, system, ticks)
+
+
+def _unstable(sections: Sections, system: System, ticks: int) -> Iterable[Oddity]:
+    """Held feedback that overshoots more from tick to tick, in an arm that no contact stops nor its limit."""
+    for name, side in SIDES.items():
+        law = system.laws.get(side)
+        if law is None or law.row[Column.LIMIT] < math.inf:
+            continue
+        mass, stiffness, damping, _ = system.bodies[side].tolist()
+        arm = Arm(mass, stiffness, damping, law.position_gain, law.velocity_gain)
+        factor = spectral_radius(arm, period_ns(sections) / NANOSECONDS, system.delay)
+        decades = ticks * math.log10(factor) if factor > 0.0 else 0.0
+        if decades > FAR:
+            why = (f"is too long for {name}_feedback: while the {name} arm touches nothing, it swings {factor:.3g}"
+                   f" times as far every period, 1e{decades:.0f} times as far in this run")
+            meant = "a shorter period, less delay or smaller gains"
+            yield Oddity("time.control_period_s", sections["time"]["control_period_s"], why, meant)
 
 
 EFFECTS = (

@@ -20,8 +20,12 @@ def _build(side: str, sections: Sections, system: System) -> None:
 
 def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
     section = f"{side}_actuator"
-    if sections[section]["limit_N"] == 0.0:
+    limit, constant = sections[section]["limit_N"], abs(sections[f"{side}_feedback"].get("feed_forward_N", 0.0))
+    if limit == 0.0:
         yield Oddity(f"{section}.limit_N", 0.0, f"lets no force of the {side} feedback through", "a limit above 0")
+    elif limit < constant:
+        why = f"is less than {side}_feedback.feed_forward_N alone"
+        yield Oddity(f"{section}.limit_N", limit, why, f"a limit above {constant!r}, or a smaller force")
 
 
 EFFECTS = tuple(
