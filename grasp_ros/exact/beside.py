@@ -68,37 +68,46 @@ def free_flight(plant: Plant, y: Array, side: Body, how: Placing) -> Flight:
 
 
 @inlined
+def ways_beside(at: Array) -> tuple[float, float]:
+    """Ways of the arms by those of the object and of the gaps."""
+    return at[LANES + X_O] + at[LANES + Z_L], at[LANES + X_O] - at[LANES + Z_R]
+
+
+@inlined
+def arm_beside(how: Placing, free: Flight, way: float, t: float, x: float, v: float) -> tuple[float, float, float]:
+    """x and v of an arm after t s, and the way there; x and v are those of object and gap, `way` is theirs, too."""
+    if how == Placing.BY_FLIGHT:
+        flown: tuple[float, float, float] = fly(free, t)
+        return flown
+    return free.x + way if how == Placing.BY_WAY else x, v, way
+
+
+@inlined
 def place_beside(at: Array, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float, y: Array) -> None:
     """Put arms where they are after t s, if that is not where object and gap are."""
-    if how[0] == Placing.BY_WAY:
-        y[X_L] = free[0].x + (at[LANES + X_O] + at[LANES + Z_L])
-    elif how[0] == Placing.BY_FLIGHT:
-        y[X_L], y[V_L], _ = fly(free[0], t)
-    if how[1] == Placing.BY_WAY:
-        y[X_R] = free[1].x + (at[LANES + X_O] - at[LANES + Z_R])
-    elif how[1] == Placing.BY_FLIGHT:
-        y[X_R], y[V_R], _ = fly(free[1], t)
+    way_l, way_r = ways_beside(at)
+    y[X_L], y[V_L], _ = arm_beside(how[0], free[0], way_l, t, y[X_L], y[V_L])
+    y[X_R], y[V_R], _ = arm_beside(how[1], free[1], way_r, t, y[X_R], y[V_R])
 
 
 @inlined
 def end_beside(state: State, at: Array, how: tuple[Placing, Placing], free: tuple[Flight, Flight], t: float) -> None:
     """Put arms where they are at the end of a segment of t s, as `place_beside`, with what roundings leave out."""
-    object_way = at[LANES + X_O]
-    end_arm(state, LEFT, how[0], free[0], object_way + at[LANES + Z_L], t)
-    end_arm(state, RIGHT, how[1], free[1], object_way - at[LANES + Z_R], t)
+    way_l, way_r = ways_beside(at)
+    end_arm(state, LEFT, how[0], free[0], way_l, t)
+    end_arm(state, RIGHT, how[1], free[1], way_r, t)
 
 
 @inlined
 def end_arm(state: State, side: Body, how: Placing, free: Flight, way: float, t: float) -> None:
     """Put an arm where it is at the end of a segment."""
-    x = velocity_lane(side) - 1
+    y, v = state.y, velocity_lane(side)
+    x = v - 1
+    y[x], y[v], way = arm_beside(how, free, way, t, y[x], y[v])
     if how == Placing.BY_GAP:
         state.carry[x] = 0.0  # object and gap have their own
         return
-    end = free.x + way
-    if how == Placing.BY_FLIGHT:
-        end, state.y[x + 1], way = fly(free, t)
-    state.y[x] = free.x
+    end, y[x] = y[x], free.x
     add(state, x, way, end)
 
 

@@ -19,7 +19,7 @@ from grasp_ros.exact.friction import push_on_object, slide_in_contact, slip_cand
 from grasp_ros.exact.implicit import expand_row, implicit_step
 from grasp_ros.exact.jit import door, inlined, kernel
 from grasp_ros.exact.kinematics import keep_resting
-from grasp_ros.exact.modes import make_transitions
+from grasp_ros.exact.modes import TOGETHER, make_transitions
 from grasp_ros.exact.observer import leave_step, notify
 from grasp_ros.exact.outputs import due, wait
 from grasp_ros.exact.polynomial import values
@@ -129,7 +129,7 @@ def squeezed_slide(tables: Tables, plant: Plant, state: State, h: float, work: I
 def is_doubtful(tables: Tables, plant: Plant, state: State, side: Body, candidate: Candidate, s: float, h: float
                 ) -> bool:
     """Whether an event early in a step, at s, is a release, or has the roundings of all that u' gains in the step."""
-    if candidate.when != s:
+    if candidate.when > s * TOGETHER:
         return False
     if candidate.what in (Transition.CLAMP, Transition.REENTRY) and not motion_of(plant, state, side, h).stiff:
         return abs(tables.f[E_NODES + side * STAGES + STAGES - 1]) * plant.pairs[side, DISSIPATION] > GAINS
