@@ -1,30 +1,27 @@
 """The energy that a motion lost, by cause, in J of V, which is twice the energy.
 
-Of an exact run it is what `outcomes` sees while the run is integrated again, from closed forms and polynomials; of any
+Of an exact run it is what an observer sees while the run is integrated again, from closed forms and polynomials; of any
 other motion what its output times tell.
 """
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Status
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.sight import Seen, Wanted
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.simulation.chunk import Setup
-from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.simulate import simulate
+from grasp_ros.simulation.quantities import SETTLED
 from grasp_ros.simulation.trajectory import Trajectory
 
-NODES = 24  # of a segment between events
-MOST = 20_000  # stretches between events that are worth it
-LONGEST = 0.25  # s; longer segments are cut, so that an arm turns by no more than some radians in each part
+CAUSES = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
+UNLIMITED = 2**62  # budgets of a run that has reached its end before
 
 
 class Losses(NamedTuple):
@@ -59,48 +56,35 @@ def power_lost(system: System, state: Array) -> Losses:
     return Losses(dampers, feedback, impacts, friction)
 
 
-def edges_of(run: Trajectory, longest: float) -> Array:
-    """Ends of the stretches of a motion in which everything is smooth: events, and cuts of the long flights, in s.
-
-    Empty if there are more stretches than MOST.
-    """
-    events = np.unique(np.concatenate([[0.0], run.event_table[:, 0], run.t[-1:]]))
-    parts = np.ceil(np.diff(events) / longest)
-    if parts.sum() > MOST:
-        return np.zeros(0)
-    cuts = [np.linspace(a, b, int(n) + 1)[1:] for (a, b), n in zip(pairwise(events.tolist()), parts, strict=True)]
-    return np.concatenate([[0.0], *cuts])
-
-
 def by_output_times(run: Trajectory) -> bool:
     """Whether `losses` are no more exact than the output times are dense."""
     return run.method != EXACT or run.status is not Status.DONE or run.sampled or bool(run.scene.system.external)
 
 
-def running_losses(run: Trajectory, longest: float = LONGEST) -> tuple[Array, Losses]:
-    """Energy lost so far by each cause: times (n,), at most `longest` s apart, in s, and arrays (n,) in J of V.
+def running_losses(run: Trajectory) -> tuple[Array, Losses]:
+    """Energy lost so far by each cause: times (n,) in s, and arrays (n,) in J of V; see `by_output_times`.
 
-    Under continuous feedback of `exact` the run is integrated again at the nodes of Gauss and Legendre: between events
-    the rates are analytic functions of theta in t = middle - half cos(theta), because u^(3/2) becomes theta^3 times
-    one, but for a relaxation shorter than they are apart: large p. Other runs, those that stopped and those of more
-    than MOST stretches have their output times: the trapezoidal rule.
+    The times are those of outputs and events of an exact run, and its begin and end; those of outputs of any other,
+    whose sums follow the trapezoidal rule.
     """
-    system, edges = run.scene.system, np.zeros(0) if by_output_times(run) else edges_of(run, longest)
-    if not len(edges):
-        lost = power_lost(system, run.state)
-        steps = np.diff(run.t)
-        sums = [np.concatenate([[0.0], np.cumsum(0.5 * steps * (rate[1:] + rate[:-1]))]) for rate in lost]
-        return run.t, Losses(*sums)
-    x, weight = np.polynomial.legendre.leggauss(NODES)
-    theta = 0.5 * np.pi * (x + 1.0)
-    half = 0.5 * np.diff(edges)[:, None]
-    times = edges[:-1, None] + half * (1.0 - np.cos(theta))
-    weights = 0.5 * np.pi * half * np.sin(theta) * weight
-    grid = np.maximum.accumulate(np.minimum(times.ravel(), edges[-1]))
-    again = simulate(run.scene, grid=grid, accuracy=run.setting)
-    lost = power_lost(system, again.state)
-    sums = [np.concatenate([[0.0], np.cumsum((rate.reshape(weights.shape) * weights).sum(axis=1))]) for rate in lost]
-    return edges, Losses(*sums)
+    if not by_output_times(run):
+        times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
+        return times, observed_losses(run, times)
+    steps = np.diff(run.t)
+    rates = power_lost(run.scene.system, run.state)
+    return run.t, Losses(*(np.concatenate([[0.0], np.cumsum(0.5 * steps * (r[1:] + r[:-1]))]) for r in rates))
+
+
+def observed_losses(run: Trajectory, times: Array) -> Losses:
+    """Energy lost until each of the times (n,) in s, from 0 on: arrays (n,). An exact run is integrated again."""
+    again = Integrator(
+        run.scene.system, continuous=True, accuracy=run.setting, max_events=UNLIMITED, max_work=UNLIMITED)
+    seen = again.watch(Wanted.LOSSES, SETTLED).seen
+    lost = np.zeros((len(CAUSES), len(times)))
+    for k, length in enumerate(np.diff(times).tolist(), 1):
+        again.advance(length)
+        lost[:, k] = seen[CAUSES]
+    return Losses(*(2.0 * lost))
 
 
 def losses(run: Trajectory) -> Losses:
@@ -109,10 +93,8 @@ def losses(run: Trajectory) -> Losses:
     What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
     out of the arms, beside what they have stored in V_c, from the positions at the output times.
     """
-    if not by_output_times(run):
-        seen = ensemble(run.scene, {}, ("energy",), setup=Setup(accuracy=run.setting)).columns
-        return Losses(*(2.0 * seen[f"lost_{cause}"][0] for cause in Losses._fields))
-    _, sums = running_losses(run)
+    exact = not by_output_times(run)
+    sums = observed_losses(run, np.array([0.0, run.scene.duration])) if exact else running_losses(run)[1]
     found = Losses(*(np.asarray(total[-1]) for total in sums))
     if not run.sampled:
         return found

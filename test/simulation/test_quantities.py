@@ -54,20 +54,26 @@ def test_what_is_lost_in_a_relaxation_is_not_missed(p: float) -> None:
     assert float(losses(run).total) == pytest.approx(level[0] - level[-1], rel=1e-11)
 
 
-def test_running_sums_follow_V_c() -> None:
-    run = simulate(scenes.load("case_03"))
-    t, lost = running_losses(run)
-    V_c = simulate(scenes.load("case_03"), grid=t).energy.V_c
-    assert lost.total == pytest.approx(V_c[0] - V_c, abs=1e-8)
+@pytest.mark.parametrize("settings", [(), ("left_contact.dissipation_s_per_m=1e8", "left_arm.velocity_m_per_s=1")])
+def test_running_sums_follow_V_c(settings: tuple[str, ...]) -> None:
+    scene = scenes.load("case_03", settings)
+    t, lost = running_losses(simulate(scene))
+    V_c = simulate(scene, grid=t).energy.V_c
+    assert lost.total == pytest.approx(V_c[0] - V_c, abs=1e-12 * V_c[0])
 
 
-def test_a_run_of_too_many_stretches_has_its_output_times() -> None:
-    run = simulate(scenes.load("no_contact", ["time.duration_s=1e5", "time.control_period_s=1000"]))
+def test_running_sums_stand_at_outputs_and_events() -> None:
+    run = simulate(scenes.load("case_03"), grid=np.array([1.0, 7.0]))
     t, lost = running_losses(run)
-    assert np.array_equal(t, run.t)
+    assert np.array_equal(t, np.union1d([0.0, 1.0, 7.0, run.scene.duration], run.event_table[:, 0]))
     assert all(len(total) == len(t) for total in lost)
-    assert not by_output_times(run)
-    assert by_output_times(simulate(run.scene, sampled=True))
+    assert float(losses(run).total) == pytest.approx(float(lost.total[-1]), rel=1e-13)
+
+
+def test_losses_of_a_run_without_feedback_of_its_own_have_its_output_times() -> None:
+    run = simulate(scenes.load("case_01"), sampled=True)
+    assert by_output_times(run)
+    assert np.array_equal(running_losses(run)[0], run.t)
 
 
 def test_what_held_commands_take_is_their_work() -> None:

@@ -26,7 +26,6 @@ CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"
 PALE = 0.35  # of the standard case behind a changed one
 CONTACT_POINTS = 400
 IN_CONTACT = 60  # output times in each contact, so that no peak is cut
-CLOSE = 0.02  # s between two values of the losses
 PAGE = 170.0 / 25.4  # in, the width of a page in print
 
 
@@ -144,7 +143,7 @@ def _behind(axes: Axes, draw: object, run: Trajectory) -> None:
 
 def _losses(axes: Axes, run: Trajectory) -> None:
     """Energy lost so far by each cause, one above the other, in percent of V_c(0)."""
-    t, lost = running_losses(run, CLOSE)
+    t, lost = running_losses(run)
     whole = float(run.energy.V_c[0])
     shown = [
         (name, color, getattr(lost, name) / whole * 100.0) for name, color in CAUSES if getattr(lost, name)[-1] > 0.0
