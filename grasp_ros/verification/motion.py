@@ -234,7 +234,7 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
         unit = unit + stored.max(axis=1) + (elastic.max(axis=1) * pair.noise[:, 0] / EPS)
         unit = unit + pair.bounce[:, 0] * np.abs(pair.d).max(axis=1)
         unit = unit + _loss_noise(detail, pair)
-        power = power + (elastic * np.abs(pair.d)).max(axis=1)
+        power = power + (np.maximum(elastic, np.abs(pair.force)) * np.abs(pair.d)).max(axis=1)
     lost, doubt = detail.integral(taken[:, 1:-1])
     late = EPS * detail.pieces.end * power
     unit = EPS * (unit + lost) + late + doubt + _wander(detail, taken) + TINY
