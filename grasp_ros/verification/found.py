@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +21,7 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, SceneError
 from grasp_ros.simulation import simulate
 from grasp_ros.verification.reference import integrate_scene
 from grasp_ros.verification.roundings import largest, rates
@@ -31,7 +32,7 @@ STEPS = 2_500  # of the reference; where it needs more the answer ends earlier
 HALVINGS, PARTS = 16, 16  # of the horizon, where it may end
 FORGOTTEN = 1e6  # amplification beyond which a comparison tells little
 LARGE = 1e300  # m, m/s: beyond, the motion outgrows doubles
-DRAWS, DRAWN_DIGITS = 2, 20  # of the amplification
+DRAWS, TRIES, DRAWN_DIGITS = 2, 50, 20  # of the amplification
 LIMIT = 100.0  # roundings that are right
 TIMES = {"start_s", "length_s", "time_s"}  # must stay whole control periods
 EXACT = ("time", "left_sensor", "right_sensor")  # sections whose numbers stay
@@ -116,19 +117,28 @@ def _relative(changes: Array, size: Array) -> Array:
         return np.where(changes == 0.0, 0.0, np.abs(changes) / size)
 
 
-def _moved(scene: Scene) -> Iterator[Scene]:
-    """The scene with some of its numbers smaller by one rounding."""
-    for seed in range(DRAWS):
-        draw = np.random.default_rng(seed)
-        changes: dict[str, Any] = {}
-        for section, numbers in scene.values.items():
-            for key, value in numbers.items():
-                if section in EXACT or key in TIMES or isinstance(value, int):
-                    continue
-                factors = 1.0 - EPS * draw.integers(0, 2, np.size(value))
-                moved = (np.atleast_1d(value) * factors).tolist()
-                changes[f"{section}.{key}"] = tuple(moved) if isinstance(value, tuple) else moved[0]
-        yield scene.changed(changes)
+def _moved(scene: Scene) -> list[Scene]:
+    """The scene with some of its numbers smaller by one rounding, DRAWS times, where scenes may be so."""
+    found: list[Scene] = []
+    for seed in range(TRIES):
+        with suppress(SceneError):  # k + Kp = 0 must not become negative
+            found.append(scene.changed(_changes(scene, np.random.default_rng(seed))))
+        if len(found) == DRAWS:
+            break
+    return found
+
+
+def _changes(scene: Scene, draw: np.random.Generator) -> dict[str, Any]:
+    """The numbers of the scene, some of them smaller by one rounding."""
+    changes: dict[str, Any] = {}
+    for section, numbers in scene.values.items():
+        for key, value in numbers.items():
+            if section in EXACT or key in TIMES or isinstance(value, int):
+                continue
+            factors = 1.0 - EPS * draw.integers(0, 2, np.size(value))
+            moved = (np.atleast_1d(value) * factors).tolist()
+            changes[f"{section}.{key}"] = tuple(moved) if isinstance(value, tuple) else moved[0]
+    return changes
 
 
 def verdict(scene: Scene, right: Answer) -> Verdict:

@@ -44,6 +44,15 @@ def test_the_budget_of_work_ends_a_run(monkeypatch: pytest.MonkeyPatch, breath: 
     assert 0 < len(run.t) < 2001
 
 
+def test_an_implicit_step_counts_as_the_time_that_it_takes() -> None:
+    scene = scenes.load("case_01", [f"{side}_contact.dissipation_s_per_m=1e8" for side in ("left", "right")])
+    whole = simulate(scene)
+    units = int(whole.work.sum() - whole.work[Work.REJECTED_STEPS])
+    assert whole.status is Status.DONE
+    assert simulate(scene, max_work=2 * units).status is Status.WORK_BUDGET
+    assert simulate(scene, max_work=units + integrator.IMPLICIT * int(whole.work[Work.CONTACT_STEPS])).t[-1] == 20.0
+
+
 @pytest.mark.parametrize("name", ["case_02", "friction", "friction_slide"])
 def test_a_run_that_takes_breath_gives_the_same_bits(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     whole = simulate(scenes.load(name))

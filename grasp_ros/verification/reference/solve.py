@@ -149,7 +149,8 @@ def integrate_scene(scene: Scene, times: Iterable[float], digits: int = 25, seco
     digits : int
         See `integrate`.
     seconds, budget : float
-        Limits of wall time and of steps; the states at the times reached until then are given.
+        Limits of wall time, looked at between steps, and of steps; the states at the times reached until then are
+        given.
 
     Returns
     -------
