@@ -12,7 +12,7 @@ from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import CONTACTS
 
-ROUNDING = 1e-9  # of a position: what is less deep is meant to touch
+ROUNDING = 1e-9  # of the largest position, or of 1 m: what is less deep is meant to touch
 PARAMETERS = (
     Parameter("hertz_N_per_m1_5", 0.0, 1e15, "Hertzian stiffness of the impact, H", open_low=True),
     Parameter("dissipation_s_per_m", 0.0, 1e12, "Hunt-Crossley dissipation of the impact, p", optional=True),
@@ -47,7 +47,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
     depth, gap = float(depths[at]), float(-depths[SIDES[far]])
     key, value = f"{side}_arm.position_m", sections[f"{side}_arm"]["position_m"]
     place = sections["object"]["position_m"]
-    if depth <= ROUNDING * max(abs(value), abs(place)):
+    if depth <= ROUNDING * min(1.0, max(map(abs, system.state[0::2].tolist()))):
         return
     stored, pressing = 0.4 * system.pairs[at, HERTZIAN] * depth**2.5, _pressing(system, at, depth)
     if SIDES[far] in system.contacts and 0.0 < gap < depth:
@@ -62,10 +62,10 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
 def _pressing(system: System, side: int, depth: float) -> float:
     """Energy in J with which an arm and the object can be pressed into each other: of motion, and of today's forces."""
     loop, external, energy = system.closed_loop, system.external_at(0), 0.0
-    for body in (side, OBJECT):
+    for body, sign in ((side, 1.0 if side == LEFT else -1.0), (OBJECT, -1.0 if side == LEFT else 1.0)):
         x, v = system.state[COLUMN[body] : COLUMN[body] + 2]
-        force = abs(loop[body, FORCE] - loop[body, STIFFNESS] * x) + abs(external[body])
-        energy += 0.5 * loop[body, MASS] * v**2 + force * depth
+        force = sign * (loop[body, FORCE] - loop[body, STIFFNESS] * x) + abs(external[body])
+        energy += 0.5 * loop[body, MASS] * v**2 + max(force, 0.0) * depth
     return float(energy)
 
 
