@@ -26,7 +26,7 @@ from grasp_ros.verification.roundings import DIED_OUT
 from grasp_ros.verification.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
 
 MOST_EVENTS = 2000
-MOST_WORK = 10_000  # of a run
+MOST_WORK = 20_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
 OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
