@@ -175,7 +175,7 @@ def test_a_light_arm_beside_one_that_creeps_costs_few_steps() -> None:
     """The object has roundings of the velocity of the arm that creeps beside it: they are no relaxation."""
     scene = Squeeze((1.5, 1.5), 1e9, (0.0, 0.0, 0.0), (-0.01, -0.01, -5.0), mass=(1e-3, 5.0, 1.0),
                     stiffness=(50.0, 0.0), damping=0.2)
-    result = scene.start(max_work=10**5)
+    result = scene.start(max_work=10**6)
     result.advance(0.5)
     assert result.status is Status.DONE
     assert result.work[Work.CONTACT_STEPS] < 8000
