@@ -16,7 +16,7 @@ _INT = re.compile(r"^[-+]?(0|[1-9]\d*)$")
 _RULES = (("float", _FLOAT), ("int", _INT))
 MOST_DEPTH, MOST_NODES = 20, 50_000
 LONG = 60  # characters that a refusal shows of a name
-MISFITS = (ValueError, LookupError, AttributeError)  # what PyYAML raises for 2001-13-45, `!!bool x`, `!!timestamp x`
+MISFITS = (ValueError, LookupError, AttributeError, OverflowError)  # PyYAML's for 2001-13-45 or "\UFFFFFFFF"
 _NUMERIC = {f"tag:yaml.org,2002:{kind}" for kind, _ in _RULES}
 _MERGE = "tag:yaml.org,2002:merge"  # of mappings, by a key <<: here a key like any other
 
@@ -104,11 +104,14 @@ def load(text: str) -> Any:
     if len(text) > TEXT_BYTES:
         raise Refused(f"larger than {TEXT_BYTES} characters; allowed: at most that")
     try:
-        return yaml.load(text, _Loader)
+        loader = _Loader(text)
+        return loader.get_single_data()
     except Refused:
         raise
     except yaml.YAMLError as error:
         raise Refused(" ".join(str(error).split())) from None
+    except MISFITS as error:  # before there is a node
+        raise Refused(f"line {loader.line + 1}: a value cannot be read: {error}") from None
 
 
 def dump(document: Any) -> str:
