@@ -23,7 +23,7 @@ from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pai
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
-MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for about a minute
+MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for a minute or a few
 BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
 IMPLICIT = 100  # units of work that an implicit step takes the time of, beside its own
 
@@ -98,7 +98,7 @@ class Integrator:
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._events: list[Array] = []
-        self._event_count = self._implicit = 0
+        self._event_count = self._implicit = 0  # the second in units of work
         self._watcher: Watcher | None = None
 
     def watch(self, wanted: Wanted, bound: float) -> Watcher:
@@ -122,7 +122,7 @@ class Integrator:
     @property
     def _spent(self) -> int:
         flights, steps, _, iterations = self.work.tolist()  # enums cost a sampled tick more than the list
-        return int(flights + steps + iterations) + IMPLICIT * self._implicit
+        return int(flights + steps + iterations) + self._implicit
 
     @property
     def stop(self) -> str:
@@ -200,10 +200,10 @@ class Integrator:
                 self._watcher.attach(filled, tables)
             while self.status is Status.DONE:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
-                most = min(self._spent + BREATH, self._max_work) - IMPLICIT * self._implicit
+                most = min(self._spent + BREATH, self._max_work) - self._implicit
                 own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, self._carry, self._clock)
                 if outcome == Outcome.SQUEEZED:
-                    k, self._implicit = int(loop.place[Place.INTERVAL]), self._implicit + 1
+                    k, self._implicit = int(loop.place[Place.INTERVAL]), self._implicit + IMPLICIT
                     outcome = creep(*own, loop.lengths[k], self._accuracy, most, grid[: loop.bounds[k + 1]], out,
                                     allowed, filled, self.work)
                 else:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.control import ControlLaw, feedback
 from grasp_ros.physics.layout import DAMPING, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.physics.model import Arm, Array, Grasp
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
@@ -111,6 +111,12 @@ class System:
             bodies[side, DAMPING] += law.velocity_gain
             bodies[side, FORCE] += law.position_gain * law.set_point + law.feed_forward
         return bodies
+
+    def arm(self, side: int) -> Arm:
+        """An arm with the gains of its controller."""
+        mass, stiffness, damping, _ = self.bodies[side].tolist()
+        law = self.laws[side]
+        return Arm(mass, stiffness, damping, law.position_gain, law.velocity_gain)
 
     def external_at(self, tick: int) -> Array:
         """External forces (3,) in N from a tick to the next, by body."""

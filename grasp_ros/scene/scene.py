@@ -15,7 +15,7 @@ from typing import Any
 
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, MASS, OBJECT, RIGHT
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.model import Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
@@ -86,15 +86,10 @@ class Scene:
         system = self.system
         if self.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
             raise Refused(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
-        left, right = (self._arm(side) for side in (LEFT, RIGHT))
+        left, right = (system.arm(side) for side in (LEFT, RIGHT))
         (hertz_l, loss_l), (hertz_r, loss_r) = system.pairs.tolist()
         mass = float(system.bodies[OBJECT, MASS])
         return Grasp(left, right, Contact(hertz_l, loss_l), Contact(hertz_r, loss_r), mass)
-
-    def _arm(self, side: int) -> Arm:
-        mass, stiffness, damping, _ = self.system.bodies[side].tolist()
-        law = self.system.laws[side]
-        return Arm(mass, stiffness, damping, law.position_gain, law.velocity_gain)
 
     @property
     def initial_state(self) -> Array:

@@ -62,7 +62,8 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
 def _pressing(system: System, side: int, depth: float) -> float:
     """Energy in J with which an arm and the object can be pressed into each other: of motion, and of today's forces."""
     loop, external, energy = system.closed_loop, system.external_at(0), 0.0
-    for body, sign in ((side, 1.0 if side == LEFT else -1.0), (OBJECT, -1.0 if side == LEFT else 1.0)):
+    inward = 1.0 if side == LEFT else -1.0  # for the arm
+    for body, sign in ((side, inward), (OBJECT, -inward)):
         x, v = system.state[COLUMN[body] : COLUMN[body] + 2]
         force = sign * (loop[body, FORCE] - loop[body, STIFFNESS] * x) + abs(external[body])
         energy += 0.5 * loop[body, MASS] * v**2 + max(force, 0.0) * depth

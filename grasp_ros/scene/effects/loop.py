@@ -6,10 +6,9 @@ import math
 from collections.abc import Iterable
 
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.model import Arm
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import NANOSECONDS, SIDES, Effect, Oddity, Sections, period_ns, run_ns
+from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections, period_ns, run_ns
 from grasp_ros.scene.parameter import Parameter
 
 HELD = "commands are held over control periods and do work of their own"
@@ -44,19 +43,17 @@ def _odd(sections: Sections, system: System) -> Iterable[Oddity]:
 
 def _unstable(sections: Sections, system: System, ticks: int) -> Iterable[Oddity]:
     """Held feedback that overshoots more from tick to tick, in an arm that no contact stops nor its limit."""
+    period = sections["time"]["control_period_s"]
     for name, side in SIDES.items():
-        law = system.laws.get(side)
-        if law is None or law.row[Column.LIMIT] < math.inf:
+        if side not in system.laws or system.laws[side].row[Column.LIMIT] < math.inf:
             continue
-        mass, stiffness, damping, _ = system.bodies[side].tolist()
-        arm = Arm(mass, stiffness, damping, law.position_gain, law.velocity_gain)
-        factor = spectral_radius(arm, period_ns(sections) / NANOSECONDS, system.delay)
+        factor = spectral_radius(system.arm(side), period, system.delay)
         decades = ticks * math.log10(factor) if factor > 0.0 else 0.0
         if decades > FAR:
             why = (f"is too long for {name}_feedback: while the {name} arm touches nothing, it swings {factor:.3g}"
                    f" times as far every period, 1e{decades:.0f} times as far in this run")
             meant = "a shorter period, less delay or smaller gains"
-            yield Oddity("time.control_period_s", sections["time"]["control_period_s"], why, meant)
+            yield Oddity("time.control_period_s", period, why, meant)
 
 
 EFFECTS = (

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
-import numpy as np
-
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
@@ -52,7 +50,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
         for key, value in unused.items():
             gain = f"{side}_feedback.{GAINS[key.partition('_')[0]]}"
             yield Oddity(f"{section}.{key}", value, f"has no effect: {gain} is 0", "a gain that is not 0")
-        reach = max(np.abs(system.state[0::2]).max(), abs(system.laws[SIDES[side]].set_point))
+        reach = max(map(abs, (*system.state[0::2].tolist(), system.laws[SIDES[side]].set_point)))
         if reach > 0.0 and wrong.get("position_step_m", 0.0) > 2.0 * reach:
             why = f"measures 0 everywhere within {reach:g} m, where all bodies start"
             yield Oddity(f"{section}.position_step_m", wrong["position_step_m"], why, "a smaller step")

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure as Drawing
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, plots, simulate
-from grasp_ros.simulation.losses import running_losses
+from grasp_ros.simulation.losses import losses, running_losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
 from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of
 from grasp_ros.studies.paper.cases import STANDARD, Figure, Start, start_of, started
@@ -195,9 +195,9 @@ def _hardest(run: Trajectory) -> tuple[float, float] | None:
 
 def _bars(axes: Axes, run: Trajectory) -> None:
     """What the energy was lost to, in percent of what was lost."""
-    _, lost = running_losses(run)
-    whole = float(lost.total[-1]) or 1.0
-    shown = [(name, color, 100.0 * float(getattr(lost, name)[-1]) / whole) for name, color in CAUSES]
+    lost = losses(run)
+    whole = float(lost.total) or 1.0
+    shown = [(name, color, 100.0 * float(getattr(lost, name)) / whole) for name, color in CAUSES]
     shown = [each for each in shown if each[2] > 1e-6]
     axes.set_title("% of what was lost", fontsize="small")
     if not shown:
