@@ -160,11 +160,11 @@ def summary(bases: Sequence[Measured], owns: Sequence[Measured]) -> Measured:
 
 def text_of(checkouts: list[Path], table: dict[str, list[Measured]]) -> str:
     """The table, and below it what is to be said of single cells."""
-    lines = [" " * 24 + "".join(f"{checkout.name[-24:]:>28}" for checkout in checkouts)]
-    lines.append(f"{'row':24}" + f"{'ms':>12}{'ratio':>8}{'minima':>8}" * len(checkouts))
+    lines = [" " * 28 + "".join(f"{checkout.name[-24:]:>28}" for checkout in checkouts)]
+    lines.append(f"{'row':28}" + f"{'ms':>12}{'ratio':>8}{'minima':>8}" * len(checkouts))
     remarks = []
     for name, row in table.items():
-        lines.append(f"{name:24}")
+        lines.append(f"{name:28}")
         for checkout, told in zip(checkouts, row, strict=True):
             where = f"{name}, {checkout.name}:"
             if "absent" in told:
