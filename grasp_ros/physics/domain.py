@@ -12,19 +12,9 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from grasp_ros.physics.layout import (
-    DAMPING,
-    DISSIPATION,
-    EPS,
-    FORCE,
-    HERTZIAN,
-    LEFT,
-    MASS,
-    OBJECT,
-    RIGHT,
-    STIFFNESS,
-)
+from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, HERTZIAN, MASS, OBJECT, STIFFNESS
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
@@ -36,27 +26,32 @@ SMALLEST = 1e-30  # of any number of a scene that is not 0, in SI
 class Range(NamedTuple):
     """Bounds of one kind of number."""
 
-    text: str
     low: float
     high: float
     unit: str
     why: str
 
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The smallest and the largest number allowed."""
+        return self.low, self.high
 
-MASS_RANGE = Range("mass", 1e-12, 1e9, "kg", "from a grain of dust to a wall that does not move")
-POSITION_RANGE = Range("position or set-point", -1e9, 1e9, "m", "a thousandth of what a run may reach")
-SPEED_RANGE = Range("velocity", -1e9, 1e9, "m/s", "a thousandth of what a run may reach")
-SPRING_RANGE = Range("stiffness of an arm", 0.0, 1e12, "N/m", "1 nm under 1 kN")
-DAMPER_RANGE = Range("damping, drag", 0.0, 1e12, "N s/m", "1 nm/s under 1 kN")
-POSITION_GAIN_RANGE = Range("position gain", -1e12, 1e12, "N/m", "as the springs")
-VELOCITY_GAIN_RANGE = Range("velocity gain", -1e12, 1e12, "N s/m", "as the dampers")
-FORCE_RANGE = Range("force", -1e12, 1e12, "N", "what the stiffest spring exerts over 1 m")
-HERTZ_RANGE = Range("Hertzian stiffness H", 1e-6, 1e15, "N/m^1.5", "a sphere of diamond as large as a house has 1e13")
-DISSIPATION_RANGE = Range("dissipation p", 0.0, 1e12, "s/m", "what is too large depends on speed and force: see below")
-RANGES = (
-    MASS_RANGE, POSITION_RANGE, SPEED_RANGE, SPRING_RANGE, DAMPER_RANGE, POSITION_GAIN_RANGE, VELOCITY_GAIN_RANGE,
-    FORCE_RANGE, HERTZ_RANGE, DISSIPATION_RANGE,
-)
+
+RANGES = {
+    "mass": Range(1e-12, 1e9, "kg", "from a grain of dust to a wall that does not move"),
+    "position, set-point": Range(-1e9, 1e9, "m", "a thousandth of what a run may reach"),
+    "velocity": Range(-1e9, 1e9, "m/s", "a thousandth of what a run may reach"),
+    "stiffness of an arm": Range(0.0, 1e12, "N/m", "1 nm under 1 kN"),
+    "damping, drag": Range(0.0, 1e12, "N s/m", "1 nm/s under 1 kN"),
+    "position gain": Range(-1e12, 1e12, "N/m", "as the springs"),
+    "velocity gain": Range(-1e12, 1e12, "N s/m", "as the dampers"),
+    "force": Range(-1e12, 1e12, "N", "what the stiffest spring exerts over 1 m"),
+    "gravity": Range(0.0, 1e3, "m/s^2", "some hundred times that of the earth"),
+    "Hertzian stiffness H": Range(1e-6, 1e15, "N/m^1.5", "harder than a sphere of diamond as large as a house"),
+    "dissipation p": Range(0.0, 1e12, "s/m", "how much is too much depends on the impulse, see below"),
+    "duration": Range(0.0, 1e9, "s", "some 30 years"),
+    "control period": Range(0.0, 1e3, "s", "a command that is held for longer controls nothing"),
+}
 
 
 class Rows:
@@ -115,7 +110,7 @@ class Rows:
         push[:, :OBJECT] *= self.touching
         mass[:, :OBJECT] *= self.touching
         common = push.sum(axis=1) / mass.sum(axis=1)  # acceleration
-        inward = (push - mass * common[:, None])[:, :OBJECT] * (1.0, -1.0)
+        inward: Array = (push - mass * common[:, None])[:, :OBJECT] * (1.0, -1.0)
         return np.maximum(inward, 0.0) * self.touching
 
     def gaps(self) -> Array:
@@ -127,8 +122,8 @@ class Rows:
         return np.abs(self.v[:, :OBJECT] - self.v[:, OBJECT:]) / _rounding(self.v) * self.touching
 
     def masses(self) -> Array:
-        """Mass of an arm by that of the object, (n, 2)."""
-        return self.mass[:, :OBJECT] / self.mass[:, OBJECT:] * (self.there[:, :OBJECT] & self.there[:, OBJECT:])
+        """Mass of an arm by that of the object that it hits, (n, 2)."""
+        return self.mass[:, :OBJECT] / self.mass[:, OBJECT:] * self.touching
 
     def turns(self) -> Array:
         """Rate times duration, (n, 3)."""
@@ -142,15 +137,16 @@ class Rows:
         """Speed at which a pair that starts pressed in is pushed apart, (n, 2) in m/s."""
         return np.sqrt(0.8 * self.elastic * np.maximum(-self.gap, 0.0) / self.reduced)
 
-    def losses(self) -> Array:
-        """The dissipation p times the speeds of arm and object, (n, 2)."""
-        return self._pairs[..., DISSIPATION] * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:]) * self.touching
+    def impulses(self) -> Array:
+        """Largest p J / mu, (n, 2): J from the approach, a start pressed in, and constant forces over the duration.
 
-    def relaxations(self) -> Array:
-        """How many times p F / mu a pair is pressed for, (n, 2): from its start outwards, and for the whole run."""
+        A pair under the force F relaxes with the rate p F / mu, so that this counts relaxation times: p v of an impact
+        at v that loses all of it, p F t / mu where F presses for a time t.
+        """
         loss = self._pairs[..., DISSIPATION]
-        outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))
-        return loss / self.reduced * (self.elastic * outward + self.pressed * self._duration)
+        outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, it parts with 1/p
+        force = self.elastic * outward + self.pressed * self._duration
+        return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
 
 
 def _rounding(numbers: Array) -> Array:
@@ -182,27 +178,23 @@ def _arms(key: str) -> tuple[str, ...]:
 
 
 RULES = (
-    Rule("gap or penetration of a pair, in roundings of the largest position", 1e-3, np.inf, "",
-         "a gap far below the rounding of its positions has no meaning", _arms("arm.position_m"), Rows.gaps),
+    Rule("gap or depth of a pair, in roundings of the largest position", 1e-3, np.inf, "",
+         "the positions do not tell a smaller one", _arms("arm.position_m"), Rows.gaps),
     Rule("relative speed of a pair, in roundings of the largest speed", 1e-3, np.inf, "",
-         "a speed far below the rounding of the velocities has no meaning", _arms("arm.velocity_m_per_s"),
-         Rows.closing),
-    Rule("mass of an arm, in masses of the object", 1e-12, 1e12, "",
-         "an impact still moves the heavier one by four digits of a rounded velocity", _arms("arm.mass_kg"),
+         "the velocities do not tell a smaller one", _arms("arm.velocity_m_per_s"), Rows.closing),
+    Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
+         "four digits of a velocity are left for what an impact moves the heavier one", _arms("arm.mass_kg"),
          Rows.masses),
-    Rule("sqrt(k/m) or c/m of a body, times the duration", 0.0, 1e12, "",
+    Rule("rate of a body, sqrt(k/m) or c/m, x duration", 0.0, 1e12, "",
          "one rounding of the rate turns the phase at the end by 1e-4", ("time.duration_s",) * 3, Rows.turns),
-    Rule("speed that a body reaches by its spring and its constant force", 0.0, 1e10, "m/s",
+    Rule("speed that a body reaches by its spring and constant force", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", ("left_arm.mass_kg", "right_arm.mass_kg", "object.mass_kg"),
          Rows.speeds),
-    Rule("speed at which a pair that starts pressed in is pushed apart", 0.0, 1e10, "m/s",
+    Rule("speed at which a pair that starts pressed in parts", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", _arms("arm.position_m"), Rows.thrown),
-    Rule("p times the speeds of arm and object", 0.0, 1e6, "",
-         "an impact leaves a part of 1/(p v) of its speed and takes p v / 15 Taylor steps",
-         _arms("contact.dissipation_s_per_m"), Rows.losses),
-    Rule("p F / mu times how long a pair is pressed by F", 0.0, 1e9, "",
-         "a pressed pair takes a fifteenth of that in Taylor steps, and a run may take 1e8",
-         _arms("contact.dissipation_s_per_m"), Rows.relaxations),
+    Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e9, "",
+         "it takes a fifteenth of that in Taylor steps, and a run may take 1e8", _arms("contact.dissipation_s_per_m"),
+         Rows.impulses),
 )
 
 
@@ -226,10 +218,13 @@ def outside(system: System, duration: float) -> Outside | None:
     return None
 
 
-def outside_rows(rows: Rows) -> Array:
-    """Which of n systems break a rule, (n,) of bool."""
-    return np.any([_breaks(rule, rule.measure(rows)).any(axis=1) for rule in RULES], axis=0)
+def outside_rows(rows: Rows) -> NDArray[np.bool_]:
+    """Which of n systems break a rule, (n,)."""
+    broken = np.zeros(len(rows.x), dtype=bool)
+    for rule in RULES:
+        broken |= _breaks(rule, rule.measure(rows)).any(axis=1)
+    return broken
 
 
-def _breaks(rule: Rule, measured: Array) -> Array:
-    return ~((measured == 0.0) | ((measured >= rule.low) & (measured <= rule.high)))
+def _breaks(rule: Rule, measured: Array) -> NDArray[np.bool_]:
+    return np.asarray(~((measured == 0.0) | ((measured >= rule.low) & (measured <= rule.high))))
