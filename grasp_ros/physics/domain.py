@@ -20,7 +20,9 @@ from grasp_ros.physics.system import System
 
 LARGEST_POSITION = 1e12  # m, that a run may reach
 LARGEST_SPEED = 1e12  # m/s
-SMALLEST = 1e-30  # of any number of a scene that is not 0, in SI
+SMALLEST = 1e-36  # in SI, of a number that is not 0; a position or a velocity may decay to any
+SIGNS = np.array([1.0, -1.0])  # of what points to the object, by side
+PART = 1e-3  # of a rounding, that a gap is at least
 
 
 class Range(NamedTuple):
@@ -76,15 +78,16 @@ class Rows:
         self.touching = (pairs[..., HERTZIAN] > 0.0) & self.there[:, :OBJECT] & self.there[:, OBJECT:]
 
     @cached_property
-    def rate(self) -> Array:
-        """The faster of sqrt(k/m) and c/m of each body, (n, 3) in 1/s."""
-        return np.maximum(np.sqrt(self._bodies[..., STIFFNESS] / self.mass), self._bodies[..., DAMPING] / self.mass)
+    def swing(self) -> Array:
+        """sqrt(k/m) of each body, (n, 3) in 1/s."""
+        return np.sqrt(self._bodies[..., STIFFNESS] / self.mass)
 
     @cached_property
     def speed(self) -> Array:
         """What each body reaches by its own spring and constant force, (n, 3) in m/s."""
         force = self._bodies[..., FORCE] - self._bodies[..., STIFFNESS] * self.x
-        return np.abs(self.v) + np.abs(force) / self.mass / np.maximum(self.rate, 1.0 / self._duration)
+        rate = np.maximum(self.swing, self._bodies[..., DAMPING] / self.mass)
+        return np.abs(self.v) + np.abs(force) / self.mass / np.maximum(rate, 1.0 / self._duration)
 
     @cached_property
     def reduced(self) -> Array:
@@ -95,7 +98,7 @@ class Rows:
     @cached_property
     def gap(self) -> Array:
         """Positive where a pair is apart, (n, 2) in m."""
-        return (self.x[:, OBJECT:] - self.x[:, :OBJECT]) * (1.0, -1.0)
+        return np.asarray((self.x[:, OBJECT:] - self.x[:, :OBJECT]) * SIGNS)
 
     @cached_property
     def elastic(self) -> Array:
@@ -110,7 +113,7 @@ class Rows:
         push[:, :OBJECT] *= self.touching
         mass[:, :OBJECT] *= self.touching
         common = push.sum(axis=1) / mass.sum(axis=1)  # acceleration
-        inward: Array = (push - mass * common[:, None])[:, :OBJECT] * (1.0, -1.0)
+        inward: Array = (push - mass * common[:, None])[:, :OBJECT] * SIGNS
         return np.maximum(inward, 0.0) * self.touching
 
     def gaps(self) -> Array:
@@ -118,16 +121,17 @@ class Rows:
         return np.abs(self.gap) / _rounding(self.x) * self.touching
 
     def closing(self) -> Array:
-        """Relative speed by a rounding of the largest speed, (n, 2)."""
-        return np.abs(self.v[:, :OBJECT] - self.v[:, OBJECT:]) / _rounding(self.v) * self.touching
+        """Relative speed where there is no gap, by a rounding of the largest speed, (n, 2)."""
+        closed = self.touching & (self.gap == 0.0)
+        return np.asarray(np.abs(self.v[:, :OBJECT] - self.v[:, OBJECT:]) / _rounding(self.v) * closed)
 
     def masses(self) -> Array:
         """Mass of an arm by that of the object that it hits, (n, 2)."""
         return self.mass[:, :OBJECT] / self.mass[:, OBJECT:] * self.touching
 
     def turns(self) -> Array:
-        """Rate times duration, (n, 3)."""
-        return self.rate * self._duration * self.there
+        """sqrt(k/m) times the duration, (n, 3)."""
+        return self.swing * self._duration * self.there
 
     def speeds(self) -> Array:
         """What each body reaches by itself, (n, 3) in m/s."""
@@ -150,12 +154,12 @@ class Rows:
 
 
 def _rounding(numbers: Array) -> Array:
-    largest = np.abs(numbers).max(axis=1, keepdims=True)
-    return np.where(largest > 0.0, EPS * largest, 1.0)
+    """Of the largest of three numbers (n, 3), and so large that PART of it is SMALLEST at least: (n, 1)."""
+    return np.asarray(np.maximum(EPS * np.abs(numbers).max(axis=1, keepdims=True), SMALLEST / PART))
 
 
 class Rule(NamedTuple):
-    """A bound of a ratio: 0, or from `low` to `high`."""
+    """A bound of a ratio: from `low` to `high`; 0 stands for what is not there, and for no gap and no speed."""
 
     text: str
     low: float
@@ -170,7 +174,7 @@ class Rule(NamedTuple):
         """The bound in words."""
         unit = f" {self.unit}" if self.unit else ""
         parts = [f"at least {self.low:g}"] * (self.low > 0.0) + [f"at most {self.high:g}"] * (self.high < np.inf)
-        return ("0, or " if self.low > 0.0 else "") + " and ".join(parts) + unit
+        return ("0, or " if self.high == np.inf else "") + " and ".join(parts) + unit
 
 
 def _arms(key: str) -> tuple[str, ...]:
@@ -178,14 +182,16 @@ def _arms(key: str) -> tuple[str, ...]:
 
 
 RULES = (
-    Rule("gap or depth of a pair, in roundings of the largest position", 1e-3, np.inf, "",
-         "the positions do not tell a smaller one", _arms("arm.position_m"), Rows.gaps),
-    Rule("relative speed of a pair, in roundings of the largest speed", 1e-3, np.inf, "",
-         "the velocities do not tell a smaller one", _arms("arm.velocity_m_per_s"), Rows.closing),
+    Rule("gap or depth of a pair, in roundings of the largest position", PART, np.inf, "",
+         f"the positions do not tell a smaller one; nor is any below {SMALLEST:g} m told", _arms("arm.position_m"),
+         Rows.gaps),
+    Rule("relative speed of a pair without a gap, in roundings of the largest speed", PART, np.inf, "",
+         f"the velocities do not tell a smaller one; nor is any below {SMALLEST:g} m/s told",
+         _arms("arm.velocity_m_per_s"), Rows.closing),
     Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
          "four digits of a velocity are left for what an impact moves the heavier one", _arms("arm.mass_kg"),
          Rows.masses),
-    Rule("rate of a body, sqrt(k/m) or c/m, x duration", 0.0, 1e12, "",
+    Rule("sqrt(k/m) of a body x duration", 0.0, 1e12, "",
          "one rounding of the rate turns the phase at the end by 1e-4", ("time.duration_s",) * 3, Rows.turns),
     Rule("speed that a body reaches by its spring and constant force", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", ("left_arm.mass_kg", "right_arm.mass_kg", "object.mass_kg"),

@@ -31,6 +31,7 @@ class Parameter(NamedTuple):
     live: bool = False  # whether it may be set while the graph runs
     whole: bool = False
     several: bool = False
+    smallest: float = SMALLEST  # of what is not 0
 
     @property
     def unit(self) -> str:
@@ -43,13 +44,13 @@ class Parameter(NamedTuple):
         kind = "a whole number" if self.whole else "a number"
         span = f"{kind} {'>' if self.open_low else '>='} {_short(self.low)} and <= {_short(self.high)}"
         if self.has_smallest:
-            span += f", of a size >= {SMALLEST:g} or 0"
+            span += f", of a size >= {self.smallest:g} or 0"
         return f"a list of at least one entry, each {span}" if self.several else span
 
     @property
     def has_smallest(self) -> bool:
         """Whether numbers in the range may come close to 0."""
-        return not self.whole and self.low < SMALLEST
+        return not self.whole and self.smallest > max(self.low, 0.0)
 
     def accepts(self, value: Any) -> bool:
         """Whether a value from a file is of the right kind and in the range; NaN is in no range."""
@@ -68,6 +69,6 @@ class Parameter(NamedTuple):
             return False
         if self.whole and value != value // 1:  # 7.0 is whole: messages carry nothing else
             return False
-        if self.has_smallest and 0.0 < abs(value) < SMALLEST:
+        if self.has_smallest and 0.0 < abs(value) < self.smallest:
             return False
         return bool((self.low < value if self.open_low else self.low <= value) and value <= self.high)

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_ros.physics.domain import SMALLEST, Rows, outside_rows
+from grasp_ros.physics.domain import Rows, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -151,7 +151,7 @@ class Variants:
             above = column > allowed.low if allowed.open_low else column >= allowed.low
             doubt |= ~(above & (column <= allowed.high))
             if allowed.has_smallest:
-                doubt |= (column != 0.0) & (np.abs(column) < SMALLEST)
+                doubt |= (column != 0.0) & (np.abs(column) < allowed.smallest)
         block = self.block()
         doubt |= (block.closed_loop[:, : OBJECT, STIFFNESS : FORCE] < 0.0).any(axis=(1, 2))
         with np.errstate(all="ignore"):  # a row in doubt may hold any number

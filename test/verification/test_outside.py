@@ -19,7 +19,7 @@ OUTSIDE = {  # what the refusal says: the scenes
     "_contact.hertz_N_per_m1_5: a number >= 1e-06": (
         "chain_friction_5", "surface_1", "surface_2", "surface_loop_set_point_feed_forward_1",
     ),
-    "_arm.position_m: of a size >= 1e-30 or 0": (
+    "_arm.position_m: gap or depth of a pair": (
         "clamped_pair_parts_beside_a_start", "denormal_gap", "energy_of_an_early_touch", "gap_beside_a_contact",
         "gap_of_the_smallest_numbers", "gap_that_halves", "parts_beside_a_start",
         "parts_by_the_second_difference", "pressed_by_a_depth_that_is_none", "push_overtakes_a_slow_touch",

@@ -13,8 +13,8 @@ from grasp_ros.scene.parameter import Parameter
 
 MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass")
 MOTION = (
-    Parameter("position_m", *RANGES["position, set-point"].bounds, "initial position"),
-    Parameter("velocity_m_per_s", *RANGES["velocity"].bounds, "initial velocity"),
+    Parameter("position_m", *RANGES["position, set-point"].bounds, "initial position", smallest=0.0),
+    Parameter("velocity_m_per_s", *RANGES["velocity"].bounds, "initial velocity", smallest=0.0),
 )
 SPRING = Parameter("stiffness_N_per_m", *RANGES["stiffness of an arm"].bounds, "spring of the arm, k", optional=True)
 DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper of the arm, c", optional=True)

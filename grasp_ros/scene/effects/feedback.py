@@ -17,7 +17,8 @@ PARAMETERS = (
     Parameter("velocity_gain_Ns_per_m", *RANGES["velocity gain"].bounds, "gain of the velocity feedback, Kv",
               live=True),
     Parameter("set_point_m", *RANGES["position, set-point"].bounds,
-              "position that the feedback aims at; without it 0, as in the paper", optional=True, live=True),
+              "position that the feedback aims at; without it 0, as in the paper", optional=True, live=True,
+              smallest=0.0),
     Parameter("feed_forward_N", *RANGES["force"].bounds, "constant force added to the feedback", optional=True,
               live=True),
 )
