@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from grasp_ros.physics.domain import SMALLEST
+
 UNITS = {  # endings of keys; the longest that fits counts
     "_kg": "kg", "_m": "m", "_s": "s", "_N": "N", "_Hz": "Hz", "_rad": "rad", "_m_per_s": "m/s", "_m_per_s2": "m/s^2",
     "_N_per_m": "N/m", "_Ns_per_m": "N s/m", "_N_per_m1_5": "N/m^1.5", "_s_per_m": "s/m", "_ticks": "control periods",
@@ -29,6 +31,7 @@ class Parameter(NamedTuple):
     live: bool = False  # whether it may be set while the graph runs
     whole: bool = False
     several: bool = False
+    smallest: float = SMALLEST  # of what is not 0
 
     @property
     def unit(self) -> str:
@@ -40,7 +43,14 @@ class Parameter(NamedTuple):
         """The range in words."""
         kind = "a whole number" if self.whole else "a number"
         span = f"{kind} {'>' if self.open_low else '>='} {_short(self.low)} and <= {_short(self.high)}"
+        if self.has_smallest:
+            span += f", of a size >= {self.smallest:g} or 0"
         return f"a list of at least one entry, each {span}" if self.several else span
+
+    @property
+    def has_smallest(self) -> bool:
+        """Whether numbers in the range may come close to 0."""
+        return not self.whole and self.smallest > max(self.low, 0.0)
 
     def accepts(self, value: Any) -> bool:
         """Whether a value from a file is of the right kind and in the range; NaN is in no range."""
@@ -58,5 +68,7 @@ class Parameter(NamedTuple):
         if not isinstance(value, (int, float)) or isinstance(value, bool):
             return False
         if self.whole and value != value // 1:  # 7.0 is whole: messages carry nothing else
+            return False
+        if self.has_smallest and 0.0 < abs(value) < self.smallest:
             return False
         return bool((self.low < value if self.open_low else self.low <= value) and value <= self.high)

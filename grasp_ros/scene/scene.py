@@ -25,7 +25,7 @@ from grasp_ros.scene.settings import apply
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
-from grasp_ros.scene.validation import SceneError, check_keys, check_together, is_text, read_sections
+from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, is_text, read_sections
 
 TEXTS = ("title", "readings", "watch")
 PAPER = frozenset(  # the sections of the paper's grasp
@@ -285,7 +285,9 @@ def _read(document: Mapping[Any, Any], name: str, source: str) -> Scene:
         raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of such texts")
     values = read_sections(source, {key: numbers for key, numbers in document.items() if key in BY_SECTION})
     check_together(source, values)
-    return Scene(name, title, tuple(readings), watch, values)
+    scene = Scene(name, title, tuple(readings), watch, values)
+    check_domain(source, values, scene.system)
+    return scene
 
 
 def _library() -> Any:

@@ -6,7 +6,9 @@ import unicodedata
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from grasp_ros.physics.domain import outside
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import Effect
 from grasp_ros.scene.parameter import Parameter
@@ -95,3 +97,18 @@ def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None
     for effect in effects:
         for problem in effect.problems(values):
             raise SceneError(f"{source}: {problem.key}: {problem.value!r} is not allowed; allowed: {problem.allowed}")
+
+
+def check_domain(source: str, values: Mapping[str, Mapping[str, Any]], system: System) -> None:
+    """Refuse a scene outside the domain, see `physics.domain`.
+
+    Raises
+    ------
+    SceneError
+        Names the first rule that it breaks.
+    """
+    found = outside(system, values["time"]["duration_s"])
+    if found is not None:
+        section, _, key = found.key.partition(".")
+        raise SceneError(f"{source}: {found.key}: {values[section][key]!r} is not allowed: {found.rule.text} is"
+                         f" {found.measured:.6g}; allowed: {found.rule.allowed}")

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_ros.physics.domain import Rows, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import (
     DAMPING,
@@ -143,14 +144,19 @@ class Variants:
         return found
 
     def _doubtful(self) -> NDArray[np.int64]:
-        """Rows with a number outside its range, or with a negative sum of an arm's own and its feedback's."""
+        """Rows with a number outside its range, with a negative sum of an arm's own and its feedback's, or outside."""
         doubt = np.zeros(self.rows, dtype=bool)
         for name, column in self.changes.items():
             allowed = self._parameters[name]
             above = column > allowed.low if allowed.open_low else column >= allowed.low
             doubt |= ~(above & (column <= allowed.high))
-        loop = self.block().closed_loop
-        return np.flatnonzero(doubt | (loop[:, : OBJECT, STIFFNESS : FORCE] < 0.0).any(axis=(1, 2)))
+            if allowed.has_smallest:
+                doubt |= (column != 0.0) & (np.abs(column) < allowed.smallest)
+        block = self.block()
+        doubt |= (block.closed_loop[:, : OBJECT, STIFFNESS : FORCE] < 0.0).any(axis=(1, 2))
+        with np.errstate(all="ignore"):  # a row in doubt may hold any number
+            doubt |= outside_rows(Rows(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
+        return np.flatnonzero(doubt)
 
     def block(self) -> Block:
         """The rows as arrays; to be called only if `is_plain`."""

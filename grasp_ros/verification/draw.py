@@ -1,4 +1,4 @@
-"""Scenes drawn from the whole space of parameters.
+"""Scenes drawn from the whole domain.
 
 A scene is drawn from numbers in [0, 1), so that a property test and a fuzzing run draw from the same space.
 """
@@ -6,11 +6,13 @@ A scene is drawn from numbers in [0, 1), so that a property test and a fuzzing r
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
+
 from grasp_ros import scene as scenes
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, SceneError
 from grasp_ros.verification.cases.scenes import horizon
 
 NUMBERS = 160  # of a draw
@@ -34,6 +36,15 @@ class Draw:
     def chance(self, part: float) -> bool:
         """True for the part of all draws."""
         return next(self._numbers) < part
+
+
+def inside(make: Callable[[Draw], Scene], rng: np.random.Generator) -> Scene:
+    """The first scene that is not refused: what lies outside the domain is drawn again."""
+    while True:
+        try:
+            return make(Draw(rng.random(NUMBERS).tolist()))
+        except SceneError:
+            continue
 
 
 def draw_ordinary(draw: Draw) -> Scene:

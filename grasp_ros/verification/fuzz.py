@@ -20,7 +20,7 @@ from tqdm import tqdm
 
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
-from grasp_ros.verification.draw import NUMBERS
+from grasp_ros.verification.draw import inside
 from grasp_ros.verification.habits import draw_scene
 from grasp_ros.verification.properties import Check, Examination, examine
 
@@ -115,7 +115,7 @@ class Book:
 
 def draw(seed: int, number: int) -> Scene:
     """The scene of a seed and a number."""
-    return draw_scene(np.random.default_rng((seed, number)).random(NUMBERS).tolist())
+    return inside(draw_scene, np.random.default_rng((seed, number)))
 
 
 class Memory(Protocol):

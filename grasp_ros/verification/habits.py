@@ -6,7 +6,7 @@ The title of a scene names the habits that it was drawn with.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
@@ -82,14 +82,8 @@ HABITS: tuple[tuple[str, float, Callable[[Sketch], None]], ...] = (
 )
 
 
-def draw_scene(numbers: Sequence[float]) -> Scene:
-    """A scene, ordinary or degenerate.
-
-    Parameters
-    ----------
-    numbers : sequence of `draw.NUMBERS` floats in [0, 1)
-    """
-    draw = Draw(numbers)
+def draw_scene(draw: Draw) -> Scene:
+    """A scene, ordinary or degenerate."""
     return draw_ordinary(draw) if draw.chance(ORDINARY) else draw_degenerate(draw)
 
 

@@ -87,8 +87,7 @@ def _tiny_gap(sketch: Sketch) -> None:
     place = 0.0 if draw.chance(0.6) else sketch.size * draw.between(-1.0, 1.0)
     sketch.x = [place] * 3
     for side in (0, 1):
-        low = -300.0 if draw.chance(0.03) else -18.0
-        gap = sketch.size * draw.decades(low, -3.0, zero=0.2)
+        gap = sketch.size * draw.decades(-18.0, -3.0, zero=0.2)
         sketch.x[2 * side] += (2 * side - 1) * (gap if draw.chance(0.8) else -gap)
     sketch.v = [sketch.some_speed() for _ in range(3)]
 

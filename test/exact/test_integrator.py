@@ -180,10 +180,10 @@ def test_uncompiled_source_gives_the_same_numbers() -> None:
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-50])
+@pytest.mark.parametrize("mass", [1.0, 1e-4, 1e-8, 1e-12])
 @pytest.mark.parametrize("body", ["left_arm", "right_arm"])
 def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
-    """Powers of c/m, and its product with the time, leave the range of numbers."""
+    """The product of c/m and the time is large."""
     arm = {"mass_kg": mass, "stiffness_N_per_m": 10.0, "damping_Ns_per_m": 1e3, "position_m": -0.3,
            "velocity_m_per_s": 0.0}
     scene = scenes.compose("creep", {body: arm, "time": {"duration_s": 1.0, "control_period_s": 0.001}})

@@ -41,7 +41,7 @@ REFUSED = [
     ("plant", "-p accuracy:=[1.0,2.0]", "accuracy: [1.0, 2.0] is not allowed; allowed: a number"),
     ("plant", "-p accuracy:=true", "accuracy: True is not allowed; allowed: a number"),
     ("plant", "-p scene:=delay -p loop.delay_ticks:=2.5", "loop.delay_ticks: 2.5 is not allowed; allowed: a whole"),
-    ("plant", "-p object.mass_kg:=abc", "object.mass_kg: 'abc' is not allowed; allowed: a number >= 1e-50"),
+    ("plant", "-p object.mass_kg:=abc", "object.mass_kg: 'abc' is not allowed; allowed: a number >= 1e-12"),
     ("plant", "-p scene:=table -p left_arm_table.time_s:=3.0", "left_arm_table.time_s: 3.0 is not allowed"),
     ("plant", "-p use_sim_time:=3", "use_sim_time"),
     ("plant", "-p nothing", "--ros-args: "),

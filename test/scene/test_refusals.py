@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import copy
 import math
+import re
 
 import numpy as np
 import pytest
 import yaml
 from documents import BASE, document, text_with
 
-from grasp_ros.scene import load, parse
+from grasp_ros.physics.domain import SMALLEST
+from grasp_ros.scene import compose, load, parse
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.validation import SceneError
@@ -32,11 +34,13 @@ def refused(text: str, *words: str, settings: tuple[str, ...] = ()) -> None:
 
 @pytest.mark.parametrize(("section", "parameter"), EVERY, ids=IDS)
 def test_every_parameter_is_refused_outside_its_range(section: str, parameter: Parameter) -> None:
-    words = parameter.allowed.split()
-    assert (float(words[-4]), float(words[-1])) == (parameter.low, parameter.high)
+    low, high = (float(word) for word in re.findall(r"[<>]=? (\S+?)(?:,|$| and)", parameter.allowed)[:2])
+    assert (low, high) == (parameter.low, parameter.high)
     outside = [np.nextafter(parameter.high, math.inf).item(), 10.0 * parameter.high]
     below = parameter.low if parameter.open_low else np.nextafter(parameter.low, -math.inf).item()
     outside += [below, parameter.low - 1.0 - 10.0 * abs(parameter.low)]
+    if parameter.has_smallest:
+        outside += [math.nextafter(SMALLEST, 0.0), 5e-324]
     for value in outside:
         refused(
             document(section, parameter.key, value),
@@ -57,15 +61,17 @@ def test_every_parameter_is_refused_if_it_is_no_number(section: str, parameter: 
 
 @pytest.mark.parametrize(("section", "parameter"), EVERY, ids=IDS)
 def test_every_parameter_has_accepted_values(section: str, parameter: Parameter) -> None:
+    """Both ends of its range, and the smallest number, beside bodies at rest and without springs."""
     if section == "time":
         return
-    for value in (parameter.high, parameter.low if not parameter.open_low else 5e-324):
-        partner = {"position_gain_N_per_m": "stiffness_N_per_m", "velocity_gain_Ns_per_m": "damping_Ns_per_m"}
-        changed = yaml.safe_load(document(section, parameter.key, value))
+    partner = {"position_gain_N_per_m": "stiffness_N_per_m", "velocity_gain_Ns_per_m": "damping_Ns_per_m"}
+    for value in (parameter.low, max(parameter.low, SMALLEST), parameter.high):
+        bodies = {body: {"mass_kg": 1.0, "position_m": x, "velocity_m_per_s": 0.0}
+                  for body, x in (("left_arm", -0.3), ("object", 0.0), ("right_arm", 0.5))}
         if parameter.key in partner:
-            changed[section.replace("feedback", "arm")][partner[parameter.key]] = 1e12
-        scene = parse(yaml.safe_dump(changed), "edge", "edge.yaml")
-        assert scene.values[section][parameter.key] == value
+            bodies[section.replace("feedback", "arm")][partner[parameter.key]] = 1e12
+        numbers = {"time": BASE["time"], **bodies, section: BASE[section] | {parameter.key: value}}
+        assert compose("edge", numbers).values[section][parameter.key] == value
 
 
 @pytest.mark.parametrize(("section", "parameter"), EVERY, ids=IDS)

@@ -94,14 +94,14 @@ def test_round_trip_keeps_every_bit(name: str) -> None:
     assert bits(again) == bits(scene)
 
 
-@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-300, 5e-324, 123456789.123456789, 1 / 3, 2.0**-40, 1e5, 1e16, 1e8 + 1])
+@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-30, 1.2e-29, 123456789.123456789, 1 / 3, 2.0**-40, 1e5, 1e16, 1e8 + 1])
 def test_round_trip_of_awkward_numbers(value: float) -> None:
     scene = parse(document("left_arm", "stiffness_N_per_m", min(value, 1e12)), "odd", "odd.yaml")
     again = parse(scene.to_yaml(), "odd", "odd.yaml")
     assert bits(again) == bits(scene)
 
 
-@pytest.mark.parametrize("negative", ["-0.0", "-1e-300"])
+@pytest.mark.parametrize("negative", ["-0.0", "-1e-30"])
 def test_round_trip_keeps_signs(negative: str) -> None:
     scene = parse(document("object", "velocity_m_per_s", float(negative)), "odd", "odd.yaml")
     assert parse(scene.to_yaml(), "odd", "odd.yaml").values["object"]["velocity_m_per_s"].hex() == float(negative).hex()

@@ -83,7 +83,7 @@ def test_an_arm_that_passes_through_the_object_is_named(side: str, far: str) -> 
     assert scene_of("case_01", without=("left_contact", "right_contact")).warnings == ()
 
 
-@pytest.mark.parametrize("hertz", [1e4, 1.0, 1e-300])
+@pytest.mark.parametrize("hertz", [1e4, 1.0, 1e-6])
 def test_both_arms_on_the_wrong_side_are_named(hertz: float) -> None:
     soft = [f"{side}_contact.hertz_N_per_m1_5={hertz}" for side in ("left", "right")]
     left, right = load("case_01", ["left_arm.position_m=0.5", "right_arm.position_m=-0.3", *soft]).warnings

@@ -34,16 +34,10 @@ def test_what_the_fuzzing_found_is_right_within_few_roundings(name: str) -> None
     assert found.error <= FEW, f"{name}: {found.status}, error in roundings {found.error:.3g}"
 
 
-def test_a_pair_whose_factor_is_rounding_flutters_for_few_steps() -> None:
-    """1 + p u' is below the rounding of p u': Taylor steps clamp and re-enter until an implicit one passes over it."""
-    scene = SCENES["deep_huge_p_stalled"]
-    assert len(simulate(scene, grid=[0.0, scene.duration]).events) < 15  # 4 are true; 1713 by Taylor steps
-
-
-@pytest.mark.parametrize(("name", "steps"), [("chain_1", 27), ("chain_friction_5", 26),
-                                             ("chain_set_point_friction_1", 34), ("chain_friction_4", 32)])
+@pytest.mark.parametrize(("name", "steps"), [("chain_1", 27), ("chain_set_point_friction_1", 34),
+                                             ("chain_friction_4", 32)])
 def test_a_pair_that_grows_over_decades_of_time_takes_steps_of_several_times_its_age(name: str, steps: int) -> None:
-    """Beside a pair that is much harder; 31, 40, 49 and 44 by steps of about its age."""
+    """Beside a pair that is much harder; 31, 49 and 44 by steps of about its age."""
     scene = SCENES[name]
     assert simulate(scene, grid=[0.0, scene.duration]).work[Work.CONTACT_STEPS] <= steps
 

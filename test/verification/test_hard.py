@@ -21,7 +21,7 @@ def test_names_are_unique_and_families_are_many() -> None:
     names = [(case.family.name, case.name) for case in cases()]
     assert len(names) == len(set(names)) >= 60
     assert {family for family, _ in names} == {
-        "impact", "chain", "creep", "squeeze", "touch", "graze", "clamp", "start", "extreme", "rest", "flight", "wait",
+        "impact", "chain", "creep", "touch", "graze", "clamp", "start", "extreme", "rest", "flight", "wait",
         "horizon", "tail", "balance", "loop", "growth", "limit", "relation", "found",
     }
 

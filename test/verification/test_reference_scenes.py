@@ -137,7 +137,7 @@ def test_the_first_derivative_that_differs_decides(push: float, together: bool) 
 
 
 @pytest.mark.parametrize("name", ["through_the_finger", "together", "rest_on_a_slope", "touching_chain",
-                                  "a_finger_rests", "denormal_gap", "pressed_for_a_moment"])
+                                  "a_finger_rests", "tiny_gap_pulse_1", "pressed_for_a_moment"])
 def test_more_digits_change_nothing(name: str) -> None:
     scene = FOUND[name]
     times = [scene.duration / 3, scene.duration]

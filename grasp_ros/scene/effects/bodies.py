@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import DAMPING, MASS, OBJECT, STIFFNESS
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import SIDES, Effect, Problem, Sections
 from grasp_ros.scene.parameter import Parameter
 
-MASS_KG = Parameter("mass_kg", 1e-50, 1e9, "mass")  # squares of k/m and c/m stay in the range of numbers
+MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass")
 MOTION = (
-    Parameter("position_m", -1e9, 1e9, "initial position"),
-    Parameter("velocity_m_per_s", -1e9, 1e9, "initial velocity"),
+    Parameter("position_m", *RANGES["position, set-point"].bounds, "initial position", smallest=0.0),
+    Parameter("velocity_m_per_s", *RANGES["velocity"].bounds, "initial velocity", smallest=0.0),
 )
-SPRING = Parameter("stiffness_N_per_m", 0.0, 1e12, "spring of the arm, k", optional=True)
-DAMPER = Parameter("damping_Ns_per_m", 0.0, 1e12, "damper of the arm, c", optional=True)
+SPRING = Parameter("stiffness_N_per_m", *RANGES["stiffness of an arm"].bounds, "spring of the arm, k", optional=True)
+DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper of the arm, c", optional=True)
 
 
 def _build(section: str, body: int, sections: Sections, system: System) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
 from grasp_ros.physics.model import Array, impact_force_of, penetration
 from grasp_ros.physics.system import COLUMN, System
@@ -14,8 +15,9 @@ from grasp_ros.scene.topics import CONTACTS
 
 ROUNDING = 1e-9  # of the largest position, or of 1 m: what is less deep is meant to touch
 PARAMETERS = (
-    Parameter("hertz_N_per_m1_5", 0.0, 1e15, "Hertzian stiffness of the impact, H", open_low=True),
-    Parameter("dissipation_s_per_m", 0.0, 1e12, "Hunt-Crossley dissipation of the impact, p", optional=True),
+    Parameter("hertz_N_per_m1_5", *RANGES["Hertzian stiffness H"].bounds, "Hertzian stiffness of the impact, H"),
+    Parameter("dissipation_s_per_m", *RANGES["dissipation p"].bounds, "Hunt-Crossley dissipation of the impact, p",
+              optional=True),
 )
 
 

@@ -6,17 +6,21 @@ from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import COMMANDS
 
 PARAMETERS = (
-    Parameter("position_gain_N_per_m", -1e12, 1e12, "gain of the position feedback, Kp", live=True),
-    Parameter("velocity_gain_Ns_per_m", -1e12, 1e12, "gain of the velocity feedback, Kv", live=True),
-    Parameter("set_point_m", -1e9, 1e9, "position that the feedback aims at; without it 0, as in the paper",
-              optional=True, live=True),
-    Parameter("feed_forward_N", -1e12, 1e12, "constant force added to the feedback", optional=True, live=True),
+    Parameter("position_gain_N_per_m", *RANGES["position gain"].bounds, "gain of the position feedback, Kp", live=True),
+    Parameter("velocity_gain_Ns_per_m", *RANGES["velocity gain"].bounds, "gain of the velocity feedback, Kv",
+              live=True),
+    Parameter("set_point_m", *RANGES["position, set-point"].bounds,
+              "position that the feedback aims at; without it 0, as in the paper", optional=True, live=True,
+              smallest=0.0),
+    Parameter("feed_forward_N", *RANGES["force"].bounds, "constant force added to the feedback", optional=True,
+              live=True),
 )
 
 

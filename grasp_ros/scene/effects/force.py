@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from itertools import pairwise
 
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
@@ -19,20 +20,21 @@ from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
 SECTIONS = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}
-FORCE = Parameter("force_N", -1e12, 1e12, "force, positive to the right")
+FORCE = Parameter("force_N", *RANGES["force"].bounds, "force, positive to the right")
 PULSE = (
     FORCE,
-    Parameter("start_s", 0.0, 1e9, "begin of the pulse"),
-    Parameter("length_s", 0.0, 1e9, "length of the pulse", open_low=True),
+    Parameter("start_s", *RANGES["duration"].bounds, "begin of the pulse"),
+    Parameter("length_s", *RANGES["duration"].bounds, "length of the pulse", open_low=True),
 )
 SINE = (
-    Parameter("amplitude_N", 0.0, 1e12, "amplitude"),
+    Parameter("amplitude_N", 0.0, RANGES["force"].high, "amplitude"),
     Parameter("frequency_Hz", 0.0, 1e6, "frequency", open_low=True),
     Parameter("phase_rad", -1e3, 1e3, "phase at t = 0", optional=True),
 )
 TABLE = (
-    Parameter("time_s", 0.0, 1e9, "times from which the forces act, ascending", several=True),
-    Parameter("force_N", -1e12, 1e12, "forces, each until the next time, the last one for good", several=True),
+    Parameter("time_s", *RANGES["duration"].bounds, "times from which the forces act, ascending", several=True),
+    Parameter("force_N", *RANGES["force"].bounds, "forces, each until the next time, the last one for good",
+              several=True),
 )
 
 NO_EFFECT = "has no effect"

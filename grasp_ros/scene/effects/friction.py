@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import DAMPING, OBJECT
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import Effect, Oddity, Sections
@@ -27,8 +28,9 @@ EFFECTS = (
     Effect(
         "object_friction", "friction of the object on its line, viscous and dry",
         (
-            Parameter("viscous_Ns_per_m", 0.0, 1e12, "drag of the object", optional=True),
-            Parameter("coulomb_N", 0.0, 1e12, "dry friction, sliding and sticking alike", optional=True),
+            Parameter("viscous_Ns_per_m", *RANGES["damping, drag"].bounds, "drag of the object", optional=True),
+            Parameter("coulomb_N", 0.0, RANGES["force"].high, "dry friction, sliding and sticking alike",
+                      optional=True),
         ),
         _build, "takes 2 c x_o'^2 + 2 F |x_o'|", needs=("object",), oddities=_odd,
         example={"viscous_Ns_per_m": 0.2, "coulomb_N": 0.2},

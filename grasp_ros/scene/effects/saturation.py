@@ -6,11 +6,14 @@ from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.control import Column
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
 
-PARAMETERS = (Parameter("limit_N", 0.0, 1e12, "largest force of the actuator in both directions", live=True),)
+PARAMETERS = (
+    Parameter("limit_N", 0.0, RANGES["force"].high, "largest force of the actuator in both directions", live=True),
+)
 
 
 def _build(side: str, sections: Sections, system: System) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import FORCE, MASS
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import Effect, Oddity, Sections
@@ -30,7 +31,7 @@ EFFECTS = (
         "tilt", "the line is tilted: gravity pulls every body along it",
         (
             Parameter("angle_rad", -math.pi / 2, math.pi / 2, "angle of the line, positive if the right end is higher"),
-            Parameter("gravity_m_per_s2", 0.0, 1e3, "gravitational acceleration"),
+            Parameter("gravity_m_per_s2", *RANGES["gravity"].bounds, "gravitational acceleration"),
         ),
         _build, "2 m g sin(angle) x of every body: V_c is known up to a constant", oddities=_odd,
         example={"angle_rad": 0.02, "gravity_m_per_s2": 9.81},

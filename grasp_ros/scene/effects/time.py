@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Problem, Sections, period_ns
 from grasp_ros.scene.parameter import Parameter
@@ -29,9 +30,9 @@ EFFECTS = (
     Effect(
         "time", "length of the run and control period",
         (
-            Parameter("duration_s", 0.0, 1e9, "length of the run", open_low=True),
-            Parameter("control_period_s", 0.0, 1e3, "how long a command is held if the feedback is sampled",
-                      open_low=True),
+            Parameter("duration_s", *RANGES["duration"].bounds, "length of the run", open_low=True),
+            Parameter("control_period_s", *RANGES["control period"].bounds,
+                      "how long a command is held if the feedback is sampled", open_low=True),
         ),
         _build, "none", problems=_problems,
     ),

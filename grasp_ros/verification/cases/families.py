@@ -31,11 +31,6 @@ CREEP = Family(
     "creep", "The pair opens along u' = -1/p, so closely that rounding cannot tell it from the surface itself.",
     "O2: duration and exit speed, relative; promised are 4 roundings of the speeds, whose difference is 1/p",
 )
-SQUEEZE = Family(
-    "squeeze", "Two fingers press on an object, and p is so large that u' relaxes a million times faster than the depth"
-    " creeps: an explicit method has to follow the relaxation.",
-    "quadrature of H u^1.5 (1 + p u') = f: depth, relative; inertia is below rounding",
-)
 TOUCH = Family(
     "touch", "Both sides touch at once, or nearly so, or one side touches while the other is in contact: a solver"
     " without a rule for it loses a touch or counts it twice.", REFERENCE,
@@ -94,6 +89,6 @@ FOUND = Family(
     "all properties of `grasp study fuzz`",
 )
 ORDER = (
-    IMPACT, CHAIN, CREEP, SQUEEZE, TOUCH, GRAZE, CLAMP, START, EXTREME, REST, FLIGHT, WAIT, HORIZON, TAIL, BALANCE,
+    IMPACT, CHAIN, CREEP, TOUCH, GRAZE, CLAMP, START, EXTREME, REST, FLIGHT, WAIT, HORIZON, TAIL, BALANCE,
     LOOP, GROWTH, LIMIT, RELATION, FOUND,
 )

@@ -66,8 +66,8 @@ def _budget(product: Product) -> float:
 
 def _creeps(product: Product) -> float:
     """A light arm that begins deep in a stiff contact and creeps out of it: more than ten units of work."""
-    product.run(grasp([0.04, 0.6, 0.0, 0.0, AWAY, 0.0], 1.0, left=Arm(1e-4, 0.0, 0.0, 0.0, 0.0), right=FREE,
-                      contact=Contact(1e8, 100.0), mass=1e-3))
+    product.run(grasp([0.01, 0.6, 0.0, 0.0, AWAY, 0.0], 1.0, left=Arm(1e-4, 0.0, 0.0, 0.0, 0.0), right=FREE,
+                      contact=Contact(1e6, 10.0), mass=1e-3))
     return np.inf
 
 

@@ -8,12 +8,11 @@ from itertools import product
 
 import numpy as np
 
-from grasp_ros import scene as scenes
 from grasp_ros.exact.events import Event
 from grasp_ros.physics.layout import EPS, LEFT, Transition
-from grasp_ros.physics.model import Array, Contact
+from grasp_ros.physics.model import Contact
 from grasp_ros.verification.cases.case import Case, Solver, recorded
-from grasp_ros.verification.cases.families import CHAIN, CREEP, EXTREME, IMPACT, SQUEEZE
+from grasp_ros.verification.cases.families import CHAIN, CREEP, EXTREME, IMPACT
 from grasp_ros.verification.cases.scenes import AWAY, FREE, distance, grasp, reference
 from grasp_ros.verification.oracles import chain_speeds, impact_numbers
 
@@ -82,27 +81,6 @@ def _creeps(p: float, speed: float, hertzian: float, solver: Solver) -> float:
     return _release_error(solver.events(scene), duration, restitution * speed)
 
 
-def _squeezed(p: float, solver: Solver) -> float:
-    """Error of the depth to which two equal fingers have crept after p 1e-6 s, relative.
-
-    dt = p H u^1.5 du / (f - H u^1.5): the time that belongs to the depth found, by Gauss's quadrature, tells its error.
-    """
-    begin, force, hertzian, seconds = 1e-6, 5.0, 1e8, 1e-6 * p
-
-    def rate(u: Array) -> Array:
-        return (force / (hertzian * u * np.sqrt(u)) - 1.0) / p
-
-    v = float(rate(np.array(begin)))
-    scene = grasp([begin, v, 0.0, 0.0, -begin, -v], seconds, left=FREE, contact=Contact(hertzian, p), mass=0.5)
-    push = {f"{side}_feedback": {**scene.values[f"{side}_feedback"], "feed_forward_N": sign * force}
-            for side, sign in (("left", 1.0), ("right", -1.0))}
-    u = solver.states(scenes.compose("squeezed", {**scene.values, **push}), [0.0, scene.duration])[-1, 0]
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    half = 0.5 * (u - begin)
-    time = half * float(np.dot(weights, 1.0 / rate(begin + half * (nodes + 1.0))))
-    return float(abs(time - scene.duration) * rate(u) / u)
-
-
 def cases() -> Iterator[Case]:
     """All impacts."""
     for hertzian, speed in product((1.0, 1e4, 1e8, 1e12), (1e-6, 1.0, 1e3)):
@@ -118,8 +96,6 @@ def cases() -> Iterator[Case]:
         yield Case(CHAIN, f"1:{mass:g}:1 without gaps, H = 1e8",
                    partial(chain, mass, 0.0, 1.0, Contact(1e8, 0.0), 10.0, speeds, None), 1e-12)
     yield Case(EXTREME, "an impact at 1 m/s, then one at 1e-9 m/s", _short, 1e-10)
-    for p, speed, hertzian in ((1e4, 1.0, 1e4), (1e6, 1.0, 1e4), (1e9, 1e3, 1e12), (1e12, 1e-6, 1.0)):
+    for p, speed, hertzian in ((1e4, 1.0, 1e4), (1e6, 1.0, 1e4), (1e3, 1e3, 1e12), (1e12, 1e-6, 1.0)):
         yield Case(CREEP, f"p = {p:g} s/m, v = {speed:g} m/s", partial(_creeps, p, speed, hertzian),
                    4.0 * EPS * p * speed, max_work=5000)
-    for p in (1e10, 1e11, 1e12):
-        yield Case(SQUEEZE, f"p = {p:g} s/m for {1e-6 * p:g} s", partial(_squeezed, p), 1e-12, max_work=5000)

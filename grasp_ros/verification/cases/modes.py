@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from grasp_ros.verification.cases.case import Case, Solver, recorded
@@ -38,8 +38,8 @@ STARTS: dict[str, tuple[float, ...]] = {
     "u = 0 on both sides": (0.0, 0.4, 0.0, 0.0, 0.0, -0.7),
     "u = 0, u' = 0, pressed on both sides": (-0.1, 0.0, -0.1, 0.0, -0.1, 0.0),
     "u = 0 on both sides, the left one at rest": (0.0, 0.0, 0.0, 0.0, 0.0, -0.3),
-    "a denormal gap": (-5e-324, 0.4, 0.0, 0.0, 0.5, 0.0),
-    "a denormal penetration": (5e-324, 0.4, 0.0, 0.0, 0.5, 0.0),
+    "a gap of one rounding": (-EPS / 2, 0.4, 0.0, 0.0, 0.5, 0.0),
+    "a penetration of one rounding": (EPS / 2, 0.4, 0.0, 0.0, 0.5, 0.0),
     "1e4 m/s": (-1.0, 1e4, 0.0, 0.0, 0.5, 0.0),
 }
 CLAMPS = {  # first clamp and first re-entry of the right pair: time in s, depth in m; by the reference with 30 digits

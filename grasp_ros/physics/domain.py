@@ -1,0 +1,236 @@
+"""The domain: which scenes are simulated. What lies outside is refused, with the key, its value and what is allowed.
+
+`RANGES` are bounds of single numbers, in SI; `grasp_ros.scene.effects` takes the ranges of its keys from them. `RULES`
+are ratios of several numbers, measured on systems as arrays; a row is a scene, so that an ensemble is checked at once.
+A shorter run of a scene inside is inside as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, HERTZIAN, MASS, OBJECT, STIFFNESS
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import System
+
+LARGEST_POSITION = 1e12  # m, that a run may reach
+LARGEST_SPEED = 1e12  # m/s
+SMALLEST = 1e-36  # in SI, of a number that is not 0; a position or a velocity may decay to any
+SIGNS = np.array([1.0, -1.0])  # of what points to the object, by side
+PART = 1e-3  # of a rounding, that a gap is at least
+
+
+class Range(NamedTuple):
+    """Bounds of one kind of number."""
+
+    low: float
+    high: float
+    unit: str
+    why: str
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The smallest and the largest number allowed."""
+        return self.low, self.high
+
+
+RANGES = {
+    "mass": Range(1e-12, 1e9, "kg", "from a grain of dust to a wall that does not move"),
+    "position, set-point": Range(-1e9, 1e9, "m", "a thousandth of what a run may reach"),
+    "velocity": Range(-1e9, 1e9, "m/s", "a thousandth of what a run may reach"),
+    "stiffness of an arm": Range(0.0, 1e12, "N/m", "1 nm under 1 kN"),
+    "damping, drag": Range(0.0, 1e12, "N s/m", "1 nm/s under 1 kN"),
+    "position gain": Range(-1e12, 1e12, "N/m", "as the springs"),
+    "velocity gain": Range(-1e12, 1e12, "N s/m", "as the dampers"),
+    "force": Range(-1e12, 1e12, "N", "what the stiffest spring exerts over 1 m"),
+    "gravity": Range(0.0, 1e3, "m/s^2", "some hundred times that of the earth"),
+    "Hertzian stiffness H": Range(1e-6, 1e15, "N/m^1.5", "harder than a sphere of diamond as large as a house"),
+    "dissipation p": Range(0.0, 1e12, "s/m", "how much is too much depends on the impulse, see below"),
+    "duration": Range(0.0, 1e9, "s", "some 30 years"),
+    "control period": Range(0.0, 1e3, "s", "a command that is held for longer controls nothing"),
+}
+
+
+class Rows:
+    """Systems of n scenes over one duration, and what the rules make of them.
+
+    Parameters
+    ----------
+    bodies : array (n, 3, 4)
+        With the continuous feedback in them, see `System.closed_loop`; mass 0: no such body.
+    pairs : array (n, 2, 2)
+        See `System`.
+    state : array (n, 6), m and m/s
+    duration : float, s
+    """
+
+    def __init__(self, bodies: Array, pairs: Array, state: Array, duration: float) -> None:
+        self._bodies, self._pairs, self._duration = bodies, pairs, duration
+        self.there = bodies[..., MASS] > 0.0
+        self.mass = np.where(self.there, bodies[..., MASS], 1.0)
+        by_body = [0, 2, 1]  # of the columns of a state
+        self.x, self.v = state[:, 0::2][:, by_body], state[:, 1::2][:, by_body]
+        self.touching = (pairs[..., HERTZIAN] > 0.0) & self.there[:, :OBJECT] & self.there[:, OBJECT:]
+
+    @cached_property
+    def swing(self) -> Array:
+        """sqrt(k/m) of each body, (n, 3) in 1/s."""
+        return np.sqrt(self._bodies[..., STIFFNESS] / self.mass)
+
+    @cached_property
+    def speed(self) -> Array:
+        """What each body reaches by its own spring and constant force, (n, 3) in m/s."""
+        force = self._bodies[..., FORCE] - self._bodies[..., STIFFNESS] * self.x
+        rate = np.maximum(self.swing, self._bodies[..., DAMPING] / self.mass)
+        return np.abs(self.v) + np.abs(force) / self.mass / np.maximum(rate, 1.0 / self._duration)
+
+    @cached_property
+    def reduced(self) -> Array:
+        """Reduced masses of the pairs, (n, 2) in kg."""
+        arm, body = self.mass[:, :OBJECT], self.mass[:, OBJECT:]
+        return arm / (1.0 + arm / body)
+
+    @cached_property
+    def gap(self) -> Array:
+        """Positive where a pair is apart, (n, 2) in m."""
+        return np.asarray((self.x[:, OBJECT:] - self.x[:, :OBJECT]) * SIGNS)
+
+    @cached_property
+    def elastic(self) -> Array:
+        """Elastic force of the pairs at the start, (n, 2) in N."""
+        return self._pairs[..., HERTZIAN] * np.maximum(-self.gap, 0.0) ** 1.5 * self.touching
+
+    @cached_property
+    def pressed(self) -> Array:
+        """Constant force through the pairs if all that is in contact were one rigid body there, (n, 2) in N."""
+        push = self._bodies[..., FORCE] - self._bodies[..., STIFFNESS] * self.x[:, OBJECT:]
+        push, mass = push.copy(), self.mass.copy()
+        push[:, :OBJECT] *= self.touching
+        mass[:, :OBJECT] *= self.touching
+        common = push.sum(axis=1) / mass.sum(axis=1)  # acceleration
+        inward: Array = (push - mass * common[:, None])[:, :OBJECT] * SIGNS
+        return np.maximum(inward, 0.0) * self.touching
+
+    def gaps(self) -> Array:
+        """Gap or penetration by a rounding of the largest position, (n, 2)."""
+        return np.abs(self.gap) / _rounding(self.x) * self.touching
+
+    def closing(self) -> Array:
+        """Relative speed where there is no gap, by a rounding of the largest speed, (n, 2)."""
+        closed = self.touching & (self.gap == 0.0)
+        return np.asarray(np.abs(self.v[:, :OBJECT] - self.v[:, OBJECT:]) / _rounding(self.v) * closed)
+
+    def masses(self) -> Array:
+        """Mass of an arm by that of the object that it hits, (n, 2)."""
+        return self.mass[:, :OBJECT] / self.mass[:, OBJECT:] * self.touching
+
+    def turns(self) -> Array:
+        """sqrt(k/m) times the duration, (n, 3)."""
+        return self.swing * self._duration * self.there
+
+    def speeds(self) -> Array:
+        """What each body reaches by itself, (n, 3) in m/s."""
+        return self.speed * self.there
+
+    def thrown(self) -> Array:
+        """Speed at which a pair that starts pressed in is pushed apart, (n, 2) in m/s."""
+        return np.sqrt(0.8 * self.elastic * np.maximum(-self.gap, 0.0) / self.reduced)
+
+    def impulses(self) -> Array:
+        """Largest p J / mu, (n, 2): J from the approach, a start pressed in, and constant forces over the duration.
+
+        A pair under the force F relaxes with the rate p F / mu, so that this counts relaxation times: p v of an impact
+        at v that loses all of it, p F t / mu where F presses for a time t.
+        """
+        loss = self._pairs[..., DISSIPATION]
+        outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, it parts with 1/p
+        force = self.elastic * outward + self.pressed * self._duration
+        return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
+
+
+def _rounding(numbers: Array) -> Array:
+    """Of the largest of three numbers (n, 3), and so large that PART of it is SMALLEST at least: (n, 1)."""
+    return np.asarray(np.maximum(EPS * np.abs(numbers).max(axis=1, keepdims=True), SMALLEST / PART))
+
+
+class Rule(NamedTuple):
+    """A bound of a ratio: from `low` to `high`; 0 stands for what is not there, and for no gap and no speed."""
+
+    text: str
+    low: float
+    high: float
+    unit: str
+    why: str
+    keys: tuple[str, ...]  # of the scene, one for each column of the measure
+    measure: Callable[[Rows], Array]
+
+    @property
+    def allowed(self) -> str:
+        """The bound in words."""
+        unit = f" {self.unit}" if self.unit else ""
+        parts = [f"at least {self.low:g}"] * (self.low > 0.0) + [f"at most {self.high:g}"] * (self.high < np.inf)
+        return ("0, or " if self.high == np.inf else "") + " and ".join(parts) + unit
+
+
+def _arms(key: str) -> tuple[str, ...]:
+    return f"left_{key}", f"right_{key}"
+
+
+RULES = (
+    Rule("gap or depth of a pair, in roundings of the largest position", PART, np.inf, "",
+         f"the positions do not tell a smaller one; nor is any below {SMALLEST:g} m told", _arms("arm.position_m"),
+         Rows.gaps),
+    Rule("relative speed of a pair without a gap, in roundings of the largest speed", PART, np.inf, "",
+         f"the velocities do not tell a smaller one; nor is any below {SMALLEST:g} m/s told",
+         _arms("arm.velocity_m_per_s"), Rows.closing),
+    Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
+         "four digits of a velocity are left for what an impact moves the heavier one", _arms("arm.mass_kg"),
+         Rows.masses),
+    Rule("sqrt(k/m) of a body x duration", 0.0, 1e12, "",
+         "one rounding of the rate turns the phase at the end by 1e-4", ("time.duration_s",) * 3, Rows.turns),
+    Rule("speed that a body reaches by its spring and constant force", 0.0, 1e10, "m/s",
+         "a hundredth of what a run may reach", ("left_arm.mass_kg", "right_arm.mass_kg", "object.mass_kg"),
+         Rows.speeds),
+    Rule("speed at which a pair that starts pressed in parts", 0.0, 1e10, "m/s",
+         "a hundredth of what a run may reach", _arms("arm.position_m"), Rows.thrown),
+    Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e9, "",
+         "it takes a fifteenth of that in Taylor steps, and a run may take 1e8", _arms("contact.dissipation_s_per_m"),
+         Rows.impulses),
+)
+
+
+class Outside(NamedTuple):
+    """A number that puts a scene outside."""
+
+    rule: Rule
+    key: str
+    measured: float
+
+
+def outside(system: System, duration: float) -> Outside | None:
+    """The first rule that a system breaks over a duration in s, or None."""
+    rows = Rows(system.closed_loop[None], system.pairs[None], system.state[None], duration)
+    for rule in RULES:
+        measured = rule.measure(rows)
+        wrong = _breaks(rule, measured)[0]
+        if wrong.any():
+            column = int(wrong.argmax())
+            return Outside(rule, rule.keys[column], float(measured[0, column]))
+    return None
+
+
+def outside_rows(rows: Rows) -> NDArray[np.bool_]:
+    """Which of n systems break a rule, (n,)."""
+    broken = np.zeros(len(rows.x), dtype=bool)
+    for rule in RULES:
+        broken |= _breaks(rule, rule.measure(rows)).any(axis=1)
+    return broken
+
+
+def _breaks(rule: Rule, measured: Array) -> NDArray[np.bool_]:
+    return np.asarray(~((measured == 0.0) | ((measured >= rule.low) & (measured <= rule.high))))
