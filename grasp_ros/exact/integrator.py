@@ -82,19 +82,20 @@ class Integrator:
         max_work: int = MAX_WORK,
     ) -> None:
         check_accuracy(accuracy)
-        state = system.state
+        state = np.asarray(system.state, dtype=float)
         if state.shape != (6,) or not np.isfinite(state).all():
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.work = np.zeros(len(Work), dtype=np.int64)
-        self._system, self._continuous, self._accuracy = system, continuous, accuracy
-        self._max_events, self._max_work = max_events, max_work
+        # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
+        self._system, self._continuous, self._accuracy = system, continuous, float(accuracy)
+        self._max_events, self._max_work = int(max_events), int(max_work)
         self._clock, self._carry = np.zeros(3), np.zeros(8)
-        self._given = system.closed_loop if continuous else system.bodies.copy()
+        self._given = np.array(system.closed_loop if continuous else system.bodies, dtype=float, order="C")
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
         self._bodies = self._given.copy()
-        self._plant = self._given, self._bodies, system.pairs.copy(), float(system.coulomb)
+        self._plant = self._given, self._bodies, np.array(system.pairs, dtype=float, order="C"), float(system.coulomb)
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._events: list[Array] = []
@@ -106,7 +107,7 @@ class Integrator:
         plant = Plant(*self._plant)
         self._watcher = Watcher(plant, State(self._y, self._mode, self._carry, self._clock), wanted)
         self._watcher.set_system(self._system, self._continuous)
-        self._watcher.begin(bound)
+        self._watcher.begin(float(bound))
         return self._watcher
 
     @property
@@ -172,7 +173,7 @@ class Integrator:
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else np.array(grid, dtype=float)
-        loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
+        loop = Loop(np.array([float(duration)]), np.array([float(start)]), np.array([0, len(times)]), new_place())
         return self.run(loop, times)
 
     def run(self, loop: Loop, grid: Array, rows: Array | None = None) -> Array:

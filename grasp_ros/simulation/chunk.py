@@ -152,8 +152,8 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
         loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
         np.full(n, LEFT_OUT),
     )
-    integrate_rows(rows, variants.scene.duration, setup.accuracy, wanted, setup.settled, stop, setup.max_events,
-                   setup.max_work)
+    integrate_rows(rows, variants.scene.duration, float(setup.accuracy), wanted, float(setup.settled), stop,
+                   int(setup.max_events), int(setup.max_work))
     done = rows.outcome == Ended.DONE
     runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
     runs.touches[which[done]] = rows.touches[done]
