@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from enum import Enum
 
 import numpy as np
@@ -71,6 +72,12 @@ class Integrator:
         Budget of flights, Taylor steps and evaluations of event functions together, an implicit step as IMPLICIT of
         them; the integration stops with `Status.WORK_BUDGET` when it is used up.
 
+    Attributes
+    ----------
+    status : Status
+    progress : callable or None
+        Called with the time reached, in s, now and then in a call that takes longer than about a second.
+
     Raises
     ------
     Refused
@@ -86,6 +93,7 @@ class Integrator:
         if state.shape != (6,) or not np.isfinite(state).all():
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
+        self.progress: Callable[[float], object] | None = None
         self.work = np.zeros(len(Work), dtype=np.int64)
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self._system, self._continuous, self._accuracy = system, continuous, float(accuracy)
@@ -121,6 +129,12 @@ class Integrator:
         return self._y[[U_L, U_R]]
 
     @property
+    def time(self) -> float:
+        """Time reached on the clock of the recorded events, s."""
+        time, rest, begin = self._clock.tolist()
+        return float(begin + (time + rest))
+
+    @property
     def _spent(self) -> int:
         flights, steps, _, iterations = self.work.tolist()  # enums cost a sampled tick more than the list
         return int(flights + steps + iterations) + self._implicit
@@ -132,8 +146,7 @@ class Integrator:
             return ""
         with np.errstate(over="ignore", invalid="ignore"):  # of states that are not finite any more
             mode = int(energy(self._system, self.state).mode)
-        time, rest, begin = self._clock.tolist()
-        return f"{self.status.value}: t = {begin + (time + rest)!r} s, mode {mode}, state {self.state.tolist()}"
+        return f"{self.status.value}: t = {self.time!r} s, mode {mode}, state {self.state.tolist()}"
 
     @property
     def event_table(self) -> Array:
@@ -216,6 +229,8 @@ class Integrator:
                     filled[_EVENTS] = 0
                 if outcome == Outcome.NO_COMMAND or self._ends(outcome):
                     break
+                if self.progress is not None:
+                    self.progress(self.time)
         return out[: filled[_OUTPUTS]]
 
     def _ends(self, outcome: int) -> bool:
