@@ -19,6 +19,8 @@ from grasp_ros.exact.numba_internals import Kernel, KernelCache
 # makes a contact several times faster. It never reorders a floating-point sum.
 numba.config.SLP_VECTORIZE = 1
 
+COMPILED = not numba.config.DISABLE_JIT
+_UNCOMPILED: dict[int, Any] = {}
 DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
@@ -77,10 +79,21 @@ def compiling(function: Callable[[], None]) -> Callable[[], None]:
 
 
 def compiled_address(function: Any, signature: str) -> int:
-    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been."""
+    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been.
+
+    Where nothing is compiled it is a number that `function_at` knows.
+    """
+    if not COMPILED:
+        _UNCOMPILED[id(function)] = function
+        return id(function)
     function.compile(signature)
     (result,) = function.overloads.values()
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+
+
+def function_at(address: int) -> Any:
+    """The function of an address, where nothing is compiled."""
+    return _UNCOMPILED[address]
 
 
 def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False, inline: bool = False) -> Any:
@@ -92,10 +105,10 @@ def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False,
             error_model="numpy", nogil=True, _nrt=counts, forceinline=inline,
             no_cpython_wrapper=not door, no_cfunc_wrapper=not door,
         )(function)
-        if not numba.config.DISABLE_JIT and not inline:
+        if COMPILED and not inline:
             found._cache = KernelCache(function)
     finally:
         numba.config.CACHE_DIR = before
-    if not numba.config.DISABLE_JIT and not door:
+    if COMPILED and not door:
         found.__class__, found.door = Kernel, partial(_door, function)
     return found

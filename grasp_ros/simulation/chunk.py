@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
+from grasp_ros.exact.jit import COMPILED
 from grasp_ros.exact.rows import Rows, integrate_rows
 from grasp_ros.exact.sight import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY
@@ -133,10 +134,10 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
 
 
 def _is_plain(variants: Variants, setup: Setup, columns: Sequence[Outcome]) -> bool:
-    """Whether rows can be integrated without the interpreter: continuous feedback, no other inputs, arrays for all."""
+    """Whether rows can be integrated without the interpreter: compiled, continuous feedback alone, arrays for all."""
     scene = variants.scene
     inputs = setup.sampled or scene.sampled or scene.system.external
-    return variants.is_plain and not inputs and all(column.name != LYAPUNOV for column in columns)
+    return COMPILED and variants.is_plain and not inputs and all(column.name != LYAPUNOV for column in columns)
 
 
 def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, which: NDArray[np.int64],

@@ -209,6 +209,31 @@ def test_uncompiled_source_gives_the_same_numbers() -> None:
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
 
 
+EVERYTHING = """
+import numpy as np
+from grasp_ros import scene as scenes
+from grasp_ros.simulation import ensemble, simulate
+from grasp_ros.simulation.losses import losses
+scene = scenes.load("case_01", ["time.duration_s=0.02", "left_arm.position_m=-0.01", "left_arm.velocity_m_per_s=2"])
+own = {"controllers": {"left": lambda tick, time, x, v: -x}}
+for settings in ({}, {"sampled": True}, own, {"method": "paper"}, {"method": "discrete_gradient"}):
+    run = simulate(scene, grid=np.linspace(0.0, 0.02, 5), **settings)
+    print(*run.state.ravel().tolist(), *map(float, losses(run)))
+print(*np.concatenate([*ensemble(scene, {}, ("energy", "settling_time", "touches")).columns.values()]).tolist())
+"""
+
+
+def test_everything_runs_uncompiled() -> None:
+    outputs = []
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        finished = subprocess.run([sys.executable, "-W", "ignore", "-c", EVERYTHING], env=environment,
+                                  capture_output=True, text=True, timeout=120, check=True)
+        outputs.append([float(word) for word in finished.stdout.split()])
+    assert len(outputs[0]) > 150
+    assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
+
+
 @pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-50])
 @pytest.mark.parametrize("body", ["left_arm", "right_arm"])
 def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
