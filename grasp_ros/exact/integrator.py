@@ -72,12 +72,6 @@ class Integrator:
         Budget of flights, Taylor steps and evaluations of event functions together, an implicit step as IMPLICIT of
         them; the integration stops with `Status.WORK_BUDGET` when it is used up.
 
-    Attributes
-    ----------
-    status : Status
-    progress : callable or None
-        Called with the time reached, in s, now and then in a call that takes longer than about a second.
-
     Raises
     ------
     Refused
@@ -93,7 +87,7 @@ class Integrator:
         if state.shape != (6,) or not np.isfinite(state).all():
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
-        self.progress: Callable[[float], object] | None = None
+        self.progress: Callable[[float], object] | None = None  # told the time in s every BREATH units of work
         self.work = np.zeros(len(Work), dtype=np.int64)
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self._system, self._continuous, self._accuracy = system, continuous, float(accuracy)

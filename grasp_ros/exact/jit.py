@@ -25,7 +25,7 @@ DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """A function that kernels call, compiled to machine code at its first call and kept on disk.
+    """A function that kernels call, compiled as a part of each door that needs it.
 
     It may not make arrays: without them nothing counts references, which makes a kernel a quarter faster.
     """
@@ -33,7 +33,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A kernel that becomes part of its callers, and of what they keep on disk.
+    """A kernel that becomes part of its callers.
 
     Handing over many arrays can cost as much as a short function.
     """
@@ -41,7 +41,11 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def door(function: Callable[..., Any]) -> Any:
-    """A kernel that Python calls, or C by its address."""
+    """A kernel that Python calls, or C by its address; its machine code is kept on disk, with all that it calls.
+
+    Of the kernels that it calls nothing else is kept: they would be most of the files, and save time only where a door
+    is compiled in a process that has not compiled its kernels for another one.
+    """
     return _compiled(function, door=True)
 
 
@@ -98,17 +102,21 @@ def function_at(address: int) -> Any:
 
 def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False, inline: bool = False) -> Any:
     """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
-    before, room = numba.config.CACHE_DIR, cache_directory(Path(function.__code__.co_filename).parent)
-    numba.config.CACHE_DIR = str(room / "doors" if door else room)  # a function may have machine code of both kinds
-    try:
-        found = numba.njit(
-            error_model="numpy", nogil=True, _nrt=counts, forceinline=inline,
-            no_cpython_wrapper=not door, no_cfunc_wrapper=not door,
-        )(function)
-        if COMPILED and not inline:
-            found._cache = KernelCache(function)
-    finally:
-        numba.config.CACHE_DIR = before
-    if COMPILED and not door:
+    found = numba.njit(
+        error_model="numpy", nogil=True, _nrt=counts, forceinline=inline, no_cpython_wrapper=not door,
+        no_cfunc_wrapper=not door,
+    )(function)
+    if COMPILED and door:
+        found._cache = _cache_of(function)
+    elif COMPILED:
         found.__class__, found.door = Kernel, partial(_door, function)
     return found
+
+
+def _cache_of(function: Callable[..., Any]) -> KernelCache:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_directory(Path(function.__code__.co_filename).parent))
+    try:
+        return KernelCache(function)
+    finally:
+        numba.config.CACHE_DIR = before

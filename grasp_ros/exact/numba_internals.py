@@ -28,10 +28,6 @@ class Part(JITCodeLibrary):  # type: ignore[misc]
     def _finalize_final_module(self) -> None:
         self._finalized = True
 
-    def serialize_using_object_code(self) -> Any:
-        """What is kept on disk."""
-        return self.serialize_using_bitcode()
-
 
 class InlinedPart(Part):
     """The same of a function that goes into its callers as a whole, which optimize it there."""

@@ -92,7 +92,6 @@ def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
     ("owner", "name"),
     [
         (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
-        (JITCodeLibrary, "serialize_using_object_code"), (JITCodeLibrary, "serialize_using_bitcode"),
         (CPUDispatcher, "compile"), (FunctionCache, "load_overload"), (FunctionCache, "save_overload"),
         (FunctionCache, "_index_key"), (cpu_target.target_context.codegen(), "_library_class"),
         (cpu_target.target_context.codegen(), "set_env"),
