@@ -78,8 +78,8 @@ def _simulate(options: argparse.Namespace) -> int:
         check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    quick = not (sampled or scene.sampled)
-    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=quick, delay=1.0) as bar:
+    silent = METHODS[options.method].knob == STEP
+    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=silent, delay=1.0) as bar:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,

@@ -57,7 +57,7 @@ if numba.config.DISABLE_JIT:
 
     def call(address: int, tick: int, time: float, x: float, v: float) -> float:
         """The command of the function at an address."""
-        return float(PROTOTYPE(address)(tick, time, x, v))
+        return float(PROTOTYPE(int(address))(tick, time, x, v))
 
 
 class Foreign:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from enum import Enum
 
 import numpy as np
@@ -82,19 +83,21 @@ class Integrator:
         max_work: int = MAX_WORK,
     ) -> None:
         check_accuracy(accuracy)
-        state = system.state
+        state = np.asarray(system.state, dtype=float)
         if state.shape != (6,) or not np.isfinite(state).all():
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
+        self.progress: Callable[[float], object] | None = None  # told the time in s every BREATH units of work
         self.work = np.zeros(len(Work), dtype=np.int64)
-        self._system, self._continuous, self._accuracy = system, continuous, accuracy
-        self._max_events, self._max_work = max_events, max_work
+        # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
+        self._system, self._continuous, self._accuracy = system, continuous, float(accuracy)
+        self._max_events, self._max_work = int(max_events), int(max_work)
         self._clock, self._carry = np.zeros(3), np.zeros(8)
-        self._given = system.closed_loop if continuous else system.bodies.copy()
+        self._given = np.array(system.closed_loop if continuous else system.bodies, dtype=float, order="C")
         self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
         self._own_forces = self._given[:, FORCE].copy()
         self._bodies = self._given.copy()
-        self._plant = self._given, self._bodies, system.pairs.copy(), float(system.coulomb)
+        self._plant = self._given, self._bodies, np.array(system.pairs, dtype=float, order="C"), float(system.coulomb)
         self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
         self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
         self._events: list[Array] = []
@@ -106,7 +109,7 @@ class Integrator:
         plant = Plant(*self._plant)
         self._watcher = Watcher(plant, State(self._y, self._mode, self._carry, self._clock), wanted)
         self._watcher.set_system(self._system, self._continuous)
-        self._watcher.begin(bound)
+        self._watcher.begin(float(bound))
         return self._watcher
 
     @property
@@ -120,6 +123,12 @@ class Integrator:
         return self._y[[U_L, U_R]]
 
     @property
+    def time(self) -> float:
+        """Time reached on the clock of the recorded events, s."""
+        time, rest, begin = self._clock.tolist()
+        return float(begin + (time + rest))
+
+    @property
     def _spent(self) -> int:
         flights, steps, _, iterations = self.work.tolist()  # enums cost a sampled tick more than the list
         return int(flights + steps + iterations) + self._implicit
@@ -131,8 +140,7 @@ class Integrator:
             return ""
         with np.errstate(over="ignore", invalid="ignore"):  # of states that are not finite any more
             mode = int(energy(self._system, self.state).mode)
-        time, rest, begin = self._clock.tolist()
-        return f"{self.status.value}: t = {begin + (time + rest)!r} s, mode {mode}, state {self.state.tolist()}"
+        return f"{self.status.value}: t = {self.time!r} s, mode {mode}, state {self.state.tolist()}"
 
     @property
     def event_table(self) -> Array:
@@ -172,7 +180,7 @@ class Integrator:
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else np.array(grid, dtype=float)
-        loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
+        loop = Loop(np.array([float(duration)]), np.array([float(start)]), np.array([0, len(times)]), new_place())
         return self.run(loop, times)
 
     def run(self, loop: Loop, grid: Array, rows: Array | None = None) -> Array:
@@ -215,6 +223,8 @@ class Integrator:
                     filled[_EVENTS] = 0
                 if outcome == Outcome.NO_COMMAND or self._ends(outcome):
                     break
+                if self.progress is not None:
+                    self.progress(self.time)
         return out[: filled[_OUTPUTS]]
 
     def _ends(self, outcome: int) -> bool:

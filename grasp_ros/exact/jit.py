@@ -4,67 +4,28 @@
 """
 
 import gc
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from functools import cache, wraps
+from collections.abc import Callable
+from functools import cache, partial, wraps
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numba
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import CPUDispatcher
 
 from grasp_ros.exact.disk import cache_directory
+from grasp_ros.exact.numba_internals import Kernel, KernelCache
 
 # Off by default in numba; it turns the eight independent sums of `series.convolve` into vector instructions, which
 # makes a contact several times faster. It never reorders a floating-point sum.
 numba.config.SLP_VECTORIZE = 1
 
+COMPILED = not numba.config.DISABLE_JIT
+_UNCOMPILED: dict[int, Any] = {}
 DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
-class Part(JITCodeLibrary):  # type: ignore[misc]
-    """The code of a function that others call, without machine code: theirs has a copy of it.
-
-    Machine code of every function by itself would be a fifth of the time of compiling.
-    """
-
-    def _finalize_final_module(self) -> None:
-        self._finalized = True
-
-    def serialize_using_object_code(self) -> Any:
-        """What is kept on disk."""
-        return self.serialize_using_bitcode()
-
-
-class InlinedPart(Part):
-    """The same of a function that goes into its callers as a whole, which optimize it there."""
-
-    def _optimize_final_module(self) -> None:
-        pass
-
-
-class Kernel(CPUDispatcher):  # type: ignore[misc]
-    """A function that other kernels call; for Python it is compiled once more.
-
-    A call from Python goes through a wrapper that unpacks the arguments, as large as many a kernel: without it
-    compiling takes a sixth less. Nothing but a test calls such a function.
-    """
-
-    def compile(self, signature: Any) -> Any:
-        """Compile for arguments of some types."""
-        with global_compiler_lock, _libraries(self, InlinedPart if self.targetoptions["forceinline"] else Part):
-            return super().compile(signature)
-
-    def __call__(self, *arguments: Any) -> Any:
-        """What the function returns."""
-        return _door(self.py_func)(*arguments)
-
-
 def kernel(function: Callable[..., Any]) -> Any:
-    """A function that kernels call, compiled to machine code at its first call and kept on disk.
+    """A function that kernels call, compiled as a part of each door that needs it.
 
     It may not make arrays: without them nothing counts references, which makes a kernel a quarter faster.
     """
@@ -72,7 +33,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """A kernel that becomes part of its callers, and of what they keep on disk.
+    """A kernel that becomes part of its callers.
 
     Handing over many arrays can cost as much as a short function.
     """
@@ -80,30 +41,17 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 
 def door(function: Callable[..., Any]) -> Any:
-    """A kernel that Python calls, or C by its address."""
+    """A kernel that Python calls, or C by its address; its machine code is kept on disk, with all that it calls.
+
+    Of the kernels that it calls nothing else is kept: they would be most of the files, and save time only where a door
+    is compiled in a process that has not compiled its kernels for another one.
+    """
     return _compiled(function, door=True)
 
 
 def allocating(function: Callable[..., Any]) -> Any:
     """A door that may make arrays."""
     return _compiled(function, door=True, counts=True)
-
-
-@contextmanager
-def _libraries(dispatcher: CPUDispatcher, kind: type[Part]) -> Iterator[None]:
-    """Of what kind the code is that this thread compiles meanwhile; it must have numba's lock."""
-    own = vars(dispatcher.targetctx.codegen())
-    before = own.copy()
-    own.update(_library_class=kind, set_env=_no_environment)
-    try:
-        yield
-    finally:
-        own.clear()
-        own.update(before)
-
-
-def _no_environment(*_: object) -> None:
-    """Hand nothing over to machine code that is not there."""
 
 
 @cache
@@ -135,34 +83,40 @@ def compiling(function: Callable[[], None]) -> Callable[[], None]:
 
 
 def compiled_address(function: Any, signature: str) -> int:
-    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been."""
+    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been.
+
+    Where nothing is compiled it is a number that `function_at` knows.
+    """
+    if not COMPILED:
+        _UNCOMPILED[id(function)] = function
+        return id(function)
     function.compile(signature)
     (result,) = function.overloads.values()
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
 
 
+def function_at(address: int) -> Any:
+    """The function of an address, where nothing is compiled."""
+    return _UNCOMPILED[address]
+
+
 def _compiled(function: Callable[..., Any], *, door: bool, counts: bool = False, inline: bool = False) -> Any:
     """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
-    before, room = numba.config.CACHE_DIR, cache_directory(Path(function.__code__.co_filename).parent)
-    numba.config.CACHE_DIR = str(room / "doors" if door else room)  # a function may have machine code of both kinds
-    try:
-        found = numba.njit(
-            cache=not inline, error_model="numpy", nogil=True, _nrt=counts, forceinline=inline,
-            no_cpython_wrapper=not door, no_cfunc_wrapper=not door,
-        )(function)
-    finally:
-        numba.config.CACHE_DIR = before
-    if not numba.config.DISABLE_JIT:
-        found._cache.save_overload = _where_there_is_room(found._cache.save_overload)
-        if not door:
-            found.__class__ = Kernel
+    found = numba.njit(
+        error_model="numpy", nogil=True, _nrt=counts, forceinline=inline, no_cpython_wrapper=not door,
+        no_cfunc_wrapper=not door,
+    )(function)
+    if COMPILED and door:
+        found._cache = _cache_of(function)
+    elif COMPILED:
+        found.__class__, found.door = Kernel, partial(_door, function)
     return found
 
 
-def _where_there_is_room(save: Callable[..., None]) -> Callable[..., None]:
-    """Keeping machine code is a help, no need: a disk that is full only means to compile again."""
-    def attempt(*arguments: Any) -> None:
-        with suppress(OSError):
-            save(*arguments)
-
-    return attempt
+def _cache_of(function: Callable[..., Any]) -> KernelCache:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_directory(Path(function.__code__.co_filename).parent))
+    try:
+        return KernelCache(function)
+    finally:
+        numba.config.CACHE_DIR = before

@@ -7,6 +7,7 @@ called when the segment is over and before its transitions, so that modes and bo
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from grasp_ros.exact.jit import inlined
+from grasp_ros.exact.jit import COMPILED, function_at, inlined
 from grasp_ros.exact.records import Output, Tables
 from grasp_ros.physics.layout import CHECK, LANES, TIME, Filled, Segment
 
@@ -46,6 +47,21 @@ def integers_at(_: Any, address: Any) -> Any:
         return builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
 
     return types.CPointer(types.int64)(types.int64), code
+
+
+if not COMPILED:
+
+    def call(address: int, context: int, kind: int, t: float) -> int:
+        """Call the function at an address."""
+        return int(function_at(int(address))(int(context), kind, t))
+
+    def floats_at(address: int) -> Any:
+        """A pointer to the floats at an address."""
+        return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_double))
+
+    def integers_at(address: int) -> Any:
+        """A pointer to the integers at an address."""
+        return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int64))
 
 
 @inlined

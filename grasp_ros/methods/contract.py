@@ -26,6 +26,7 @@ class Problem(NamedTuple):
     max_work: int = MAX_WORK
     sampled: bool = False  # the controllers are in `drive`; otherwise their feedback acts continuously
     drive: Drive | None = None  # inputs that change on the way; None: continuous feedback alone
+    progress: Callable[[float], object] | None = None  # told the time reached in s, where the method knows it
 
 
 class Solution(NamedTuple):

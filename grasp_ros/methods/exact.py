@@ -18,6 +18,7 @@ def solve(problem: Problem) -> Solution:
         problem.system, continuous=not problem.sampled, accuracy=problem.setting, max_events=problem.max_events,
         max_work=problem.max_work,
     )
+    integrator.progress = problem.progress
     drive = problem.drive or (lambda free: free.advance(problem.duration, problem.grid))
     states = drive(integrator)
     return Solution(states, integrator.event_table, integrator.work.copy(), integrator.status, integrator.stop)

@@ -71,7 +71,7 @@ def straight(name: str, problem: Problem) -> Solution:
     system, work = problem.system, np.zeros(len(Work), dtype=np.int64)
     grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
     args = (parameters(system), True, True)
-    result = _integrate(name, (0.0, problem.duration), system.state, grid, args, problem.setting, None, work)
+    result = _integrate(name, (0.0, problem.duration), system.state, grid, args, problem, None, work)
     status = Status.STALLED if result.status < 0 else Status.DONE
     return Solution(_spread(_rows(result), place), np.empty((0, 5)), work, status)
 
@@ -88,7 +88,7 @@ def restarted(name: str, problem: Problem) -> Solution:
     while status is None:
         active = [*gaps[LEFT][mode[LEFT]], *gaps[RIGHT][mode[RIGHT]]]
         args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
-        result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem.setting, active, work)
+        result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active, work)
         states.append(_rows(result))
         row += len(states[-1])
         if status := _status(result, idle > MAX_IDLE):
@@ -146,7 +146,7 @@ def _gaps(side: int, p: float, work: Any) -> dict[int, list[_Gap]]:
 
 
 def _integrate(
-    name: str, span: tuple[float, float], y: Array, grid: Array, args: tuple[Any, ...], tolerance: float,
+    name: str, span: tuple[float, float], y: Array, grid: Array, args: tuple[Any, ...], problem: Problem,
     events: list[Any] | None, work: Any,
 ) -> Any:
     from scipy import integrate
@@ -154,17 +154,21 @@ def _integrate(
     base: Any = getattr(integrate, name)
 
     class Counting(base):
-        """scipy's solver, which counts its steps."""
+        """scipy's solver, which counts its steps and says how far it is."""
 
         def step(self) -> Any:
             work[Work.STEPS] += 1
-            return super().step()
+            message = super().step()
+            if problem.progress is not None:
+                problem.progress(float(self.t_old))  # an event may lie before its end
+            return message
 
     options = {"jac": jacobian} if name in IMPLICIT else {}
     with warnings.catch_warnings():  # an integration that fails says so in its status
         warnings.simplefilter("ignore")
         result = integrate.solve_ivp(
-            slopes, span, y, Counting, grid, events=events, args=args, rtol=tolerance, atol=tolerance, **options
+            slopes, span, y, Counting, grid, events=events, args=args, rtol=problem.setting, atol=problem.setting,
+            **options
         )
     work[Work.RIGHT_HAND_SIDES] += result.nfev
     work[Work.IMPLICIT_ITERATIONS] += result.nlu

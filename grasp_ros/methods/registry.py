@@ -120,7 +120,7 @@ def check(
         does not declare.
     """
     method = find(name)
-    value = method.default if setting is None else setting
+    value = method.default if setting is None else float(setting)  # as all kernels take it
     low, high = method.low, method.high
     if method.knob == STEP:
         low, high = scene.duration / MOST_STEPS, scene.duration

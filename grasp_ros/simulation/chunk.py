@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
+from grasp_ros.exact.jit import COMPILED
 from grasp_ros.exact.rows import Rows, integrate_rows
 from grasp_ros.exact.sight import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY
@@ -133,10 +134,10 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
 
 
 def _is_plain(variants: Variants, setup: Setup, columns: Sequence[Outcome]) -> bool:
-    """Whether rows can be integrated without the interpreter: continuous feedback, no other inputs, arrays for all."""
+    """Whether rows can be integrated without the interpreter: compiled, continuous feedback alone, arrays for all."""
     scene = variants.scene
     inputs = setup.sampled or scene.sampled or scene.system.external
-    return variants.is_plain and not inputs and all(column.name != LYAPUNOV for column in columns)
+    return COMPILED and variants.is_plain and not inputs and all(column.name != LYAPUNOV for column in columns)
 
 
 def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, which: NDArray[np.int64],
@@ -152,8 +153,8 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
         loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
         np.full(n, LEFT_OUT),
     )
-    integrate_rows(rows, variants.scene.duration, setup.accuracy, wanted, setup.settled, stop, setup.max_events,
-                   setup.max_work)
+    integrate_rows(rows, variants.scene.duration, float(setup.accuracy), wanted, float(setup.settled), stop,
+                   int(setup.max_events), int(setup.max_work))
     done = rows.outcome == Ended.DONE
     runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
     runs.touches[which[done]] = rows.touches[done]

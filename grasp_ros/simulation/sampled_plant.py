@@ -81,7 +81,7 @@ class SampledPlant:
         self.tick = 0
         self.effort: Array = np.zeros(3)
         self.inputs: Array = np.zeros(3)
-        self._system, self._period_ns, self._period = system, period_ns, period_ns / NANOSECONDS
+        self._system, self._period_ns, self._period = system, period_ns, float(period_ns / NANOSECONDS)
         self._integrator = Integrator(system, continuous=False) if integrator is None else integrator
         self._waiting = np.zeros((system.delay, 3))  # until the first command arrives nothing acts
 

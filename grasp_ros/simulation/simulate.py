@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods import registry
 from grasp_ros.methods.contract import ACCURACY_KNOB, Problem
 from grasp_ros.methods.registry import EXACT, METHODS
@@ -77,7 +77,8 @@ def simulate(
         that numba has compiled runs at full speed. A class is made anew for the run; of any other object `reset()` is
         called before it, if it has one.
     progress : callable, optional
-        Called with the time reached, in s.
+        Called with the time reached, in s: at the end of the horizon, if the run gets there, and on the way, except by
+        methods with a fixed step.
 
     Raises
     ------
@@ -99,8 +100,11 @@ def simulate(
     foreign = foreign_controllers(scene, controllers)
     loop = SampledLoop(scene, grid, changes, progress, foreign) if sampled else None
     drive = loop.drive if loop else partial(drive_external, scene, grid) if scene.system.external else None
-    problem = Problem(scene.system, scene.duration, grid, setting, max_events, max_work, sampled, drive)
+    problem = Problem(scene.system, scene.duration, grid, setting, max_events, max_work, sampled, drive,
+                      None if loop else progress)
     found = METHODS[method].solve(problem)
+    if progress is not None and found.status is Status.DONE:
+        progress(scene.duration)
     for body in scene.system.absent:
         found.state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
     reached = len(found.state)

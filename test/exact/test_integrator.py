@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import os
 import subprocess
@@ -10,16 +11,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
+from numba.core.registry import CPUDispatcher
 from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.hybrid import advance
-from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.numba_internals import Kernel
+from grasp_ros.exact.sight import Wanted
 from grasp_ros.physics.layout import Work
 from grasp_ros.physics.system import System
-from grasp_ros.simulation import simulate
+from grasp_ros.simulation import ensemble, simulate
+from grasp_ros.simulation.chunk import Setup
 from grasp_ros.verification.cases.modes import STARTS
 
 GRID = np.linspace(0.0, 20.0, 201)
@@ -108,14 +114,37 @@ def test_an_end_a_million_times_smaller_than_the_start_is_no_alarm() -> None:
     assert integrator.status is Status.DONE
 
 
-def test_any_array_of_output_times_runs_on_the_same_machine_code() -> None:
-    grid = np.linspace(0.0, 1.0, 21)[::2]
-    grid.setflags(write=False)
-    compile_kernels()
-    known = len(advance.signatures)
-    Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True).advance(1.0, grid)
-    simulate(scenes.load("case_01"), grid=grid)
-    assert len(advance.signatures) == known
+READ_ONLY = np.linspace(0.0, 1.0, 21)[::2]
+READ_ONLY.setflags(write=False)
+
+
+def compiled() -> dict[str, int]:
+    """How often each function that Python calls has been compiled."""
+    doors = [item for item in gc.get_objects() if isinstance(item, CPUDispatcher) and not isinstance(item, Kernel)]
+    return {f"{door.py_func.__module__}.{door.__name__}": len(door.signatures) for door in doors}
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("grid", [READ_ONLY, np.arange(2), np.float32([0.0, 0.5]), [0, 1]], ids=range(4))
+def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid: Any) -> None:
+    scene = scenes.load("case_01", ["time.duration_s=1"])
+    ensemble(scene, {"object.mass_kg": [1.0]}, ("energy",))
+    integrator = Integrator(scene.system, continuous=True)
+    integrator.watch(Wanted.LOSSES, 0.02)
+    for name in ("exact", "rk4", "paper", "discrete_gradient"):
+        simulate(scene, method=name, grid=np.zeros(1))
+    known = compiled()
+    for one in (1, np.float32(1.0), True):
+        integrator = Integrator(scene.system, continuous=True, accuracy=np.float32(1e-6), max_work=1e8, max_events=1e6)
+        integrator.watch(Wanted.LOSSES, np.float32(0.5))
+        integrator.advance(one, grid, start=0)
+    table = ensemble(scene, {"object.mass_kg": [1, 2]}, setup=Setup(accuracy=np.float32(1e-6), max_work=1e8))
+    assert table.done.all()
+    for name, setting in (("exact", np.float32(1e-6)), ("rk4", 1), ("paper", 1), ("discrete_gradient", np.float32(1))):
+        simulate(scene, method=name, setting=setting, grid=grid)
+    simulate(scene, sampled=True, accuracy=np.float32(1e-6), max_work=np.int32(10**8), grid=grid)
+    assert compiled() == known
+    assert len(advance.signatures) == 1
 
 
 def test_event_budget_stops_with_its_status() -> None:
@@ -180,7 +209,32 @@ def test_uncompiled_source_gives_the_same_numbers() -> None:
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("mass", [1.0, 1e-4, 1e-8, 1e-12])
+EVERYTHING = """
+import numpy as np
+from grasp_ros import scene as scenes
+from grasp_ros.simulation import ensemble, simulate
+from grasp_ros.simulation.losses import losses
+scene = scenes.load("case_01", ["time.duration_s=0.02", "left_arm.position_m=-0.01", "left_arm.velocity_m_per_s=2"])
+own = {"controllers": {"left": lambda tick, time, x, v: -x}}
+for settings in ({}, {"sampled": True}, own, {"method": "paper"}, {"method": "discrete_gradient"}):
+    run = simulate(scene, grid=np.linspace(0.0, 0.02, 5), **settings)
+    print(*run.state.ravel().tolist(), *map(float, losses(run)))
+print(*np.concatenate([*ensemble(scene, {}, ("energy", "settling_time", "touches")).columns.values()]).tolist())
+"""
+
+
+def test_everything_runs_uncompiled() -> None:
+    outputs = []
+    for disabled in ("0", "1"):
+        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
+        finished = subprocess.run([sys.executable, "-W", "ignore", "-c", EVERYTHING], env=environment,
+                                  capture_output=True, text=True, timeout=120, check=True)
+        outputs.append([float(word) for word in finished.stdout.split()])
+    assert len(outputs[0]) > 150
+    assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-50])
 @pytest.mark.parametrize("body", ["left_arm", "right_arm"])
 def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
     """The product of c/m and the time is large."""

@@ -11,6 +11,7 @@ from numba.core.codegen import JITCodeLibrary
 
 from grasp_ros import exact
 from grasp_ros.exact import jit
+from grasp_ros.exact.numba_internals import InlinedPart, Part
 
 PARAMETERS, BODY, LINES = 8, 40, 250
 DOORS = ("advance", "creep")  # of hybrid and squeezed: flat arrays, see their docstrings
@@ -66,7 +67,7 @@ def test_only_a_door_has_machine_code() -> None:
     def sum_of(x: float) -> float:
         return float(half(x) + double(x))
 
-    for function, kind in ((half, jit.Part), (double, jit.InlinedPart), (sum_of, JITCodeLibrary)):
+    for function, kind in ((half, Part), (double, InlinedPart), (sum_of, JITCodeLibrary)):
         function.compile("float64(float64)")
         [compiled] = function.overloads.values()
         assert type(compiled.library) is kind

@@ -53,12 +53,25 @@ def test_commands_follow_4_and_5() -> None:
     assert result.command[:, 1] == pytest.approx(-50.0 * result.state[:, 4] - 0.5 * result.state[:, 5])
 
 
-def test_progress_is_reported() -> None:
+@pytest.mark.parametrize(
+    ("reports", "settings"),
+    [(5, {"sampled": True}), (5, {}), (1, {"method": "rk4"}), (5, {"method": "rk45"}), (5, {"method": "rk45_events"})],
+)
+def test_progress_is_reported(monkeypatch: pytest.MonkeyPatch, reports: int, settings: dict[str, Any]) -> None:
+    monkeypatch.setattr("grasp_ros.exact.integrator.BREATH", 20)  # of some 400
     seen: list[float] = []
-    simulate(case_of(duration=10.0), sampled=True, progress=seen.append)
+    simulate(case_of(duration=10.0), progress=seen.append, **settings)
     assert seen == sorted(seen)
-    assert len(seen) >= 5
+    assert len(seen) >= reports
     assert seen[-1] == 10.0
+
+
+def test_no_end_is_reported_that_is_not_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("grasp_ros.exact.integrator.BREATH", 20)
+    seen: list[float] = []
+    run = simulate(case_of(duration=10.0), progress=seen.append, max_work=100)
+    assert run.status is Status.WORK_BUDGET
+    assert 0.0 < seen[-1] < 10.0
 
 
 @pytest.mark.parametrize("sampled", [False, True])

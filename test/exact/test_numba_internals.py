@@ -1,0 +1,104 @@
+"""The kernel cache: what is damaged is compiled anew; and what is used of numba's inside is there."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numba
+import pytest
+from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.registry import CPUDispatcher, cpu_target
+
+from grasp_ros.exact import disk, jit
+
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+
+
+OURS = "from grasp_ros.exact.jit import door\n@door\ndef twice(x):\n    return 2.0 * x\n"
+
+
+def twice(x: float) -> float:
+    """What is compiled here."""
+    return 2.0 * x
+
+
+@pytest.fixture
+def cached(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """The file of `twice` in a cache of its own."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    disk.cache_directory.cache_clear()
+    jit.door(twice)(1.0)
+    [path] = [path for path in tmp_path.rglob("*") if path.is_file()]
+    yield path
+    disk.cache_directory.cache_clear()
+
+
+def answer(path: Path, content: bytes) -> tuple[float, bool]:
+    """What the function answers, and whether it came from a file with this content."""
+    path.write_bytes(content)
+    disk.say_damaged.cache_clear()
+    again: Any = jit.door(twice)
+    return again(21.0), bool(again.stats.cache_hits)
+
+
+def damaged(whole: bytes) -> list[bytes]:
+    """Nothing, a part, more, other bytes, and the content with two bits flipped in many places."""
+    found = [b"", whole[: len(whole) // 2], whole[:-1], whole + b"\0", os.urandom(len(whole)), b"\0" * len(whole)]
+    for place in [*range(0, 64, 8), *range(64, len(whole), len(whole) // 40)]:
+        flipped = bytearray(whole)
+        flipped[place] ^= 0b101
+        found.append(bytes(flipped))
+    return found
+
+
+def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole = cached.read_bytes()
+    assert answer(cached, whole) == (42.0, True)
+    assert not capsys.readouterr().err
+    for content in damaged(whole):
+        assert answer(cached, content) == (42.0, False)
+        assert capsys.readouterr().err.count("is damaged; what cannot be loaded is compiled anew\n") == 1
+        assert answer(cached, cached.read_bytes()) == (42.0, True)  # it has been written again
+        assert not capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
+    disk.write_checked(cached, b"no code at all")
+    assert answer(cached, cached.read_bytes()) == (42.0, False)
+
+
+def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
+    (tmp_path / "ours.py").write_text(OURS)
+    environment = {
+        **os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path]), "NUMBA_CACHE_DIR": str(tmp_path / "c"),
+    }
+    command = [sys.executable, "-c", "import ours; print(ours.twice(21.0), len(ours.twice.stats.cache_hits))"]
+    for hits in (0, 1):
+        runs = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(4)]
+        found = [run.communicate(timeout=60.0)[0].split() for run in runs]
+        assert all(line[0] == "42.0" for line in found)
+        assert not hits or [line[1] for line in found] == ["1"] * 4
+        [path] = [path for path in (tmp_path / "c").rglob("*") if path.is_file()]
+        disk.read_checked(path)
+
+
+@pytest.mark.parametrize(
+    ("owner", "name"),
+    [
+        (JITCodeLibrary, "_finalize_final_module"), (JITCodeLibrary, "_optimize_final_module"),
+        (CPUDispatcher, "compile"), (FunctionCache, "load_overload"), (FunctionCache, "save_overload"),
+        (FunctionCache, "_index_key"), (cpu_target.target_context.codegen(), "_library_class"),
+        (cpu_target.target_context.codegen(), "set_env"),
+        (FunctionCache(twice)._impl, "rebuild"), (FunctionCache(twice)._impl, "reduce"),
+        (FunctionCache(twice)._impl, "check_cachable"), (FunctionCache(twice)._impl, "filename_base"),
+        (numba.njit(twice), "_cache"), (numba.njit(twice), "targetctx"), (numba.njit(twice), "targetoptions"),
+    ],
+)
+def test_numba_has_what_is_used_of_its_inside(owner: Any, name: str) -> None:
+    assert hasattr(owner, name), f"numba {numba.__version__} has moved it; used by grasp_ros/exact/numba_internals.py"
