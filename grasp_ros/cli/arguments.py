@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.disk import COMPILING, kernels_on_disk
+from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene

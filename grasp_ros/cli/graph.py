@@ -14,7 +14,7 @@ from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
-from grasp_ros.exact.disk import kernels_on_disk
+from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running

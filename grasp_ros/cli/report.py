@@ -49,6 +49,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
         *foreign,
         ("status", trajectory.stop or trajectory.status.value),
         ("simulated", _simulated(trajectory)),
+        *([("at rest", f"from {trajectory.at_rest:.6g} s on")] if trajectory.at_rest is not None else []),
         ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
         ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),

@@ -5,28 +5,36 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 
+from grasp_ros.exact.compilation.jit import compiling
+from grasp_ros.exact.driver.advance import advance
+from grasp_ros.exact.driver.outputs import SPARE
+from grasp_ros.exact.driver.rest import SINCE
+from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.events import Event, to_events
-from grasp_ros.exact.hybrid import advance
-from grasp_ros.exact.jit import compiling
-from grasp_ros.exact.outputs import SPARE
-from grasp_ros.exact.records import Loop, Plant, State, new_place
-from grasp_ros.exact.sight import Wanted
-from grasp_ros.exact.squeezed import creep
-from grasp_ros.exact.watcher import Watcher
-from grasp_ros.exact.workspace import workspace
+from grasp_ros.exact.records import (
+    COULOMB,
+    PLANT_NUMBERS,
+    STATE_NUMBERS,
+    Integers,
+    Loop,
+    Tables,
+    new_place,
+    plant_of,
+    state_of,
+)
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import FORCE, MASS, U_L, U_R, Filled, Outcome, Pair, Place, Work
+from grasp_ros.physics.layout import Filled, Of, Outcome, Pair, U, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
 MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for a minute or a few
 BREATH = 10**6  # units of work, less than a second, after which a kernel lets Python see a Ctrl-C
-IMPLICIT = 100  # units of work that an implicit step takes the time of, beside its own
 
 
 class Status(Enum):
@@ -34,7 +42,8 @@ class Status(Enum):
 
     DONE = "reached the end of the horizon"
     EVENT_BUDGET = "stopped: the event budget is used up before the end of the horizon"
-    NOT_FINITE = "stopped: a state is no longer finite, or too large for an impact"
+    NOT_FINITE = "stopped: a state is no longer finite"
+    OUTSIDE = "stopped: a body is farther away or faster than the domain allows"
     WORK_BUDGET = "stopped: the budget of work is used up before the end of the horizon"
     ENERGY_RISES = "stopped: the energy rose by more than rounding explains"
     ENERGY_FALLS = "stopped: the energy fell by more than its losses explain"
@@ -43,17 +52,26 @@ class Status(Enum):
 
 
 _OUTPUTS, _EVENTS, _FILLED = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled)
-_GOES_ON = (Outcome.GO_ON, Outcome.SQUEEZED)
-_NO_TIMES = np.zeros(0)
+_NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
+_UNKNOWN = [int(Pair.UNKNOWN)] * 3
+_DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
 _STATUS: dict[int, Status] = {
     Outcome.DONE: Status.DONE,
     Outcome.NOT_FINITE: Status.NOT_FINITE,
+    Outcome.OUTSIDE: Status.OUTSIDE,
     Outcome.STALLED: Status.STALLED,
     Outcome.ENERGY_RISES: Status.ENERGY_RISES,
     Outcome.ENERGY_FALLS: Status.ENERGY_FALLS,
     Outcome.PENETRATES: Status.PENETRATES,
     Outcome.WORK_USED: Status.WORK_BUDGET,
 }
+
+
+class Observer(Protocol):
+    """What looks on after each segment."""
+
+    def attach(self, tables: Tables) -> Integers:
+        """Addresses (2,) of a function and of its context, see `driver.callback`, for a run with this workspace."""
 
 
 class Integrator:
@@ -69,8 +87,19 @@ class Integrator:
     max_events : int
         Budget of events; the integration stops with `Status.EVENT_BUDGET` beyond it.
     max_work : int
-        Budget of flights, Taylor steps and evaluations of event functions together, an implicit step as IMPLICIT of
-        them; the integration stops with `Status.WORK_BUDGET` when it is used up.
+        Budget of flights, Taylor steps and evaluations of event functions together; the integration stops with
+        `Status.WORK_BUDGET` when it is used up.
+
+    Attributes
+    ----------
+    status : Status
+    progress : callable or None
+        Called with the time reached, in s, now and then in a call that takes longer than about a second.
+    observer : Observer or None
+    system, continuous : System and bool
+        As given.
+    plant, records : Plant and State
+        What the kernels work on.
 
     Raises
     ------
@@ -84,54 +113,56 @@ class Integrator:
     ) -> None:
         check_accuracy(accuracy)
         state = np.asarray(system.state, dtype=float)
-        if state.shape != (6,) or not np.isfinite(state).all():
+        if state.shape != (6,) or not all(map(math.isfinite, state.tolist())):
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.progress: Callable[[float], object] | None = None  # told the time in s every BREATH units of work
         self.work = np.zeros(len(Work), dtype=np.int64)
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
-        self._system, self._continuous, self._accuracy = system, continuous, float(accuracy)
+        self.system, self.continuous, self._accuracy = system, continuous, float(accuracy)
         self._max_events, self._max_work = int(max_events), int(max_work)
-        self._clock, self._carry = np.zeros(3), np.zeros(8)
-        self._given = np.array(system.closed_loop if continuous else system.bodies, dtype=float, order="C")
-        self._given[self._given[:, MASS] == 0.0, MASS] = 1.0  # what is not there rests at 0 without any force
-        self._own_forces = self._given[:, FORCE].copy()
-        self._bodies = self._given.copy()
-        self._plant = self._given, self._bodies, np.array(system.pairs, dtype=float, order="C"), float(system.coulomb)
-        self._y = np.array([*state, state[0] - state[2], state[2] - state[4]])
-        self._mode = np.full(3, Pair.UNKNOWN, dtype=np.int64)
+        self._plant_block, self._state_block = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS)
+        self._mode = np.array(_UNKNOWN)
+        self.plant, self.records = plant_of(self._plant_block), state_of(self._state_block, self._mode)
+        given = system.closed_loop if continuous else system.bodies
+        self.plant.given[:] = self.plant.bodies[:] = given
+        for body in system.absent:  # what is not there rests at 0 without any force
+            self.plant.given[body, Of.MASS] = self.plant.bodies[body, Of.MASS] = 1.0
+        self.plant.pairs[:], self._plant_block[COULOMB] = system.pairs, system.coulomb
+        self.plant.own[:] = given[:, Of.FORCE]
+        self.records.y[:6] = state
+        self.records.y[6:] = state[0] - state[2], state[2] - state[4]
+        self.records.rest[SINCE] = math.inf
         self._events: list[Array] = []
-        self._event_count = self._implicit = 0  # the second in units of work
-        self._watcher: Watcher | None = None
-
-    def watch(self, wanted: Wanted, bound: float) -> Watcher:
-        """Watch the run from here on; `bound` is the part of the largest displacement that counts as settled."""
-        plant = Plant(*self._plant)
-        self._watcher = Watcher(plant, State(self._y, self._mode, self._carry, self._clock), wanted)
-        self._watcher.set_system(self._system, self._continuous)
-        self._watcher.begin(float(bound))
-        return self._watcher
+        self._event_count = 0
+        self.observer: Observer | None = None
 
     @property
     def state(self) -> Array:
         """Copy of the state (6,): x_l, v_l, x_o, v_o, x_r, v_r."""
-        return self._y[:6].copy()
+        return self.records.y[:6].copy()
 
     @property
     def penetration(self) -> Array:
         """Copy of (u_l, u_r) in m, exact where the difference of the positions is not."""
-        return self._y[[U_L, U_R]]
+        return self.records.y[[U.L, U.R]]
 
     @property
     def time(self) -> float:
         """Time reached on the clock of the recorded events, s."""
-        time, rest, begin = self._clock.tolist()
+        time, rest, begin = self.records.clock.tolist()
         return float(begin + (time + rest))
+
+    @property
+    def at_rest(self) -> float | None:
+        """Time in s since when everything is at rest for good, see `driver.rest`; None if it is not."""
+        since = float(self.records.rest[SINCE])
+        return since if math.isfinite(since) else None
 
     @property
     def _spent(self) -> int:
         flights, steps, _, iterations = self.work.tolist()  # enums cost a sampled tick more than the list
-        return int(flights + steps + iterations) + self._implicit
+        return int(flights + steps + iterations)
 
     @property
     def stop(self) -> str:
@@ -139,7 +170,7 @@ class Integrator:
         if self.status is Status.DONE:
             return ""
         with np.errstate(over="ignore", invalid="ignore"):  # of states that are not finite any more
-            mode = int(energy(self._system, self.state).mode)
+            mode = int(energy(self.system, self.state).mode)
         return f"{self.status.value}: t = {self.time!r} s, mode {mode}, state {self.state.tolist()}"
 
     @property
@@ -154,7 +185,7 @@ class Integrator:
 
     def set_input(self, forces: Array) -> None:
         """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
-        self._given[:, FORCE] = self._own_forces + forces
+        self.plant.given[:, Of.FORCE] = self.plant.own + forces
 
     def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
         """Integrate for `duration` seconds.
@@ -202,26 +233,19 @@ class Integrator:
         """
         out = np.empty((len(grid), 6)) if rows is None else rows
         filled = np.zeros(_FILLED, dtype=np.int64)
-        outcome = int(Outcome.GO_ON)
-        with workspace(self._accuracy) as (tables, event_rows):
-            if self._watcher is not None:
-                self._watcher.attach(filled, tables)
+        with workspace(self._accuracy) as (block, order, tables, event_rows):
+            observer = _NOBODY if self.observer is None else self.observer.attach(tables)
             while self.status is Status.DONE:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
-                most = min(self._spent + BREATH, self._max_work) - self._implicit
-                own = (*tables[:-1], *tables.start, *self._plant, self._y, self._mode, self._carry, self._clock)
-                if outcome == Outcome.SQUEEZED:
-                    k, self._implicit = int(loop.place[Place.INTERVAL]), self._implicit + IMPLICIT
-                    outcome = creep(*own, loop.lengths[k], self._accuracy, most, grid[: loop.bounds[k + 1]], out,
-                                    allowed, filled, self.work)
-                else:
-                    outcome = advance(*own, self._accuracy, most, grid, out, allowed, filled, self.work,
-                                      self._own_forces, *loop)
+                most = min(self._spent + BREATH, self._max_work)
+                outcome = advance(
+                    block, order, self._plant_block, self._state_block, self._mode, self._accuracy, most, grid, out,
+                    allowed, filled, self.work, observer, loop)
                 if count := int(filled[_EVENTS]):
                     self._events.append(event_rows[:count].copy())
                     self._event_count += count
                     filled[_EVENTS] = 0
-                if outcome == Outcome.NO_COMMAND or self._ends(outcome):
+                if outcome in (_DONE, _NO_COMMAND) or self._ends(outcome):
                     break
                 if self.progress is not None:
                     self.progress(self.time)
@@ -229,8 +253,6 @@ class Integrator:
 
     def _ends(self, outcome: int) -> bool:
         """Whether a run is over, and its status."""
-        if outcome in _GOES_ON:
-            return False
         if outcome == Outcome.EVENTS_FULL:
             if self._event_count > self._max_events:
                 self.status = Status.EVENT_BUDGET

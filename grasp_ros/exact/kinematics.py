@@ -4,32 +4,11 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import damping_factor
-from grasp_ros.exact.jit import inlined, kernel
-from grasp_ros.exact.records import Array, Motion, PairFlight, Plant, Rates, State
-from grasp_ros.exact.roots import LARGE, SMALL, safe_step
-from grasp_ros.exact.sums import meet
-from grasp_ros.physics.layout import (
-    DAMPING,
-    DISSIPATION,
-    EPS,
-    FORCE,
-    LEFT,
-    MASS,
-    OBJECT,
-    RIGHT,
-    STIFFNESS,
-    U_L,
-    U_R,
-    V_L,
-    V_O,
-    V_R,
-    X_L,
-    X_O,
-    X_R,
-    Body,
-    Pair,
-)
+from grasp_ros.exact.numerics.roots import LARGE, SMALL, safe_step
+from grasp_ros.exact.records import Array, Motion, PairFlight, Plant, Rates
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V, X
 
 
 @kernel
@@ -41,30 +20,13 @@ def other(side: Body) -> Body:
 @kernel
 def arm_of(y: Array, side: Body) -> tuple[float, float, float]:
     """x and v of an arm, and the sign with which they enter u and u'."""
-    return (y[X_L], y[V_L], 1.0) if side == LEFT else (y[X_R], y[V_R], -1.0)
-
-
-@inlined
-def apart(y: Array, side: Body) -> float:
-    """Distance in m between the place of an arm and where object and u say that it is.
-
-    Both are carried beside each other, with roundings of the whole way, which may have been much longer than the places
-    are now.
-    """
-    x, _, sign = arm_of(y, side)
-    return abs(sign * (x - y[X_O]) - y[U_L + side])
-
-
-@kernel
-def velocity_lane(body: Body) -> int:
-    """Place of a body's velocity in the state; its position stands before it."""
-    return V_O if body == OBJECT else (V_L if body == LEFT else V_R)
+    return (y[X.L], y[V.L], 1.0) if side == LEFT else (y[X.R], y[V.R], -1.0)
 
 
 @kernel
 def rate_lanes(side: Body) -> tuple[int, int]:
     """Places of the two velocities whose difference is u', (8)."""
-    return (V_L, V_O) if side == LEFT else (V_O, V_R)
+    return (V.L, V.O) if side == LEFT else (V.O, V.R)
 
 
 @kernel
@@ -75,34 +37,15 @@ def approach(y: Array, side: Body) -> float:
 
 
 @kernel
-def write_penetrations(y: Array) -> None:
-    """Write u of both pairs, (8), from the positions."""
-    y[U_L] = y[X_L] - y[X_O]
-    y[U_R] = y[X_O] - y[X_R]
-
-
-@inlined
-def keep_resting(state: State) -> None:
-    """A pair at rest stays one: what arm and object differ by after a segment is rounding."""
-    y, mode = state.y, state.mode
-    if mode[LEFT] == Pair.RESTING:
-        meet(state, LEFT)
-        y[V_L] = y[V_O]
-    if mode[RIGHT] == Pair.RESTING:
-        meet(state, RIGHT)
-        y[V_R] = y[V_O]
-
-
-@kernel
 def own_acceleration(body: Array, x: float, v: float) -> float:
     """x'' of a body, m/s^2, without impact forces: (1) to (3)."""
-    return (body[FORCE] - body[STIFFNESS] * x - body[DAMPING] * v) / body[MASS]
+    return (body[Of.FORCE] - body[Of.STIFFNESS] * x - body[Of.DAMPING] * v) / body[Of.MASS]
 
 
 @kernel
 def own_size(body: Array, x: float, v: float) -> float:
     """Sum of the sizes of the terms of `own_acceleration`, m/s^2."""
-    return (abs(body[FORCE]) + abs(body[STIFFNESS] * x) + abs(body[DAMPING] * v)) / body[MASS]
+    return (abs(body[Of.FORCE]) + abs(body[Of.STIFFNESS] * x) + abs(body[Of.DAMPING] * v)) / body[Of.MASS]
 
 
 @inlined
@@ -110,21 +53,21 @@ def relative_motion(plant: Plant, y: Array, side: Body) -> tuple[float, float]:
     """u' and the u'' that both bodies would have without impact forces."""
     x, v, sign = arm_of(y, side)
     a = own_acceleration(plant.bodies[side], x, v)
-    a_o = own_acceleration(plant.bodies[OBJECT], y[X_O], y[V_O])
+    a_o = own_acceleration(plant.bodies[OBJECT], y[X.O], y[V.O])
     return approach(y, side), sign * (a - a_o)
 
 
 @kernel
 def reduced_mass(bodies: Array, side: Body) -> float:
     """mu of one pair, kg."""
-    m, m_o = bodies[side, MASS], bodies[OBJECT, MASS]
+    m, m_o = bodies[side, Of.MASS], bodies[OBJECT, Of.MASS]
     return m / (1.0 + m / m_o)  # m_o is infinite if the object sticks
 
 
 @kernel
 def rates_of(body: Array) -> Rates:
     """What the equation of a body divides by its mass; body is its row (4,)."""
-    m, k, c, f = body[MASS], body[STIFFNESS], body[DAMPING], body[FORCE]
+    m, k, c, f = body[Of.MASS], body[Of.STIFFNESS], body[Of.DAMPING], body[Of.FORCE]
     return Rates(k / m, c / m, f / m, m / c if c > 0.0 else math.inf, m / k if k > 0.0 else math.inf)
 
 
@@ -190,13 +133,13 @@ def bound(body: Array, q: float, q_rate: float, span: float) -> float:
 @kernel
 def next_derivative(body: Array, before: float, value: float) -> float:
     """The derivative after two of a body's flight, from the second one on: m q'' = -(c q' + k q)."""
-    return -(body[DAMPING] * value + body[STIFFNESS] * before) / body[MASS]
+    return -(body[Of.DAMPING] * value + body[Of.STIFFNESS] * before) / body[Of.MASS]
 
 
 @kernel
 def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, float, float]:
     """Derivatives `order` >= 2 and order + 1 of a body's flight, m/s^order, and the sum of the sizes of the first."""
-    m, k, c = body[MASS], body[STIFFNESS], body[DAMPING]
+    m, k, c = body[Of.MASS], body[Of.STIFFNESS], body[Of.DAMPING]
     value, size = own_acceleration(body, x, v), own_size(body, x, v)
     before, before_size = v, abs(v)
     for _ in range(order - 2):
@@ -208,13 +151,13 @@ def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, flo
 @inlined
 def is_closed(mode: Pair) -> bool:
     """Whether a pair is between its touch and its release."""
-    return mode in (Pair.CONTACT, Pair.CLAMPED, Pair.LEAVING)
+    return mode in (Pair.CONTACT, Pair.BEGINNING, Pair.CLAMPED, Pair.LEAVING)
 
 
 @kernel
 def surface_factor(plant: Plant, y: Array, side: Body, roundings: float) -> float:
     """1 + p u' of a pair; 0 within some roundings of its terms."""
-    loss, (front, back) = plant.pairs[side, DISSIPATION], rate_lanes(side)
+    loss, (front, back) = plant.pairs[side, Law.DISSIPATION], rate_lanes(side)
     factor = damping_factor(loss, y[front] - y[back])
     return factor if abs(factor) > roundings * EPS * (1.0 + loss * (abs(y[front]) + abs(y[back]))) else 0.0
 
@@ -222,4 +165,4 @@ def surface_factor(plant: Plant, y: Array, side: Body, roundings: float) -> floa
 @inlined
 def is_resting(y: Array, side: Body) -> bool:
     """Whether a pair is at u = u' = 0."""
-    return y[U_L + side] == 0.0 and approach(y, side) == 0.0
+    return y[U.L + side] == 0.0 and approach(y, side) == 0.0

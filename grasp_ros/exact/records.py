@@ -1,7 +1,7 @@
 """The records that the kernels hand to each other: what a plant is, where it stands, what a run writes.
 
-A record crosses from Python at a price, about half a microsecond each, so `hybrid.advance` takes flat arrays and makes
-its records inside, where they cost nothing.
+An array that crosses from Python costs some 60 ns, and a record of arrays a microsecond, so that `driver.advance` takes
+few of them: plant and state cross as one block of numbers each, of which the arrays of their records are parts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.layout import Place, Slide, Transition
+from grasp_ros.physics.layout import LANES, Kind, Place, Slide, Transition
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -28,6 +28,20 @@ class Plant(NamedTuple):
     bodies: Array  # (3, 4) the same as it acts in this mode: friction in f, an infinite mass where the object sticks
     pairs: Array  # (2, 2) by side: H N/m^1.5, p s/m; H = 0: no such pair
     coulomb: float  # dry friction of the object, N
+    own: Array = np.zeros(3)  # (3,) N by body: forces of the bodies by themselves, to which the inputs are added
+
+
+BODY_NUMBERS, PAIR_NUMBERS = 12, 4
+COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its place in the block of a plant
+PLANT_NUMBERS = COULOMB + 4
+STATE_NUMBERS = 20
+
+
+def plant_of(block: Array) -> Plant:
+    """A plant whose arrays are parts of a block (PLANT_NUMBERS,)."""
+    pairs = 2 * BODY_NUMBERS
+    return Plant(block[:BODY_NUMBERS].reshape((3, 4)), block[BODY_NUMBERS:pairs].reshape((3, 4)),
+                 block[pairs:COULOMB].reshape((2, 2)), block[COULOMB], block[COULOMB + 1 :])
 
 
 class State(NamedTuple):
@@ -35,8 +49,14 @@ class State(NamedTuple):
 
     y: Array  # (8,) x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r; m and m/s
     mode: Integers  # (3,) Pair, Pair, Slide; frozen within a segment
-    carry: Array  # (8,) what roundings left out of the places and u of y, see `sums`
+    low: Array  # (6,) low words of the positions and velocities of y, see `compensated`
     clock: Array  # (3,) time since the begin of the interval, what its roundings left out, and that begin, s
+    rest: Array = np.zeros(3)  # (3,) see `driver.rest`
+
+
+def state_of(block: Array, mode: Integers) -> State:
+    """A state whose numbers are parts of a block (STATE_NUMBERS,)."""
+    return State(block[:8], mode, block[8:14], block[14:17], block[17:])
 
 
 class Order(NamedTuple):
@@ -53,7 +73,7 @@ class Settings(NamedTuple):
     tolerance: float  # first neglected Taylor term, relative to the impact
     one: Order  # of a step with one pair in contact, unless the step is short
     both: Order  # of one with both
-    rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `scales.rate_bound`
+    rate: float  # bound on the rates at which the bodies move by themselves, 1/s, see `step_unit.rate_bound`
 
 
 class Output(NamedTuple):
@@ -62,12 +82,13 @@ class Output(NamedTuple):
     grid: Array  # (n,) ascending output times on the clock, s
     rows: Array  # (n, 6) states at them
     events: Array  # (m, 5) time s, body, Transition, u m, u' m/s
-    filled: Integers  # (6,) rows in use, see `layout.Filled`
+    filled: Integers  # (2,) rows in use, see `layout.Filled`
     work: Integers  # (4,) counters, see `layout.Work`
+    observer: Integers  # (2,) addresses of what is called after each segment and of its context; 0: nothing
 
 
 class Loop(NamedTuple):
-    """What drives a run through n intervals of constant inputs, and what it was; see `loop`."""
+    """What drives a run through n intervals of constant inputs, and what it was; see `driver.intervals`."""
 
     lengths: Array  # (n,) s
     begins: Array  # (n,) s, on the clock of the events
@@ -93,18 +114,14 @@ def new_place(tick: int = 0) -> Integers:
     return place
 
 
-class Start(NamedTuple):
-    """Workspace of `start`: coefficients of the state and of the factors of the force."""
-
-    c: Array  # (LANES (n + 1),)
-    f: Array  # (2 ROWS (n + 1),)
+FACTORS = 32  # numbers of one order in the table of factors
 
 
 class Tables(NamedTuple):
     """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
 
     The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
-    the begin of the step, and CHECK for w w, w_l w_r or the P of `growing`, as far as it is expanded.
+    the begin of the step, and CHECK for w w or w_l w_r, as far as it is expanded.
     """
 
     c: Array  # (LANES (order + 1),), with the order of `Settings.both`
@@ -112,10 +129,22 @@ class Tables(NamedTuple):
     at: Array  # (2 LANES,) values of the lanes at some s, and how far they have come
     size: Array  # (LANES,) their sums of |c_k| s^k, k >= 2
     row: Array  # (order + 1,) one polynomial
-    start: Start
+    copy: Array  # (order + 1,) another one
 
 
-NEITHER = -1  # in place of a side
+def tables_of(block: Array, order: int) -> Tables:
+    """A workspace whose tables are parts of a block (`numbers_of_tables`,), for series up to an order."""
+    f = LANES * (order + 1)
+    at = f + FACTORS * (order + 1)
+    size = at + 2 * LANES
+    row = size + LANES
+    copy = row + order + 1
+    return Tables(block[:f], block[f:at], block[at:size], block[size:row], block[row:copy], block[copy:])
+
+
+def numbers_of_tables(order: int) -> int:
+    """Length of the block of a workspace."""
+    return (LANES + FACTORS + 2) * (order + 1) + 3 * LANES
 
 
 class Step(NamedTuple):
@@ -125,7 +154,6 @@ class Step(NamedTuple):
     unit: float  # of s, such that the radius of convergence is about 1
     left: bool  # whether the left pair is in contact
     right: bool
-    growing: int  # the side whose pair comes from rest beside the other one, see `growing`; or NEITHER
 
 
 class Regime(IntEnum):
@@ -135,14 +163,6 @@ class Regime(IntEnum):
     UNDER = 1  # under-damped
     NEAR = 2  # critical or over-damped, around a rest position that is near
     OVER = 3  # over-damped, with a rest position far away or none
-
-
-class Placing(IntEnum):
-    """What tells the place of an arm after a step in contact, see `beside.placing`."""
-
-    BY_GAP = 0  # where the object is, and u
-    BY_WAY = 1  # where it was, and how far object and gap have come
-    BY_FLIGHT = 2  # its own equation
 
 
 class Flight(NamedTuple):
@@ -159,12 +179,31 @@ class Flight(NamedTuple):
     omega0_2: float  # k / m, 1/s^2
 
 
+class Flown(NamedTuple):
+    """Where a flight has come to."""
+
+    x: float  # m
+    v: float  # m/s
+    way: float  # m, with digits of its own; nan: the flight is long, it has none
+    change: float  # of the velocity, m/s, likewise
+
+
 class Flights(NamedTuple):
     """All bodies in free flight."""
 
     left: Flight
     right: Flight
     object: Flight
+
+
+class Segment(NamedTuple):
+    """A piece of the motion: what its bodies do from its begin on, and where it ends."""
+
+    kind: Kind
+    t: float  # length, s; nan: it is not known
+    s: float  # the same of a Taylor step, in its variable
+    step: Step  # whose series stand in the tables
+    flights: Flights  # of all bodies, or of the arms that touch nothing
 
 
 class Rates(NamedTuple):
@@ -230,16 +269,23 @@ class Push(NamedTuple):
 class Leaning(NamedTuple):
     """Where a pair at rest at u = 0 goes: the first derivative of u that differs from zero."""
 
-    order: float  # of it; see `rest.leaning` for what is no derivative
-    value: float  # m/s^order; > 0: pressed together, inf: by the other pair, which has only just begun
+    order: float  # of it; UNDECIDED or NEVER where there is none
+    value: float  # m/s^order; > 0: pressed together; inf: by the other pair, which only begins itself
+
+
+class Ends(NamedTuple):
+    """The first event of each pair and of the object in a segment, and how far it is known."""
+
+    left: Candidate
+    right: Candidate
+    slide: SlideCandidate
+    known: float  # s, or the variable of a Taylor step
 
 
 class Level(NamedTuple):
-    """An energy, and what its digits are relative to; and what a segment finds of both pairs."""
+    """An energy, and what its digits are relative to; and the penetrations that go with it."""
 
     value: float  # J of V
     size: float  # J, sum of the sizes of its terms
-    left: float  # m between the place of an arm and where object and u say that it is
-    right: float
     u_l: float  # m
     u_r: float

@@ -37,6 +37,7 @@ class Solution(NamedTuple):
     work: Any  # int array (k,), one for each of `Method.counters`
     status: Status
     stop: str = ""  # why and where it stopped, if the method can say more than its status
+    at_rest: float | None = None  # s, since when everything is at rest for good; None: it is not, or nobody knows
 
 
 class Method(NamedTuple):

@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.integrator import Status
-from grasp_ros.exact.jit import kernel
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import SLIVER, Work, parameters, put
 from grasp_ros.physics.layout import EPS

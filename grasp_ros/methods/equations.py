@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force
-from grasp_ros.exact.jit import kernel
-from grasp_ros.physics.layout import FORCE, LEFT, MASS, OBJECT, RIGHT, Body, Pair, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of, Pair, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
@@ -33,8 +33,8 @@ def parameters(system: System) -> Array:
     Forces and friction are not in it: the paper's grasp has none.
     """
     bodies, pairs = system.closed_loop, system.pairs
-    sides = [part for side in (LEFT, RIGHT) for part in (bodies[side, :FORCE], pairs[side])]
-    return np.concatenate([*sides, bodies[OBJECT, [MASS]]])
+    sides = [part for side in (LEFT, RIGHT) for part in (bodies[side, :Of.FORCE], pairs[side])]
+    return np.concatenate([*sides, bodies[OBJECT, [Of.MASS]]])
 
 
 @kernel

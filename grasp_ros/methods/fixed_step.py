@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
-from grasp_ros.exact.jit import allocating, kernel
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,

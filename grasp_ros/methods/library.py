@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.exact.compilation.jit import allocating
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.integrator import Status
-from grasp_ros.exact.jit import allocating
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
     CLAMPED,
@@ -26,7 +26,7 @@ from grasp_ros.methods.equations import (
     rates,
     relative,
 )
-from grasp_ros.physics.layout import DISSIPATION, LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, RIGHT, Law
 from grasp_ros.physics.model import Array
 
 TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's event is an event of both
@@ -82,7 +82,7 @@ def restarted(name: str, problem: Problem) -> Solution:
     grid, place = np.unique(problem.grid, return_inverse=True)
     t, y, row, idle, states = 0.0, problem.system.state, 0, 0, []
     mode = [int(condition(q, tuple(y), side)) for side in SIDES]
-    gaps = [_gaps(side, problem.system.pairs[side, DISSIPATION], work) for side in SIDES]
+    gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in SIDES]
     events: list[tuple[float, ...]] = []
     status: Status | None = None
     while status is None:

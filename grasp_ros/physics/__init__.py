@@ -18,7 +18,7 @@ H               hertzian               N/m^1.5    Hertzian stiffness; (6), (7)
 p               dissipation            s/m        Hunt-Crossley dissipation; (6), (7), contact needs u' >= -1/p; (10)
 V, V'           V, V_rate              J, W       the paper's Lyapunov function and its rate; (16), (18)
 V_c             V_c                    J          V with the Hertz term of every pair with u >= 0
-w, s, G         w, s, g                           regularised variables of a contact, see `series`
+w, s, G         w, s, g                           regularised variables of a contact, see `exact.contact.series`
 ==============  =====================  =========  ==========================================================
 
 The impact law is that of Hunt and Crossley (1975), with its tension cut off by (10): fw = H u^(3/2) max(0, 1 + p u')

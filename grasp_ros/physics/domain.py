@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, HERTZIAN, MASS, OBJECT, STIFFNESS
+from grasp_ros.physics.layout import EPS, OBJECT, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
@@ -71,22 +71,22 @@ class Rows:
 
     def __init__(self, bodies: Array, pairs: Array, state: Array, duration: float) -> None:
         self._bodies, self._pairs, self._duration = bodies, pairs, duration
-        self.there = bodies[..., MASS] > 0.0
-        self.mass = np.where(self.there, bodies[..., MASS], 1.0)
+        self.there = bodies[..., Of.MASS] > 0.0
+        self.mass = np.where(self.there, bodies[..., Of.MASS], 1.0)
         by_body = [0, 2, 1]  # of the columns of a state
         self.x, self.v = state[:, 0::2][:, by_body], state[:, 1::2][:, by_body]
-        self.touching = (pairs[..., HERTZIAN] > 0.0) & self.there[:, :OBJECT] & self.there[:, OBJECT:]
+        self.touching = (pairs[..., Law.HERTZIAN] > 0.0) & self.there[:, :OBJECT] & self.there[:, OBJECT:]
 
     @cached_property
     def swing(self) -> Array:
         """sqrt(k/m) of each body, (n, 3) in 1/s."""
-        return np.sqrt(self._bodies[..., STIFFNESS] / self.mass)
+        return np.sqrt(self._bodies[..., Of.STIFFNESS] / self.mass)
 
     @cached_property
     def speed(self) -> Array:
         """What each body reaches by its own spring and constant force, (n, 3) in m/s."""
-        force = self._bodies[..., FORCE] - self._bodies[..., STIFFNESS] * self.x
-        rate = np.maximum(self.swing, self._bodies[..., DAMPING] / self.mass)
+        force = self._bodies[..., Of.FORCE] - self._bodies[..., Of.STIFFNESS] * self.x
+        rate = np.maximum(self.swing, self._bodies[..., Of.DAMPING] / self.mass)
         return np.abs(self.v) + np.abs(force) / self.mass / np.maximum(rate, 1.0 / self._duration)
 
     @cached_property
@@ -103,12 +103,12 @@ class Rows:
     @cached_property
     def elastic(self) -> Array:
         """Elastic force of the pairs at the start, (n, 2) in N."""
-        return self._pairs[..., HERTZIAN] * np.maximum(-self.gap, 0.0) ** 1.5 * self.touching
+        return self._pairs[..., Law.HERTZIAN] * np.maximum(-self.gap, 0.0) ** 1.5 * self.touching
 
     @cached_property
     def pressed(self) -> Array:
         """Constant force through the pairs if all that is in contact were one rigid body there, (n, 2) in N."""
-        push = self._bodies[..., FORCE] - self._bodies[..., STIFFNESS] * self.x[:, OBJECT:]
+        push = self._bodies[..., Of.FORCE] - self._bodies[..., Of.STIFFNESS] * self.x[:, OBJECT:]
         push, mass = push.copy(), self.mass.copy()
         push[:, :OBJECT] *= self.touching
         mass[:, :OBJECT] *= self.touching
@@ -147,7 +147,7 @@ class Rows:
         A pair under the force F relaxes with the rate p F / mu, so that this counts relaxation times: p v of an impact
         at v that loses all of it, p F t / mu where F presses for a time t.
         """
-        loss = self._pairs[..., DISSIPATION]
+        loss = self._pairs[..., Law.DISSIPATION]
         outward = np.minimum(self._duration, 0.4 * loss * np.maximum(-self.gap, 0.0))  # s, it parts with 1/p
         force = self.elastic * outward + self.pressed * self._duration
         return loss * self.touching * (self.speed[:, :OBJECT] + self.speed[:, OBJECT:] + force / self.reduced)
@@ -198,8 +198,8 @@ RULES = (
          Rows.speeds),
     Rule("speed at which a pair that starts pressed in parts", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", _arms("arm.position_m"), Rows.thrown),
-    Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e9, "",
-         "it takes a fifteenth of that in Taylor steps, and a run may take 1e8", _arms("contact.dissipation_s_per_m"),
+    Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e8, "",
+         "it takes a fifteenth of that in Taylor steps, some ten seconds", _arms("contact.dissipation_s_per_m"),
          Rows.impulses),
 )
 

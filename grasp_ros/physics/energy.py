@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import DAMPING, EPS, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force, in_contact, penetration
 from grasp_ros.physics.system import COLUMN, System
 
@@ -124,13 +124,13 @@ def mechanical_level(system: System, body: int, state: Array, feedback: bool = T
 def _levels(bodies: Array, body: int, state: Array) -> tuple[Array, Array]:
     """Twice the kinetic energy and the potential of one body."""
     x, v = state[..., COLUMN[body]], state[..., COLUMN[body] + 1]
-    stiffness, force = bodies[body, STIFFNESS], bodies[body, FORCE]
+    stiffness, force = bodies[body, Of.STIFFNESS], bodies[body, Of.FORCE]
     potential: Array = np.zeros(np.shape(state)[:-1])
     if stiffness > 0.0:
         potential = stiffness * (x - force / stiffness) * (x - force / stiffness)
     elif force != 0.0:
         potential = -2.0 * force * x
-    return bodies[body, MASS] * v * v, potential
+    return bodies[body, Of.MASS] * v * v, potential
 
 
 def _mechanical(system: System, bodies: Array, state: Array) -> Array:
@@ -157,7 +157,7 @@ def _own_energy(system: System, state: Array) -> tuple[Array, Array]:
 
 def elastic_level(system: System, side: int, u: Array) -> Array:
     """Twice the elastic energy of a pair, (19): a = b = 4/5; 0 without penetration."""
-    return np.asarray(2.0 * stored_energy(system.pairs[side, HERTZIAN], np.maximum(u, 0.0)))
+    return np.asarray(2.0 * stored_energy(system.pairs[side, Law.HERTZIAN], np.maximum(u, 0.0)))
 
 
 def _place(system: System, body: int, state: Array) -> Array:
@@ -171,7 +171,7 @@ def _power(system: System, bodies: Array, state: Array, external: Array | None) 
     loss: Array = np.zeros(np.shape(state)[:-1])
     for body in system.present:
         v = state[..., COLUMN[body] + 1]
-        loss = loss + bodies[body, DAMPING] * v * v
+        loss = loss + bodies[body, Of.DAMPING] * v * v
         if body == OBJECT and system.coulomb > 0.0:
             loss = loss + system.coulomb * np.abs(v)
         if external is not None and np.any(push := external[..., body]):

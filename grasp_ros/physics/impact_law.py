@@ -3,8 +3,10 @@
     fw = H u^(3/2) (1 + p u')   if u >= 0 and u' >= -1/p, else 0     (6), (7), (10)
 
 u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function works on floats and on NumPy arrays, and
-`exact.impact` compiles the same source for the kernels: the only other statements of the law are those that prove it,
-in `verification`. `model.impact_force` puts the parts together for any u and u'.
+`exact.impact` compiles the same source for the kernels. `model.impact_force` puts the parts together for any u and u'.
+What follows from the exponent stands in four more places: powers of w in `exact.contact.series` and
+`exact.automaton.friction`, scales of an impact in `exact.contact.step_unit`, and times in `exact.automaton.begin`. The
+statements that prove the law are in `verification`.
 
 References
 ----------
@@ -21,6 +23,11 @@ import numpy as np
 def elastic_force(hertzian: Any, u: Any) -> Any:
     """H u^(3/2) in N, for u >= 0 in m. Two factors: a product of halves scales by powers of 4 without rounding."""
     return hertzian * (u * np.sqrt(u))
+
+
+def elastic_slope(hertzian: Any, u: Any) -> Any:
+    """Derivative of the elastic force by u, (3/2) H u^(1/2) in N/m, for u >= 0 in m."""
+    return 1.5 * hertzian * np.sqrt(u)
 
 
 def damping_factor(dissipation: Any, u_rate: Any) -> Any:

@@ -1,7 +1,7 @@
 """Array layouts shared by everything: one place for every index, mode, transition and status.
 
-The state y (8,) is x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r. The penetrations are carried beside the positions
-because x_l - x_o loses the digits of a shallow contact. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
+The state y (8,) is x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r. The penetrations follow from the positions, which have a low
+word each, see `exact.positions`. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
 pairs are rows LEFT, RIGHT of an array (2, 2).
 """
 
@@ -20,13 +20,72 @@ class Body(IntEnum):
 
 
 LEFT, RIGHT, OBJECT = Body
-MASS, STIFFNESS, DAMPING, FORCE = range(4)  # columns of bodies: kg, N/m, N s/m, N
-HERTZIAN, DISSIPATION = range(2)  # columns of pairs: N/m^1.5, s/m
-X_L, V_L, X_O, V_O, X_R, V_R, U_L, U_R = range(8)
-EVENT_TIME, EVENT_BODY, EVENT_KIND, EVENT_U, EVENT_RATE = range(5)  # columns of events: s, Body, Transition, m, m/s
+
+
+class Of(IntEnum):
+    """Columns of the bodies."""
+
+    MASS = 0  # kg
+    STIFFNESS = 1  # N/m
+    DAMPING = 2  # N s/m
+    FORCE = 3  # N
+
+
+class Law(IntEnum):
+    """Columns of the pairs: the impact law."""
+
+    HERTZIAN = 0  # H, N/m^1.5
+    DISSIPATION = 1  # p, s/m
+
+
+class X(IntEnum):
+    """Places of the positions in a state, m."""
+
+    L = 0
+    O = 2  # noqa: E741
+    R = 4
+
+
+class V(IntEnum):
+    """Places of the velocities, m/s."""
+
+    L = 1
+    O = 3  # noqa: E741
+    R = 5
+
+
+class U(IntEnum):
+    """Places of the penetrations, m."""
+
+    L = 6
+    R = 7
+
+
 LANES = 8  # of a table of polynomials: order k holds the coefficients k at LANES k
-TIME, CHECK = X_L, X_R  # in contact x_l and x_r follow from the others
-Z_L, Z_R = U_L, U_R  # w = sqrt(u) of a pair in contact, u of an open one
+
+
+class Lane(IntEnum):
+    """Lanes of a Taylor step in place of the positions of the arms, which follow from the others."""
+
+    TIME = 0
+    CHECK = 4  # w w, or w_l w_r
+
+
+class Z(IntEnum):
+    """Lanes of a Taylor step: w = sqrt(u) of a pair in contact, u of an open one."""
+
+    L = 6
+    R = 7
+
+
+class Entry(IntEnum):
+    """Columns of the events."""
+
+    TIME = 0  # s
+    BODY = 1
+    KIND = 2  # Transition
+    U = 3  # m
+    RATE = 4  # u', m/s
 
 
 class Pair(IntEnum):
@@ -39,6 +98,7 @@ class Pair(IntEnum):
     LEAVING = 3  # u > 0, separating, the rest of its impulse is below the tolerance
     RESTING = 4  # u = u' = 0 without force: arm and object move together
     ABSENT = 5  # a body is missing, or its contact: never any force
+    BEGINNING = 6  # u >= 0, closing: no force yet, because its impulse is below rounding
 
 
 class Slide(IntEnum):
@@ -50,13 +110,11 @@ class Slide(IntEnum):
     STUCK = 3
 
 
-class Segment(IntEnum):
-    """How a piece of the motion is known, and what its table of polynomials holds."""
+class Kind(IntEnum):
+    """How a segment of the motion is known."""
 
     FLIGHT = 0  # a closed form
     CONTACT = 1  # a Taylor step in regularised time: w = sqrt(u) of what touches
-    START = 2  # the begin of a contact: u, in powers of t^(1/4)
-    CREEP = 3  # an implicit step: u, in powers of t
 
 
 class Transition(IntEnum):
@@ -80,10 +138,10 @@ class Outcome(IntEnum):
     STALLED = 3
     ENERGY_RISES = 4
     WORK_USED = 5
-    SQUEEZED = 6  # a contact is stiff: an implicit step is cheaper
-    ENERGY_FALLS = 7
-    PENETRATES = 8
-    NO_COMMAND = 9  # a controller gave no finite number
+    ENERGY_FALLS = 6
+    PENETRATES = 7
+    NO_COMMAND = 8  # a controller gave no finite number
+    OUTSIDE = 9  # the motion has left the domain
 
 
 class Answer(IntEnum):
@@ -103,20 +161,16 @@ class Place(IntEnum):
 
 
 class Filled(IntEnum):
-    """Counters of the rows in use and of the steps for which no implicit one is tried; the observer of a run."""
+    """Counters of the rows in use."""
 
     OUTPUTS = 0
     EVENTS = 1
-    WAIT = 2  # contact steps until the next trial
-    PENALTY = 3  # their number after the last trial that failed
-    OBSERVER = 4  # address of what is called after each segment, see `exact.observer`; 0: nothing
-    CONTEXT = 5  # address of what it is called with
 
 
 class Work(IntEnum):
     """Columns of the work counters."""
 
     FLIGHTS = 0  # closed-form segments
-    CONTACT_STEPS = 1  # Taylor steps, starts and implicit steps
-    REJECTED_STEPS = 2  # Taylor steps shortened after a failed defect test, implicit ones given up
+    CONTACT_STEPS = 1  # Taylor steps
+    REJECTED_STEPS = 2  # Taylor steps shortened after a failed defect test
     ROOT_ITERATIONS = 3  # evaluations of an event function

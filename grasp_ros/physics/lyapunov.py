@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import elastic_level, mechanical_level, pairs_of
-from grasp_ros.physics.layout import HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, Contact, in_contact, penetration
 from grasp_ros.physics.system import COLUMN, System
 
@@ -59,8 +59,8 @@ def matrix(system: System, state: Array) -> Array:
     P = np.zeros((*np.shape(state)[:-1], 6, 6))
     for body in (LEFT, OBJECT, RIGHT):
         x = COLUMN[body]
-        P[..., x, x] = bodies[body, STIFFNESS]
-        P[..., x + 1, x + 1] = bodies[body, MASS]
+        P[..., x, x] = bodies[body, Of.STIFFNESS]
+        P[..., x + 1, x + 1] = bodies[body, Of.MASS]
     u_l, d_l, u_r, d_r = penetration(state)
     for side, u, d in ((LEFT, u_l, d_l), (RIGHT, u_r, d_r)):
         extra = contact_stiffness(Contact(*system.pairs[side]), u, d)
@@ -97,7 +97,7 @@ def deformation_bound(system: System, V_c: float) -> Array:
     It follows from V_c >= (4/5) H u^(5/2); infinite for a pair that cannot push.
     """
     with np.errstate(divide="ignore"):
-        return np.asarray((1.25 * V_c / system.pairs[:, HERTZIAN]) ** 0.4)
+        return np.asarray((1.25 * V_c / system.pairs[:, Law.HERTZIAN]) ** 0.4)
 
 
 def displacement_bound(system: System, V_c: float) -> Array:
@@ -107,5 +107,5 @@ def displacement_bound(system: System, V_c: float) -> Array:
     continuous feedback to 0, so that it bounds all that follows.
     """
     with np.errstate(divide="ignore"):
-        arms = np.sqrt(V_c / system.closed_loop[[LEFT, RIGHT], STIFFNESS])
+        arms = np.sqrt(V_c / system.closed_loop[[LEFT, RIGHT], Of.STIFFNESS])
     return np.array([arms[0], (arms + deformation_bound(system, V_c)).max(), arms[1]])

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import ControlLaw, feedback
-from grasp_ros.physics.layout import DAMPING, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Arm, Array, Grasp
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
@@ -79,27 +79,28 @@ class System:
         """The paper's grasp."""
         system = System(state=np.asarray(state, dtype=float))
         for side, arm in ((LEFT, grasp.left), (RIGHT, grasp.right)):
-            system.bodies[side, : FORCE] = arm.mass, arm.stiffness, arm.damping
+            system.bodies[side, : Of.FORCE] = arm.mass, arm.stiffness, arm.damping
             system.laws[side] = ControlLaw(arm.position_gain, arm.velocity_gain)
-        system.bodies[OBJECT, MASS] = grasp.object_mass
+        system.bodies[OBJECT, Of.MASS] = grasp.object_mass
         system.pairs[:] = grasp.left_contact, grasp.right_contact
         return system
 
     @property
     def present(self) -> list[int]:
         """Bodies that are there, in the order of the state."""
-        masses = self.bodies[:, MASS].tolist()  # a list is read faster, and a monitor asks often
+        masses = self.bodies[:, Of.MASS].tolist()  # a list is read faster, and a monitor asks often
         return [body for body in BODIES if masses[body] > 0.0]
 
     @property
     def absent(self) -> list[int]:
         """Bodies that are not there."""
-        return [body for body in BODIES if self.bodies[body, MASS] == 0.0]
+        masses = self.bodies[:, Of.MASS].tolist()
+        return [body for body in BODIES if masses[body] == 0.0]
 
     @property
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
-        hertzian = self.pairs[:, HERTZIAN].tolist()
+        hertzian = self.pairs[:, Law.HERTZIAN].tolist()
         return [side for side in (LEFT, RIGHT) if hertzian[side] > 0.0]
 
     @property
@@ -107,9 +108,8 @@ class System:
         """`bodies` with the continuous feedback of the controllers, (4), (5), in them."""
         bodies = self.bodies.copy()
         for side, law in self.laws.items():
-            bodies[side, STIFFNESS] += law.position_gain
-            bodies[side, DAMPING] += law.velocity_gain
-            bodies[side, FORCE] += law.position_gain * law.set_point + law.feed_forward
+            kp, kv, set_point, feed_forward = law.row[:4].tolist()
+            bodies[side, 1:] += kp, kv, kp * set_point + feed_forward
         return bodies
 
     def arm(self, side: int) -> Arm:

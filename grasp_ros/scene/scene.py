@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, MASS, OBJECT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, Grasp
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
@@ -88,7 +88,7 @@ class Scene:
             raise Refused(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
         left, right = (system.arm(side) for side in (LEFT, RIGHT))
         (hertz_l, loss_l), (hertz_r, loss_r) = system.pairs.tolist()
-        mass = float(system.bodies[OBJECT, MASS])
+        mass = float(system.bodies[OBJECT, Of.MASS])
         return Grasp(left, right, Contact(hertz_l, loss_l), Contact(hertz_r, loss_r), mass)
 
     @property

@@ -13,13 +13,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.exact.compilation.jit import COMPILED
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
-from grasp_ros.exact.jit import COMPILED
-from grasp_ros.exact.rows import Rows, integrate_rows
-from grasp_ros.exact.sight import SEEN, Seen, Wanted
+from grasp_ros.observe.ensemble import Rows, integrate_rows
+from grasp_ros.observe.observer import watch
+from grasp_ros.observe.sight import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import EVENT_BODY, EVENT_KIND, LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -168,7 +169,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
     watcher, wanted = None, wanted_by(columns)
     if wanted:
-        watcher = integrator.watch(wanted, setup.settled)
+        watcher = watch(integrator, wanted, setup.settled)
     if sampled:
         SampledLoop(scene, NO_GRID, {}, None, {}).drive(integrator)
     elif system.external:
@@ -182,7 +183,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
     growth = np.nan
     if integrator.status is Status.DONE and any(column.name == LYAPUNOV for column in columns):
         growth = exponent(system, scene.duration, setup.accuracy)
-    touched = integrator.event_table[integrator.event_table[:, EVENT_KIND] == Transition.TOUCH, EVENT_BODY]
+    touched = integrator.event_table[integrator.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     touches = np.array([(touched == side).sum() for side in (LEFT, RIGHT)], dtype=float)
     return _Row(seen, integrator.state, touches, growth, integrator.status, integrator.stop)
 

@@ -12,13 +12,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.foreign import Foreign
+from grasp_ros.exact.driver.user_controller import Foreign
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
 from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import MASS, OBJECT
+from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
@@ -41,7 +41,7 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> 
         If there is no such arm, or what is to control it cannot be called.
     """
     found = {}
-    arms = [side for side, body in SIDES.items() if scene.system.bodies[body, MASS] > 0.0]
+    arms = [side for side, body in SIDES.items() if scene.system.bodies[body, Of.MASS] > 0.0]
     for side, law in controllers.items():
         if side not in arms:
             allowed = " or ".join(arms) or "none, without an arm"

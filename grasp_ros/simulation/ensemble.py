@@ -1,7 +1,7 @@
 """Ensembles: many variants of one scene, each row a run of its own, and of each run its outcomes alone.
 
 A row gives the bits of `simulate` for the scene with its numbers: it is the same integrator, driven the same way, with
-an observer (`exact.watcher`) in place of an output grid. Rows know nothing of each other, so that they do not depend on
+an observer in place of an output grid. Rows know nothing of each other, so that they do not depend on
 threads, order or chunks. A row that a scene's rules refuse, or whose run stops, says so in a sentence.
 
 Rows are computed in chunks, which are all that memory holds beside the table: the kernels release the interpreter's

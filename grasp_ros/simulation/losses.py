@@ -11,10 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.sight import Seen, Wanted
 from grasp_ros.methods.registry import EXACT
+from grasp_ros.observe.observer import watch
+from grasp_ros.observe.sight import Seen, Wanted
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import DAMPING, FORCE, LEFT, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import SETTLED
@@ -43,7 +44,7 @@ def power_lost(system: System, state: Array) -> Losses:
     zero: Array = np.zeros(len(state))
     speed = {body: state[:, COLUMN[body] + 1] for body in system.present}
     arms = [body for body in system.present if body != OBJECT]
-    damping, loop = system.bodies[:, DAMPING], system.closed_loop[:, DAMPING]
+    damping, loop = system.bodies[:, Of.DAMPING], system.closed_loop[:, Of.DAMPING]
     dampers = sum((2.0 * damping[body] * speed[body] ** 2 for body in arms), zero)
     feedback = sum((2.0 * (loop - damping)[body] * speed[body] ** 2 for body in arms), zero)
     impacts = zero
@@ -79,7 +80,7 @@ def observed_losses(run: Trajectory, times: Array) -> Losses:
     """Energy lost until each of the times (n,) in s, from 0 on: arrays (n,). An exact run is integrated again."""
     again = Integrator(
         run.scene.system, continuous=True, accuracy=run.setting, max_events=UNLIMITED, max_work=UNLIMITED)
-    seen = again.watch(Wanted.LOSSES, SETTLED).seen
+    seen = watch(again, Wanted.LOSSES, SETTLED).seen
     lost = np.zeros((len(CAUSES), len(times)))
     for k, length in enumerate(np.diff(times).tolist(), 1):
         again.advance(length)
@@ -106,6 +107,6 @@ def losses(run: Trajectory) -> Losses:
             continue
         x = run.state[:, COLUMN[side]]
         work = 2.0 * float((run.inputs[:-1, side] * np.diff(x)).sum())
-        stored = virtual[side, STIFFNESS] * (x**2)[[0, -1]] - 2.0 * virtual[side, FORCE] * x[[0, -1]]
+        stored = virtual[side, Of.STIFFNESS] * (x**2)[[0, -1]] - 2.0 * virtual[side, Of.FORCE] * x[[0, -1]]
         taken -= work + float(stored[1] - stored[0])
     return found._replace(feedback=np.asarray(taken))

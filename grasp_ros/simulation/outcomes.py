@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.sight import Quantity, Seen, Wanted
+from grasp_ros.observe.sight import Quantity, Seen, Wanted
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import U_L, U_R, V_L, V_O, V_R, X_L, X_O, X_R
+from grasp_ros.physics.layout import U, V, X
 from grasp_ros.physics.model import Array
 
 NOTHING = Wanted(0)
@@ -74,7 +74,7 @@ def _growth(runs: Runs) -> Array:
     return runs.growth
 
 
-_PLACES = {"left": (X_L, V_L), "object": (X_O, V_O), "right": (X_R, V_R)}
+_PLACES = {"left": (X.L, V.L), "object": (X.O, V.O), "right": (X.R, V.R)}
 _SIDES = ("left", "right")
 _GROUPS: dict[str, tuple[Outcome, ...]] = {
     "settling_time": (Outcome(
@@ -92,7 +92,7 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         for q, name in zip((Quantity.IMPACT_L, Quantity.IMPACT_R), _SIDES, strict=True)),
     "peak_penetration": tuple(
         Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS, _peak(q))
-        for q, name in zip((U_L, U_R), _SIDES, strict=True)),
+        for q, name in zip((U.L, U.R), _SIDES, strict=True)),
     "energy": tuple(
         Outcome(name, "J", text, Wanted.LOSSES, _seen(place)) for name, text, place in (
             ("lost_dampers", "energy that the dampers of the arms took", Seen.DAMPERS),

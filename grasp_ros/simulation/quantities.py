@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import FORCE, Transition
+from grasp_ros.physics.layout import Of, Transition
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
@@ -26,7 +26,7 @@ def settled_distance(scene: Scene, part: float = SETTLED) -> float:
 
 def rests_at_zero(system: System) -> bool:
     """Whether the arms are regulated to 0 and nothing pushes from outside: where `settled` has a meaning."""
-    return not (system.closed_loop[:, FORCE].any() or system.external)
+    return not (system.closed_loop[:, Of.FORCE].any() or system.external)
 
 
 def last_outside(t: Array, position: Array, distance: float) -> Array:

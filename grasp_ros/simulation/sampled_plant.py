@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.foreign import Foreign
+from grasp_ros.exact.driver.user_controller import Foreign
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place
 from grasp_ros.physics.control import ControlLaw, normals_over

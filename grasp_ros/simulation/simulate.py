@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import partial
 from operator import length_hint
@@ -111,7 +112,7 @@ def simulate(
     record = None if loop is None else loop.record()
     return Trajectory(
         scene, grid[:reached], found.state, record, found.event_table, found.work, found.status, method, setting,
-        found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()},
+        found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()}, found.at_rest,
     )
 
 
@@ -125,7 +126,8 @@ def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:
 
 def _check_grid(scene: Scene, grid: Array) -> None:
     """Refuse output times that do not ascend or lie outside the horizon."""
-    if not ((grid[1:] >= grid[:-1]).all() and np.isfinite(grid[[0, -1]] if len(grid) else grid).all()):
+    first, last = (float(grid[0]), float(grid[-1])) if len(grid) else (0.0, 0.0)
+    if not (math.isfinite(first) and math.isfinite(last) and (len(grid) < 2 or (grid[1:] >= grid[:-1]).all())):
         raise Refused("grid: allowed: ascending finite times")
-    if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration):
+    if not 0.0 <= first <= last <= scene.duration:
         raise Refused(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")

@@ -72,6 +72,8 @@ class Trajectory:
         Why and where a run of `exact` stopped, with time, contact mode and state; empty if it did not.
     controllers : mapping of str to str
         Names of the controllers that acted in place of the scene's feedback, by side.
+    at_rest : float or None
+        Time in s since when everything is at rest for good, see `exact.driver.rest`; only `exact` tells.
     """
 
     scene: Scene
@@ -85,6 +87,7 @@ class Trajectory:
     setting: float = ACCURACY
     stop: str = ""
     controllers: Mapping[str, str] = field(default_factory=dict)
+    at_rest: float | None = None
 
     @property
     def sampled(self) -> bool:
@@ -181,6 +184,7 @@ class Trajectory:
                 method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
                 scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
                 controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
+                at_rest=np.inf if self.at_rest is None else self.at_rest,
             )))
 
 
@@ -194,6 +198,7 @@ FIELDS = {
     "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
     "mode": Field("<i8", ("n",)), **_TIMES, "events": Field("<f8", ("events", 5)), "work": Field("<i8", ("work",)),
     "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
+    "at_rest": Field("<f8"),
     "controllers": Field(TEXT, (2,)),
 }
 
@@ -217,6 +222,7 @@ def load(path: Path) -> Trajectory:
             scene, data["t"], data["state"], loop, data["events"], data["work"], Status[words["status"]], method.name,
             float(data["setting"]), words["stop"],
             {side: name for side, name in zip(SIDES, data["controllers"].tolist(), strict=True) if name},
+            float(data["at_rest"]) if np.isfinite(data["at_rest"]) else None,
         )
         if found.energy_of != words["energy_of"]:
             raise Refused(f"energy_of: {words['energy_of']}; allowed with these controllers: {found.energy_of}")

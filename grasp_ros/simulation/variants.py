@@ -17,23 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from grasp_ros.physics.domain import Rows, outside_rows
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import (
-    DAMPING,
-    DISSIPATION,
-    FORCE,
-    HERTZIAN,
-    LEFT,
-    MASS,
-    OBJECT,
-    RIGHT,
-    STIFFNESS,
-    V_L,
-    V_O,
-    V_R,
-    X_L,
-    X_O,
-    X_R,
-)
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, V, X
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import BY_SECTION
@@ -41,8 +25,8 @@ from grasp_ros.scene.parameter import Parameter
 
 POSITION_GAIN, VELOCITY_GAIN, SET_POINT, FEED_FORWARD = range(4)
 Place = tuple[str, int, int]  # array of `Block`, row, column
-_ARM = {"mass_kg": MASS, "stiffness_N_per_m": STIFFNESS, "damping_Ns_per_m": DAMPING}
-_PAIR = {"hertz_N_per_m1_5": HERTZIAN, "dissipation_s_per_m": DISSIPATION}
+_ARM = {"mass_kg": Of.MASS, "stiffness_N_per_m": Of.STIFFNESS, "damping_Ns_per_m": Of.DAMPING}
+_PAIR = {"hertz_N_per_m1_5": Law.HERTZIAN, "dissipation_s_per_m": Law.DISSIPATION}
 _GAIN = {"position_gain_N_per_m": POSITION_GAIN, "velocity_gain_Ns_per_m": VELOCITY_GAIN, "set_point_m": SET_POINT,
          "feed_forward_N": FEED_FORWARD}
 PLACES: dict[str, Place] = {
@@ -55,11 +39,11 @@ PLACES: dict[str, Place] = {
     for place in [(array, int(side), column)]
 } | {
     f"{section}.{key}": ("state", place, 0)
-    for section, x, v in (("left_arm", X_L, V_L), ("object", X_O, V_O), ("right_arm", X_R, V_R))
+    for section, x, v in (("left_arm", X.L, V.L), ("object", X.O, V.O), ("right_arm", X.R, V.R))
     for key, place in (("position_m", x), ("velocity_m_per_s", v))
 } | {
-    "object.mass_kg": ("bodies", int(OBJECT), MASS),
-    "object_friction.viscous_Ns_per_m": ("bodies", int(OBJECT), DAMPING),
+    "object.mass_kg": ("bodies", int(OBJECT), Of.MASS),
+    "object_friction.viscous_Ns_per_m": ("bodies", int(OBJECT), Of.DAMPING),
     "object_friction.coulomb_N": ("coulomb", 0, 0),
 }
 
@@ -79,9 +63,9 @@ class Block:
         """`bodies` with the continuous feedback in them, as `System.closed_loop` has it."""
         bodies = self.bodies.copy()
         gains, offset = self.laws[..., :SET_POINT], self.laws[..., SET_POINT]
-        bodies[:, : OBJECT, STIFFNESS] += gains[..., POSITION_GAIN]
-        bodies[:, : OBJECT, DAMPING] += gains[..., VELOCITY_GAIN]
-        bodies[:, : OBJECT, FORCE] += gains[..., POSITION_GAIN] * offset + self.laws[..., FEED_FORWARD]
+        bodies[:, : OBJECT, Of.STIFFNESS] += gains[..., POSITION_GAIN]
+        bodies[:, : OBJECT, Of.DAMPING] += gains[..., VELOCITY_GAIN]
+        bodies[:, : OBJECT, Of.FORCE] += gains[..., POSITION_GAIN] * offset + self.laws[..., FEED_FORWARD]
         return bodies
 
 
@@ -153,7 +137,7 @@ class Variants:
             if allowed.has_smallest:
                 doubt |= (column != 0.0) & (np.abs(column) < allowed.smallest)
         block = self.block()
-        doubt |= (block.closed_loop[:, : OBJECT, STIFFNESS : FORCE] < 0.0).any(axis=(1, 2))
+        doubt |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
         with np.errstate(all="ignore"):  # a row in doubt may hold any number
             doubt |= outside_rows(Rows(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
         return np.flatnonzero(doubt)

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import HERTZIAN, Transition
+from grasp_ros.physics.layout import Law, Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
@@ -79,7 +79,7 @@ def jumps(system: System, duration: float) -> list[Jump]:
     if integrator.status is not Status.DONE:
         raise RuntimeError(integrator.status.value)
     return [
-        Jump(event.time, event.side, event.u, 0.8 * float(system.pairs[event.side, HERTZIAN]) * event.u**2.5)
+        Jump(event.time, event.side, event.u, 0.8 * float(system.pairs[event.side, Law.HERTZIAN]) * event.u**2.5)
         for event in integrator.events
         if event.kind is Transition.REENTRY
     ]

@@ -31,7 +31,7 @@ from grasp_ros.verification.deadline import Deadline, deadline
 SECONDS = 10.0  # no door takes longer
 MEMORY = 4 * 2**30  # bytes that a door may ask for beyond what is there
 FEW_EVENTS, FEW_WORK = 100, 10_000  # budgets of what is done with an accepted scene
-SQUEEZED = [f"{side}_contact.dissipation_s_per_m=1e6" for side in ("left", "right")]
+SQUEEZED = [f"{side}_contact.dissipation_s_per_m=1e5" for side in ("left", "right")]
 Random = np.random.Generator
 
 

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.exact.jit import kernel
-from grasp_ros.physics.layout import LEFT, RIGHT, X_L, X_O, X_R
+from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.physics.layout import LEFT, RIGHT, X
 from grasp_ros.physics.model import Array, Grasp
 from grasp_ros.scene import Scene
 from grasp_ros.studies.peers import Answer, Contender, other_side_touches
@@ -234,11 +234,11 @@ class HeyokaGrasp:
         flight.state[:] = state
         flight.step(self._ballistic_s)
         y = flight.state.copy()
-        return y, [math.sqrt(y[X_L] - y[X_O]), math.sqrt(y[X_O] - y[X_R])]
+        return y, [math.sqrt(y[X.L] - y[X.O]), math.sqrt(y[X.O] - y[X.R])]
 
 
 def _open(state: Array, side: int) -> None:
     """Leave a gap behind a release."""
-    arm, sign = (X_L, -1.0) if side == LEFT else (X_R, 1.0)
-    if state[arm] == state[X_O]:
+    arm, sign = (X.L, -1.0) if side == LEFT else (X.R, 1.0)
+    if state[arm] == state[X.O]:
         state[arm] += sign * FIRST_GAP_M

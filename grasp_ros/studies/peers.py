@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from grasp_ros.physics.layout import LEFT, V_L, V_O, V_R, X_L, X_O, X_R
+from grasp_ros.physics.layout import LEFT, V, X
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 
@@ -42,5 +42,5 @@ class Contender(NamedTuple):
 def other_side_touches(y: Array, side: int) -> bool:
     """Whether the other side touches with this one: equal arms at rest reach the object at the same instant."""
     if side == LEFT:
-        return bool(abs(y[X_O] - y[X_R]) < TOGETHER_M and y[V_O] > y[V_R])
-    return bool(abs(y[X_L] - y[X_O]) < TOGETHER_M and y[V_L] > y[V_O])
+        return bool(abs(y[X.O] - y[X.R]) < TOGETHER_M and y[V.O] > y[V.R])
+    return bool(abs(y[X.L] - y[X.O]) < TOGETHER_M and y[V.L] > y[V.O])

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_ros import simulation
+from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.contact.series import expand_one
+from grasp_ros.exact.contact.step_order import series_order
+from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.exact.jit import kernel
-from grasp_ros.exact.orders import series_order
-from grasp_ros.exact.series import expand_one, new_tables
-from grasp_ros.physics.layout import LANES, LEFT, V_L, Z_L, Z_R, Work
+from grasp_ros.physics.layout import LANES, LEFT, V, Work, Z
 from grasp_ros.scene import Scene
 
 RUNS = 100
@@ -44,7 +45,7 @@ def profile(scene: Scene, accuracy: float) -> Profile:
     """Time the parts of a run in turn, warm."""
     grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
     order = series_order(accuracy)
-    tables, system = new_tables(order), scene.system
+    tables, system = new_workspace(order).tables, scene.system
     bodies = system.closed_loop
 
     def integrate(times: np.ndarray) -> Integrator:
@@ -79,5 +80,5 @@ def expand_often(c: Any, f: Any, bodies: Any, pairs: Any, order: int, times: int
     for _ in range(times):
         for lane in range(LANES):
             c[lane] = 0.0
-        c[Z_L], c[V_L], c[Z_R] = 0.03, 1.0, -0.1
+        c[Z.L], c[V.L], c[Z.R] = 0.03, 1.0, -0.1
         expand_one(c, f, bodies, pairs, LEFT, 0.03, order)

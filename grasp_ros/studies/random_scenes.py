@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import grasp_ros
-from grasp_ros.exact.disk import sources_digest
+from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.scene.versions import versions
 from grasp_ros.studies.document import prose, table, write
 from grasp_ros.studies.records import Journal, digest
@@ -40,7 +40,7 @@ class Kept:
         home = Path(grasp_ros.__file__).parent
         sources = (path.read_text("utf-8") for room in ROOMS for path in sorted((home / room).rglob("*.py")))
         self._journal = Journal(directory)
-        self._name = digest(seed, sources_digest(home / "exact"), *sources, *versions().items())
+        self._name = digest(seed, sources_digest(), *sources, *versions().items())
 
     def _key(self, numbers: range) -> str:
         return f"{self._name} {numbers.start} {numbers.stop}"

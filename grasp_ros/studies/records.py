@@ -13,8 +13,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
-from grasp_ros import methods
-from grasp_ros.exact.disk import sources_digest
+from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import decoding, read_text, writing
@@ -97,7 +96,7 @@ def origin(family: str) -> str:
     """What a family's times depend on: machine, versions, and the sources of what this package adds to it."""
     machine = describe_machine()
     package = machine.get(ADAPTED.get(family, family), "")
-    own = sources_digest(Path(methods.__file__).parent) if family in ("grasp_ros", "scipy") else ""
+    own = sources_digest() if family in ("grasp_ros", "scipy") else ""
     return digest(machine["system"], machine["cpu"], machine["python"], machine["numba"], family, package, own)
 
 

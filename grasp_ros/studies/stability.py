@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.control import ControlLaw
-from grasp_ros.physics.layout import FORCE, LEFT, V_L, X_L
+from grasp_ros.physics.layout import LEFT, Of, V, X
 from grasp_ros.physics.model import Arm, Array
 from grasp_ros.physics.sampled import spectral_radii, spectral_radius
 from grasp_ros.physics.system import System
@@ -45,14 +45,14 @@ def first_limit(arm: Arm, delay: int) -> float:
 def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) -> float:
     """Growth per period of an arm alone in the plant's own simulation, from the second half of the run."""
     system = System(delay=delay, laws={LEFT: ControlLaw(arm.position_gain, arm.velocity_gain)})
-    system.bodies[LEFT, :FORCE] = arm.mass, arm.stiffness, arm.damping
-    system.state[X_L] = 1e-150  # room to grow
+    system.bodies[LEFT, :Of.FORCE] = arm.mass, arm.stiffness, arm.damping
+    system.state[X.L] = 1e-150  # room to grow
     plant = SampledPlant(system, period * NANOSECONDS)
     sizes = []
     for tick in range(ticks):
         state = plant.state
-        speed = math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * state[X_L]
-        sizes.append(math.hypot(speed, state[V_L]))
+        speed = math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * state[X.L]
+        sizes.append(math.hypot(speed, state[V.L]))
         plant.step(system.commands(tick, state))
     half = ticks // 2
     window = ticks // 8  # maxima over a window: the phase of the oscillation drops out

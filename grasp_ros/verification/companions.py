@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import EPS, FORCE, LEFT, MASS, OBJECT, RIGHT, Work
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Of, Work
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -72,7 +72,7 @@ def short_periods(run: Trajectory, product: Product) -> Iterator[tuple[str, floa
     if run.scene.sampled or system.external or not system.laws:
         return
     feedback = max(
-        _rate(system.bodies[side, MASS], law.position_gain, law.velocity_gain) for side, law in system.laws.items()
+        _rate(system.bodies[side, Of.MASS], law.position_gain, law.velocity_gain) for side, law in system.laws.items()
     )
     left = _left_of_distance(run, product, feedback)
     if left is not None and left > FALLS:
@@ -112,7 +112,7 @@ def _left_of_distance(run: Trajectory, product: Product, rate: float) -> float |
 def _cancelled(run: Trajectory) -> float:
     """Speed in m/s that roundings of a feedback around its set-point bring, or of impacts that balance each other."""
     system, speed = run.scene.system, 0.0
-    mass, duration = system.bodies[:, MASS], run.scene.duration
+    mass, duration = system.bodies[:, Of.MASS], run.scene.duration
     depths, rates = _deepest(run), np.abs(np.nan_to_num(penetration(run.state)[1::2])).max(axis=1)
     for side in system.contacts:
         (hertzian, loss), depth, rate = system.pairs[side], depths[side], rates[side]
@@ -140,7 +140,7 @@ def _fastest_rate(run: Trajectory) -> float:
     """Of the bodies by themselves, and of the impacts as deep as the ends or the events bring them, in 1/s."""
     system = run.scene.system
     bodies = system.bodies[system.present]
-    mass, fastest = bodies[:, MASS], [_rate(*row) for row in bodies[:, :FORCE].tolist()]
+    mass, fastest = bodies[:, Of.MASS], [_rate(*row) for row in bodies[:, :Of.FORCE].tolist()]
     depths = _deepest(run)
     for side in system.contacts:
         (hertzian, loss), speed = system.pairs[side], np.abs(run.event_table[:, 4]).max(initial=0.0)

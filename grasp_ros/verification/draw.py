@@ -63,7 +63,7 @@ def draw_ordinary(draw: Draw) -> Scene:
         }
         sections[f"{side}_feedback"] = {"position_gain_N_per_m": gain, "velocity_gain_Ns_per_m": velocity}
         sections[f"{side}_contact"] = {
-            "hertz_N_per_m1_5": draw.decades(0.0, 10.0), "dissipation_s_per_m": draw.decades(-4.0, 6.0, zero=0.2),
+            "hertz_N_per_m1_5": draw.decades(0.0, 10.0), "dissipation_s_per_m": draw.decades(-4.0, 3.0, zero=0.2),
         }
         slowest = max(slowest, math.sqrt((stiffness + gain) / mass))
     sections["object"] = {

@@ -18,6 +18,7 @@ from gmpy2 import mpfr
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.domain import LARGEST_POSITION
 from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -31,7 +32,7 @@ DIGITS = 25
 STEPS = 2_500  # of the reference; where it needs more the answer ends earlier
 HALVINGS, PARTS = 16, 16  # of the horizon, where it may end
 FORGOTTEN = 1e6  # amplification beyond which a comparison tells little
-LARGE = 1e300  # m, m/s: beyond, the motion outgrows doubles
+LARGE = LARGEST_POSITION  # m or m/s: where a run ends
 DRAWS, TRIES, DRAWN_DIGITS = 2, 50, 20  # of the amplification
 LIMIT = 100.0  # roundings that are right
 TIMES = {"start_s", "length_s", "time_s"}  # must stay whole control periods
@@ -45,7 +46,7 @@ class Answer(NamedTuple):
     state: list[list[str]]  # x_l, v_l, x_o, v_o, x_r, v_r in m and m/s with DIGITS digits; 0 of what is not there
     amplification: list[float]  # what one rounding of each number of the scene has become, in roundings of the state
     events: int
-    status: str = Status.DONE.name  # NOT_FINITE: the motion outgrows doubles, and the times end before
+    status: str = Status.DONE.name  # OUTSIDE: the motion leaves the domain, and the times end before
 
 
 class Verdict(NamedTuple):
@@ -88,7 +89,7 @@ def answer(scene: Scene) -> Answer:
     last = max((k for k, value in enumerate(amplification) if value <= FORGOTTEN), default=0)
     middle = max((k for k in range(last) if times[k] <= times[last] / 2), default=last)
     kept = sorted({middle, last})
-    status = Status.DONE if len(small) == len(right.state) else Status.NOT_FINITE
+    status = Status.DONE if len(small) == len(right.state) else Status.OUTSIDE
     rows = [[_text(a) for a in small[k]] for k in kept]
     return Answer([times[k] for k in kept], rows, [amplification[k] for k in kept], len(right.events), status.name)
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.impact_law import elastic_force, stored_energy
-from grasp_ros.physics.layout import DISSIPATION, EPS, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.verification.roundings import (
     TINY,
@@ -122,7 +122,7 @@ def _momentum(detail: Detail, size: Sizes) -> tuple[Array, Array, Array]:
 def _friction(detail: Detail, pairs: list[Impacts]) -> tuple[Array, Array]:
     """Between which impulses (k,) in N s dry friction lies; its sign is that of a velocity beyond rounding."""
     limit, v = detail.run.scene.system.coulomb, detail.v[:, 1:-1, OBJECT]
-    mass, force = detail.bodies[:, OBJECT, MASS], np.abs(detail.bodies[:, OBJECT, FORCE])
+    mass, force = detail.bodies[:, OBJECT, Of.MASS], np.abs(detail.bodies[:, OBJECT, Of.FORCE])
     gained = (force + limit) * elapsed(detail)[:, 0, 0] + sum(pair.bounce[:, 0] for pair in pairs)
     noise = (EPS * gained / np.where(mass > 0.0, mass, 1.0))[:, None]
     span, turns = limit * (detail.pieces.end - detail.pieces.begin), _turns(detail)
@@ -225,7 +225,7 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
     fastest = np.abs(v).max(axis=(1, 2))  # at a touch x of the arm follows x_o
     power = power + np.where(detail.pieces.kind != INNER, fastest * held.max(axis=(1, 2)), 0.0)
     for pair in pairs:
-        hertzian = detail.run.scene.system.pairs[pair.side, HERTZIAN]
+        hertzian = detail.run.scene.system.pairs[pair.side, Law.HERTZIAN]
         deep = np.maximum(pair.u[:, [0, -1]], 0.0)
         stored = stored_energy(hertzian, deep)
         level = level + stored[:, 1] - stored[:, 0]
@@ -248,7 +248,7 @@ def _energy(detail: Detail, size: Sizes, pairs: list[Impacts], resolved: NDArray
 
 def _loss_noise(detail: Detail, pair: Impacts) -> Array:
     """What noise of u and u' makes of the loss in a contact, in J by EPS."""
-    p = detail.run.scene.system.pairs[pair.side, DISSIPATION]
+    p = detail.run.scene.system.pairs[pair.side, Law.DISSIPATION]
     rate = np.abs(pair.d) * (pair.by_u * pair.noise + pair.by_d * pair.noise_d)
     rate = rate + np.abs(pair.force) * (pair.noise_d + 0.0 * p)
     return _total(detail, rate) / EPS

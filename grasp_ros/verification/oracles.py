@@ -14,7 +14,7 @@ import numpy as np
 from mpmath import mp, mpf
 
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import LEFT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
 
@@ -232,9 +232,9 @@ def balance(system: System, duration: float, events: Sequence[float], solve: Cal
     farthest, fastest = float(np.abs(at_edges[:, places]).max()), float(np.abs(at_edges[:, speeds]).max())
     for body in system.present:
         place = at_edges[:, COLUMN[body]], at_edges[:, COLUMN[body] + 1]
-        momentum = momentum + bodies[body, MASS] * place[1] + bodies[body, DAMPING] * place[0]
-        force = force + bodies[body, STIFFNESS] * inside[..., COLUMN[body]] - bodies[body, FORCE]
-        scale = max(scale, bodies[body, MASS] * fastest, bodies[body, DAMPING] * farthest)
+        momentum = momentum + bodies[body, Of.MASS] * place[1] + bodies[body, Of.DAMPING] * place[0]
+        force = force + bodies[body, Of.STIFFNESS] * inside[..., COLUMN[body]] - bodies[body, Of.FORCE]
+        scale = max(scale, bodies[body, Of.MASS] * fastest, bodies[body, Of.DAMPING] * farthest)
     pushed = integral(force)
     P, scale = momentum + pushed, max(scale, float(np.abs(pushed).max()))
     V_c = energy(system, at_edges).V_c
@@ -246,9 +246,9 @@ def _dissipation(system: System, y: Array) -> Array:
     """W' from the definition in O3 and not from `energy`."""
     total: Array = np.zeros(y.shape[:-1])
     for body in system.present:
-        total = total + system.closed_loop[body, DAMPING] * y[..., COLUMN[body] + 1] ** 2
+        total = total + system.closed_loop[body, Of.DAMPING] * y[..., COLUMN[body] + 1] ** 2
     u_l, d_l, u_r, d_r = penetration(y)
     for side, u, d in ((LEFT, u_l, d_l), (RIGHT, u_r, d_r)):
-        p, elastic = system.pairs[side, DISSIPATION], system.pairs[side, HERTZIAN] * np.maximum(u, 0.0) ** 1.5
+        p, elastic = system.pairs[side, Law.DISSIPATION], system.pairs[side, Law.HERTZIAN] * np.maximum(u, 0.0) ** 1.5
         total = total + np.where(1.0 + p * d >= 0.0, p * elastic * d * d, -elastic * d)
     return total

@@ -26,7 +26,7 @@ from grasp_ros.verification.roundings import DIED_OUT
 from grasp_ros.verification.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
 
 MOST_EVENTS = 2000
-MOST_WORK = 20_000  # of a run
+MOST_WORK = 100_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
 OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
@@ -88,7 +88,7 @@ def _end(run: Trajectory, product: Product) -> Check:
     error = float(run.status in (Status.STALLED, Status.ENERGY_RISES, Status.ENERGY_FALLS, Status.PENETRATES))
     if run.status is Status.STALLED:
         error = float(_smallest_at_stall(run, product) > DIED_OUT)
-    if run.status is Status.NOT_FINITE and not run.sampled:
+    if run.status is Status.NOT_FINITE or (run.status is Status.OUTSIDE and not run.sampled):
         error = 1.0
     return Check(f"ends {run.status.name}", error, 0.0)
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, EPS, FORCE, MASS, OBJECT, STIFFNESS, Pair, Slide, Transition
+from grasp_ros.physics.layout import EPS, OBJECT, Law, Of, Pair, Slide, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.verification.roundings import TINY, Impacts, impacts, push_noise, sizes
 from grasp_ros.verification.segments import Detail
@@ -56,7 +56,7 @@ def findings(detail: Detail) -> Iterator[Finding]:
 def _acceleration(detail: Detail, pairs: list[Impacts]) -> Array:
     """Sizes of the accelerations (k, n + 2, 3), the terms without their signs, in m/s^2."""
     mass, stiffness, damping, force = (np.abs(detail.bodies[:, None, :, column])
-                                       for column in (MASS, STIFFNESS, DAMPING, FORCE))
+                                       for column in (Of.MASS, Of.STIFFNESS, Of.DAMPING, Of.FORCE))
     total = stiffness * np.abs(detail.x) + damping * np.abs(detail.v) + force
     total[..., OBJECT] += detail.run.scene.system.coulomb
     for pair in pairs:
@@ -68,7 +68,7 @@ def _acceleration(detail: Detail, pairs: list[Impacts]) -> Array:
 
 def _units(detail: Detail, pair: Impacts, beside: Array, acting: Array) -> Units:
     """From sizes, times, and the rounding of the impact beside it (k, 1) in kg m/s, which moves the object as well."""
-    late, mass = EPS * detail.t, detail.bodies[:, OBJECT, MASS][:, None]
+    late, mass = EPS * detail.t, detail.bodies[:, OBJECT, Of.MASS][:, None]
     d = pair.noise_d + beside / mass + late * (acting[..., pair.side] + acting[..., OBJECT])
     return Units(pair.noise + late * np.abs(pair.d) + TINY, d + TINY)
 
@@ -109,7 +109,7 @@ def _worst(detail: Detail, body: int, modes: tuple[int, ...], errors: Callable[[
 
 
 def _pair_modes(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding]:
-    p = detail.run.scene.system.pairs[pair.side, DISSIPATION]
+    p = detail.run.scene.system.pairs[pair.side, Law.DISSIPATION]
     beyond = -1.0 / p - pair.d if p > 0.0 else np.full_like(pair.d, -np.inf)  # > 0: separating faster than 1/p
 
     def errors(mode: int) -> dict[str, Array]:
@@ -144,7 +144,7 @@ def _pair_events(detail: Detail, pair: Impacts, unit: Units) -> Iterator[Finding
     piece, hit, before = piece[seen], hit[seen], before[seen]
     if not len(hit):
         return
-    p = detail.run.scene.system.pairs[pair.side, DISSIPATION]
+    p = detail.run.scene.system.pairs[pair.side, Law.DISSIPATION]
     through_zero = np.array([kinds[k] in (Transition.TOUCH, Transition.RELEASE) for k in hit])
     depth = np.abs(pair.u[piece, 0]) / np.maximum(unit.u[piece, 0], unit.u[before].max(axis=1))
     speed = np.full_like(depth, np.inf)
@@ -157,7 +157,7 @@ def _object(detail: Detail, pairs: list[Impacts], acting: Array) -> Iterator[Fin
     """An object that sticks rests, and what pushes it is within its friction; v_o = 0 where it begins or ends."""
     limit = detail.run.scene.system.coulomb
     late = EPS * detail.t
-    held = detail.bodies[:, None, OBJECT, FORCE]
+    held = detail.bodies[:, None, OBJECT, Of.FORCE]
     push = np.repeat(held, detail.t.shape[1], axis=1)
     unit = EPS * (np.abs(held) + limit) + TINY
     for pair in pairs:

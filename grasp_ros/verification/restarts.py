@@ -13,20 +13,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import (
-    DAMPING,
-    DISSIPATION,
-    EPS,
-    EVENT_KIND,
-    EVENT_TIME,
-    FORCE,
-    LEFT,
-    MASS,
-    OBJECT,
-    RIGHT,
-    Transition,
-    Work,
-)
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Entry, Law, Of, Transition, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.simulation import Trajectory
@@ -106,15 +93,15 @@ def _beside_event(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
 def _touched(detail: Detail, pieces: slice) -> NDArray[np.bool_]:
     """Which outputs (n,) come after the first touch in these pieces."""
     events = detail.run.event_table
-    touches = events[events[:, EVENT_KIND] == Transition.TOUCH, EVENT_TIME]
+    touches = events[events[:, Entry.KIND] == Transition.TOUCH, Entry.TIME]
     first = min(touches[touches > detail.pieces.begin[pieces.start]], default=np.inf)
     return np.asarray(detail.t[pieces].ravel() >= first)
 
 
 def _slowing(bodies: Array) -> Array:
     """How fast dampers (3, 4) slow bodies down, and the object that they hit, (3,) in 1/s."""
-    mass = bodies[:, MASS]
-    found: Array = np.where(mass > 0.0, np.abs(bodies[:, DAMPING]) / np.where(mass > 0.0, mass, 1.0), 0.0)
+    mass = bodies[:, Of.MASS]
+    found: Array = np.where(mass > 0.0, np.abs(bodies[:, Of.DAMPING]) / np.where(mass > 0.0, mass, 1.0), 0.0)
     found[OBJECT] = found.max()
     return found
 
@@ -139,7 +126,7 @@ def _late(times: Array, states: Array, moving: Array) -> Array:
 
 def _noise(detail: Detail, pairs: list[Impacts], pieces: slice, offsets: Array) -> Array:
     """What roundings of the constant forces, which may balance each other, and of impacts make of states (n, 6)."""
-    mass, force = detail.bodies[pieces.start, :, MASS], np.abs(detail.bodies[pieces.start, :, FORCE])
+    mass, force = detail.bodies[pieces.start, :, Of.MASS], np.abs(detail.bodies[pieces.start, :, Of.FORCE])
     force[OBJECT] += detail.run.scene.system.coulomb
     speed = EPS * (force * offsets[:, None] / np.where(mass > 0.0, mass, 1.0)
                    + impact_speed(detail, pairs)[pieces].max(axis=0))
@@ -149,7 +136,7 @@ def _noise(detail: Detail, pairs: list[Impacts], pieces: slice, offsets: Array) 
 def _alike(detail: Detail, first: int) -> int:
     """How many pieces from the first on follow each other under the same inputs."""
     begin, end = detail.pieces.begin[first + 1 : first + AHEAD], detail.pieces.end[first : first + AHEAD - 1]
-    forces = detail.bodies[:, :, FORCE]
+    forces = detail.bodies[:, :, Of.FORCE]
     ahead = forces[first + 1 : first + AHEAD]
     broken = (begin != end[: len(begin)]) | (ahead != forces[first]).any(axis=1)
     return 1 + (int(broken.argmax()) if broken.any() else len(broken))
@@ -159,7 +146,7 @@ def _restart(detail: Detail, piece: int, state: Array, offsets: Array, product: 
     """States at offsets from the begin of a piece, from another state, under the inputs of the piece."""
     run = detail.run
     base = run.scene.system.bodies if run.sampled else run.scene.system.closed_loop
-    return _go(run, state, detail.bodies[piece, :, FORCE] - base[:, FORCE], offsets, product)
+    return _go(run, state, detail.bodies[piece, :, Of.FORCE] - base[:, Of.FORCE], offsets, product)
 
 
 def _go(run: Trajectory, state: Array, inputs: Array, offsets: Array, product: Product) -> Array:
@@ -188,7 +175,7 @@ def _end_beside_nudged(run: Trajectory, start: Array, product: Product) -> tuple
 def reversal(run: Trajectory, product: Product) -> Iterator[tuple[str, float]]:
     """A motion without losses, run backwards, ends where it began, O8."""
     system = run.scene.system
-    lossy = system.closed_loop[:, DAMPING].any() or system.pairs[:, DISSIPATION].any() or system.coulomb
+    lossy = system.closed_loop[:, Of.DAMPING].any() or system.pairs[:, Law.DISSIPATION].any() or system.coulomb
     if lossy or run.sampled or system.external:
         return
     begin, unit = _end_beside_nudged(run, np.nan_to_num(run.state[-1]) * FLIP, product)

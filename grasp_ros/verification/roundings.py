@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.tolerances import REST
 from grasp_ros.physics.impact_law import stored_energy
-from grasp_ros.physics.layout import DAMPING, EPS, FORCE, LEFT, MASS, OBJECT, STIFFNESS, Work
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Of, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
 from grasp_ros.verification.segments import FIRST, INNER, Detail
@@ -79,7 +80,7 @@ def sizes(detail: Detail) -> Sizes:
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
     own = largest_in_segment(detail, np.abs(detail.x).max(axis=1, keepdims=True))
     own = largest_in_segment(detail, _with_way(detail, own))  # a touch at its end puts the arm where x_o and u say
-    touching, taken = np.zeros(len(own), dtype=bool), detail.bodies[..., DAMPING].copy()
+    touching, taken = np.zeros(len(own), dtype=bool), detail.bodies[..., Of.DAMPING].copy()
     for side in detail.run.scene.system.contacts:
         hertzian, loss = detail.run.scene.system.pairs[side]
         u = ((1.0 if side == LEFT else -1.0) * (detail.x[..., side] - detail.x[..., OBJECT])).max(axis=1)
@@ -95,7 +96,21 @@ def sizes(detail: Detail) -> Sizes:
     v = _before_decay(detail, np.abs(detail.v).max(axis=1), np.where(touching[:, None], taken, 0.0))[:, None]
     way = _with_way(detail, v + np.minimum(swing, gained))
     v = way + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
-    return Sizes(own + DIED_OUT / EPS, v + DIED_OUT / EPS)
+    x_rest, v_rest = _at_rest(detail)
+    return Sizes(own + x_rest / EPS, v + v_rest / EPS)
+
+
+def _at_rest(detail: Detail) -> tuple[Array, Array]:
+    """Changes of position and velocity, (k, 1, 3), with which a piece may come to rest, see `exact.driver.rest`."""
+    x, v = np.nan_to_num(np.abs(detail.x)), np.nan_to_num(np.abs(detail.v))
+    mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
+    finite = np.where(np.isfinite(mass) & (mass > 0.0), mass, 1.0)
+    with np.errstate(over="ignore"):
+        energy = (finite * v * v + np.abs(stiffness) * x * x + 2.0 * np.abs(force) * x).sum(axis=-1).max(initial=0.0)
+    slow = REST * np.sqrt(energy / finite)
+    rests = v.max(axis=1, keepdims=True) <= slow
+    far = REST * float(x.max(initial=0.0))
+    return np.where(rests, far, 0.0) + DIED_OUT, np.where(rests, slow, 0.0) + DIED_OUT
 
 
 def _before_decay(detail: Detail, v: Array, taken: Array) -> Array:
@@ -104,7 +119,7 @@ def _before_decay(detail: Detail, v: Array, taken: Array) -> Array:
     A series in time goes so far in one step, with the roundings of its begin. `taken`: N s/m, (k, 3), by dampers and
     by the dissipation of what is pressed.
     """
-    pieces, mass, found = detail.pieces, detail.bodies[..., MASS], v.copy()
+    pieces, mass, found = detail.pieces, detail.bodies[..., Of.MASS], v.copy()
     damped = taken * elapsed(detail)[:, 0] > mass
     for body in np.flatnonzero(damped.any(axis=0)).tolist():
         last = np.flatnonzero(damped[:, body])
@@ -131,7 +146,7 @@ def _with_way(detail: Detail, own: Array) -> Array:
 def accelerations(detail: Detail, pairs: list[Impacts]) -> Array:
     """Sizes of the accelerations (k, n + 2, 3) in m/s^2, from the model; of dry friction no more than its limit."""
     mass, stiffness, damping, force = (detail.bodies[:, None, :, column]
-                                       for column in (MASS, STIFFNESS, DAMPING, FORCE))
+                                       for column in (Of.MASS, Of.STIFFNESS, Of.DAMPING, Of.FORCE))
     total = force - stiffness * detail.x - damping * detail.v
     for pair in pairs:
         push = pair.force if pair.side == LEFT else -pair.force
@@ -149,14 +164,14 @@ def impact_speed(detail: Detail, pairs: list[Impacts]) -> Array:
     for pair in pairs:
         momentum[:, pair.side] += pair.bounce[:, 0]
         momentum[:, OBJECT] += pair.bounce[:, 0]
-    mass = detail.bodies[..., MASS]
+    mass = detail.bodies[..., Of.MASS]
     found: Array = momentum / np.where(mass > 0.0, mass, 1.0)
     return found
 
 
 def push_noise(detail: Detail, pairs: list[Impacts]) -> Array:
     """Speed (k,) in m/s that the roundings of the impacts give to the object from the begin of its segment on."""
-    mass, pieces = detail.bodies[:, OBJECT, MASS], detail.pieces
+    mass, pieces = detail.bodies[:, OBJECT, Of.MASS], detail.pieces
     gained = force_noise(detail, pairs) * (pieces.end - pieces.begin) / np.where(mass > 0.0, mass, 1.0)
     total = np.cumsum(gained)
     _, first, of = np.unique(pieces.segment, return_index=True, return_inverse=True)
@@ -191,7 +206,7 @@ def impacts(detail: Detail, size: Sizes) -> list[Impacts]:
 
 def _handed_on(detail: Detail, pair: Impacts) -> Array:
     """Roundings of u' of a pair that the object has, (k, 1) in m/s: as far as it follows that pair's dissipation."""
-    rate = pair.by_d.max(axis=1, keepdims=True) / detail.bodies[:, None, OBJECT, MASS]
+    rate = pair.by_d.max(axis=1, keepdims=True) / detail.bodies[:, None, OBJECT, Of.MASS]
     found: Array = pair.noise_d * np.minimum(1.0, rate * elapsed(detail)[:, 0])
     return found
 
@@ -210,7 +225,7 @@ def _impact(detail: Detail, size: Sizes, side: int) -> Impacts:
     by_u = 1.5 * slope * (np.maximum(damped, 0.0) + doubt)
     by_d = np.where(damped >= -MANY * doubt, contact.dissipation * near * slope, 0.0)
     loss = np.where(damped >= 0.0, contact.dissipation * elastic * d * d, elastic * -d)
-    masses = detail.bodies[:, side, MASS], detail.bodies[:, OBJECT, MASS]
+    masses = detail.bodies[:, side, Of.MASS], detail.bodies[:, OBJECT, Of.MASS]
     mu = masses[0] * masses[1] / (masses[0] + masses[1])
     late, fastest = EPS * detail.pieces.end, np.abs(d).max(axis=1)
     touches = (u + noise).max(axis=1) > -late * fastest

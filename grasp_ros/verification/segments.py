@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.physics.layout import EPS, FORCE, LEFT, OBJECT, RIGHT
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
@@ -162,10 +162,10 @@ def detail(run: Trajectory, pieces: Pieces, table: Rule, grid: Array) -> Detail:
     bodies = system.bodies if run.sampled else system.closed_loop
     acting: Array = np.repeat(bodies[None], len(pieces.begin), axis=0)
     if run.sampled:
-        acting[..., FORCE] += run.inputs[: grid.size : grid.shape[1]]
+        acting[..., Of.FORCE] += run.inputs[: grid.size : grid.shape[1]]
     elif system.external:
         ticks = tick_of(run.scene, 0.5 * (pieces.begin + pieces.end)).tolist()
-        acting[..., FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
+        acting[..., Of.FORCE] += np.array([system.external_at(tick) for tick in ticks]).reshape(-1, 3)
     places = np.array(PLACES)
     weights = np.array([table.weights, *table.coarse])[:, pieces.kind] * (pieces.end - pieces.begin)[:, None]
     return Detail(run, pieces, weights, grid, states[..., places], states[..., places + 1], acting)

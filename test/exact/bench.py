@@ -2,36 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.contact.step_order import higher_order
+from grasp_ros.exact.contact.step_unit import new_settings
+from grasp_ros.exact.driver.advance import advance
+from grasp_ros.exact.driver.outputs import SPARE
+from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.kinematics import other
-from grasp_ros.exact.orders import higher_order
-from grasp_ros.exact.outputs import SPARE
-from grasp_ros.exact.records import Array, Output, Plant, Settings, State
-from grasp_ros.exact.scales import new_settings
+from grasp_ros.exact.records import (
+    COULOMB,
+    PLANT_NUMBERS,
+    STATE_NUMBERS,
+    Array,
+    Loop,
+    Output,
+    Plant,
+    Settings,
+    State,
+    new_place,
+    plant_of,
+    state_of,
+)
 from grasp_ros.physics.layout import (
-    DISSIPATION,
-    EVENT_BODY,
-    EVENT_KIND,
-    EVENT_RATE,
-    EVENT_U,
-    FORCE,
-    HERTZIAN,
     LEFT,
-    MASS,
     OBJECT,
-    STIFFNESS,
-    U_L,
-    V_O,
-    X_O,
     Body,
+    Entry,
     Filled,
+    Law,
+    Of,
+    Outcome,
     Pair,
     Slide,
     Transition,
+    U,
+    V,
     Work,
+    X,
 )
 from grasp_ros.physics.system import COLUMN
 
@@ -60,13 +71,18 @@ class Bench(NamedTuple):
     def events(self) -> list[tuple[Body, Transition]]:
         """What was recorded: who and what."""
         rows = self.out.events[: self.out.filled[Filled.EVENTS]]
-        return [(Body(int(row[EVENT_BODY])), Transition(int(row[EVENT_KIND]))) for row in rows]
+        return [(Body(int(row[Entry.BODY])), Transition(int(row[Entry.KIND]))) for row in rows]
 
     @property
     def recorded_motion(self) -> list[tuple[float, float]]:
         """u and u' of the recorded events."""
         rows = self.out.events[: self.out.filled[Filled.EVENTS]]
-        return [(row[EVENT_U], row[EVENT_RATE]) for row in rows.tolist()]
+        return [(row[Entry.U], row[Entry.RATE]) for row in rows.tolist()]
+
+    @property
+    def times(self) -> list[float]:
+        """When, s."""
+        return [float(time) for time in self.out.events[: self.out.filled[Filled.EVENTS], Entry.TIME]]
 
 
 def bench(
@@ -83,23 +99,40 @@ def bench(
     sign = 1.0 if side == LEFT else -1.0
     far = other(side)
     given = np.zeros((3, 4))
-    given[:, MASS] = 1.0
-    given[side, STIFFNESS] = stiffness
-    given[[side, OBJECT, far], FORCE] = sign * push, sign * object_push, sign * beside_push
+    given[:, Of.MASS] = 1.0
+    given[side, Of.STIFFNESS] = stiffness
+    given[[side, OBJECT, far], Of.FORCE] = sign * push, sign * object_push, sign * beside_push
     pairs = np.zeros((2, 2))
-    pairs[:, HERTZIAN], pairs[:, DISSIPATION] = 1e4, p
+    pairs[:, Law.HERTZIAN], pairs[:, Law.DISSIPATION] = 1e4, p
     y = np.zeros(8)
     for body, (depth, rate), towards in ((side, (u, d), sign), (far, beside, -sign)):
         y[COLUMN[body]], y[COLUMN[body] + 1] = towards * depth, towards * rate + sign * object_speed
-        y[U_L + body] = depth
-    y[X_O], y[V_O] = 0.0, sign * object_speed
+        y[U.L + body] = depth
+    y[X.O], y[V.O] = 0.0, sign * object_speed
     modes = np.zeros(3, dtype=np.int64)
     modes[[side, far, OBJECT]] = mode, beside_mode, slide
-    plant = Plant(given, given.copy(), pairs, coulomb)
-    out = Output(np.zeros(0), np.zeros((0, 6)), np.zeros((SPARE, 5)), np.zeros(len(Filled), dtype=np.int64),
-                 np.zeros(len(Work), dtype=np.int64))
+    plant = Plant(given, given.copy(), pairs, coulomb, given[:, Of.FORCE].copy())
+    out = Output(np.zeros(0), np.zeros((0, 6)), np.zeros((8 * SPARE, 5)), np.zeros(len(Filled), dtype=np.int64),
+                 np.zeros(len(Work), dtype=np.int64), np.zeros(2, dtype=np.int64))
     settings = new_settings(TOLERANCE, higher_order(ORDER), given)
-    return Bench(plant, State(y, modes, np.zeros(8), np.array([time, 0.0, 0.0])), settings, out)
+    return Bench(plant, State(y, modes, np.zeros(6), np.array([time, 0.0, 0.0]), np.zeros(3)), settings, out)
+
+
+def drive(b: Bench, duration: float, grid: Sequence[float] = ()) -> Array:
+    """Integrate for a time in s without any tick; the states at the grid."""
+    loop = Loop(np.array([duration]), np.zeros(1), np.array([0, len(grid)]), new_place())
+    rows, memory, plant_block, state_block = (
+        np.full((len(grid), 6), np.nan), new_workspace(ORDER), np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS))
+    plant, state, plant_block[COULOMB] = plant_of(plant_block), state_of(state_block, b.state.mode), b.plant.coulomb
+    plant.given[:], plant.bodies[:], plant.pairs[:] = b.plant.given, b.plant.bodies, b.plant.pairs
+    plant.own[:] = b.plant.given[:, Of.FORCE]
+    state.y[:] = b.state.y
+    outcome = advance(
+        memory.block, memory.order, plant_block, state_block, b.state.mode, TOLERANCE, 10**6,
+        np.array(grid, dtype=float), rows, b.out.events, b.out.filled, b.out.work, b.out.observer, loop)
+    b.state.y[:], b.state.low[:], b.state.clock[:] = state.y, state.low, state.clock
+    assert outcome == Outcome.DONE
+    return rows
 
 
 def bits(values: Array) -> bytes:

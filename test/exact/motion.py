@@ -11,19 +11,7 @@ import gmpy2
 from exact.bench import Bench
 from gmpy2 import mpfr
 
-from grasp_ros.physics.layout import (
-    DAMPING,
-    DISSIPATION,
-    FORCE,
-    HERTZIAN,
-    LEFT,
-    MASS,
-    OBJECT,
-    RIGHT,
-    STIFFNESS,
-    U_L,
-    Pair,
-)
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Pair, U
 
 BITS, COLUMNS = 166, 12  # 50 digits
 Rates = Callable[[list[Any]], list[Any]]
@@ -38,13 +26,13 @@ def motion_of(b: Bench) -> Rates:
     def rates(y: list[Any]) -> list[Any]:
         forces = []
         for side, (u, d) in enumerate(((y[0] - y[2], y[1] - y[3]), (y[2] - y[4], y[3] - y[5]))):
-            factor = 1 + pairs[side][DISSIPATION] * d
+            factor = 1 + pairs[side][Law.DISSIPATION] * d
             active = pushing[side] and u > 0 and factor > 0
-            forces.append(pairs[side][HERTZIAN] * u * gmpy2.sqrt(u) * factor if active else mpfr(0))
+            forces.append(pairs[side][Law.HERTZIAN] * u * gmpy2.sqrt(u) * factor if active else mpfr(0))
         found = []
         for row, x, v, f in zip(rows, y[::2], y[1::2], (-forces[0], forces[0] - forces[1], forces[1]), strict=True):
-            total = row[FORCE] - row[STIFFNESS] * x - row[DAMPING] * v + f
-            found += [v, mpfr(0) if gmpy2.is_infinite(row[MASS]) else total / row[MASS]]
+            total = row[Of.FORCE] - row[Of.STIFFNESS] * x - row[Of.DAMPING] * v + f
+            found += [v, mpfr(0) if gmpy2.is_infinite(row[Of.MASS]) else total / row[Of.MASS]]
         return found
 
     return rates
@@ -75,7 +63,7 @@ def states_at(b: Bench, times: list[float]) -> Iterator[list[Any]]:
     """x and v of left arm, object and right arm at ascending times, and u of both pairs behind them."""
     rates, y = motion_of(b), [mpfr(float(value)) for value in b.state.y[:6]]
     for side, (front, back) in ((LEFT, (0, 2)), (RIGHT, (2, 4))):  # u has digits that the positions have not
-        y[4 * side] = y[2] + (1 if side == LEFT else -1) * mpfr(float(b.state.y[U_L + side]))
+        y[4 * side] = y[2] + (1 if side == LEFT else -1) * mpfr(float(b.state.y[U.L + side]))
         assert front < back
     t = mpfr(times[0]) * mpfr("1e-9")
     y = extrapolated(rates, y, mpfr(0), t, log=False)

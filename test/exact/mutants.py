@@ -1,6 +1,6 @@
 """Mutation check of the automaton: `python test/exact/mutants.py [part of a name]`, some minutes.
 
-Deletes or negates every branch of `grasp_ros.exact.modes`, `rest`, `anew` and `surface` in turn, drops every operand of
+Deletes or negates every branch of `modes`, `resting_pair`, `begin` and `clamp_surface` in turn, drops every operand of
 an `and` or `or`, one side of every loop over both sides, and every statement that calls or stores something. A test of
 the file of the same name, test_modes.py ..., must fail for each of these mutants, but for those that do what the
 original does; they are listed with the reason. Everything runs uncompiled, each mutant in a fork.
@@ -19,8 +19,8 @@ from pathlib import Path
 os.environ["NUMBA_DISABLE_JIT"] = "1"
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-ROOM = "grasp_ros.exact"
-MODULES = ("modes", "rest", "anew", "surface")
+ROOM = "grasp_ros.exact.automaton"
+MODULES = ("modes", "resting_pair", "begin", "clamp_surface")
 EQUIVALENT: dict[str, str] = {
     "impact_beside: drop u <= 0.0: state.mode[beside] != Pair.CONTACT or u <= 0.0": "at u = 0 all terms are 0",
     **{f"make_transitions: drop {side}.when <= last: {side}.when <= last and {side}.what == Transition.CLAMP and"
@@ -116,7 +116,7 @@ def main() -> int:
     import exact.bench  # noqa: F401 - imported once, before the forks
     import pytest  # noqa: F401
 
-    from grasp_ros.exact import modes
+    from grasp_ros.exact.automaton import modes
 
     found: list[Mutant] = []
     for module in MODULES:

@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from grasp_ros.exact.bits import exponent, near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
-from grasp_ros.exact.fused import fma
-from grasp_ros.exact.jit import door
+from grasp_ros.exact.compilation.fma import fma
+from grasp_ros.exact.compilation.jit import door
+from grasp_ros.exact.numerics.powers_of_two import (
+    exponent,
+    near_exp2,
+    near_inverse,
+    near_log2,
+    orders_to_one,
+    power_of_two,
+)
 
 ALL = [1.0, 1.5, math.nextafter(2.0, 1.0), 2.0, 3e-5, 1e300, 5e-324, 2.3e-308, 1.7e308]
 

@@ -11,12 +11,13 @@ import pytest
 from mpmath import mp, mpf
 from oracles import first_touch_from_rest, flight, flight_array
 
-from grasp_ros.exact.flight import FAR, fly, launch
-from grasp_ros.exact.flight_events import first_root, pair_in_flight
-from grasp_ros.exact.flight_segment import is_far
+from grasp_ros.exact.flight.closed_form import fly, launch
+from grasp_ros.exact.flight.search import first_root, pair_in_flight
+from grasp_ros.exact.flight.segment import is_far
 from grasp_ros.exact.kinematics import bound
 from grasp_ros.exact.records import Flights, Motion, Plant, Regime
-from grasp_ros.physics.layout import LEFT, MASS, OBJECT, RIGHT, U_L, Transition, Work
+from grasp_ros.exact.tolerances import FAR
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Transition, U, Work
 
 Body = tuple[float, float, float, float]  # m, k, c, f
 CRITICAL = 2.0 * math.sqrt(15.0)
@@ -49,8 +50,8 @@ STILL: Body = (5.0, 0.0, 0.0, 0.0)
 
 def solve(body: Body, x: float, v: float, t: float) -> tuple[float, float]:
     """The kernel's position and velocity."""
-    found: tuple[float, float, float] = fly(launch(np.array(body), x, v), t)
-    return found[:2]
+    found = fly(launch(np.array(body), x, v), t)
+    return found[0], found[1]
 
 
 def root(
@@ -67,11 +68,11 @@ def root(
     x, v, x_o, v_o = at
     side = LEFT if sign > 0.0 else RIGHT
     rows, y, work = np.zeros((3, 4)), np.zeros(8), np.zeros(len(Work), dtype=np.int64)
-    rows[:, MASS] = 1.0
+    rows[:, Of.MASS] = 1.0
     rows[side], rows[OBJECT] = arm, body
     pairs = np.full((2, 2), 1.0 / inverse_p if inverse_p > 0.0 else 0.0)
     u = sign * (x - x_o)
-    y[U_L + side] = u
+    y[U.L + side] = u
     launched = [launch(rows[row], *map(float, at[2 * (row == OBJECT) :][:2])) for row in (LEFT, RIGHT, OBJECT)]
     pair = pair_in_flight.py_func(Plant(rows, rows, pairs, 0.0), y, Flights(*launched), side)
     at = Motion(x, v, x_o, v_o, u, sign * (v - v_o), abs(x) + abs(x_o))
@@ -412,7 +413,7 @@ def test_where_a_bound_says_far_the_search_needs_one_step_and_finds_nothing() ->
     far = 0
     for _ in range(2000):
         rows = np.zeros((3, 4))
-        rows[:, MASS] = 10.0 ** draw.uniform(-3.0, 3.0, 3)
+        rows[:, Of.MASS] = 10.0 ** draw.uniform(-3.0, 3.0, 3)
         rows[:, 1:3] = 10.0 ** draw.uniform(-3.0, 4.0, (3, 2)) * (draw.random((3, 2)) < 0.7)
         rows[:, 3] = draw.normal(0.0, 10.0, 3) * (draw.random(3) < 0.5)
         sign = draw.choice((-1.0, 1.0))
@@ -422,7 +423,7 @@ def test_where_a_bound_says_far_the_search_needs_one_step_and_finds_nothing() ->
         gap = span * abs(v - v_o) * draw.uniform(1.0, 1.2) if draw.random() < 0.5 else 10.0 ** draw.uniform(-9.0, 1.0)
         lane = 0 if side == LEFT else 4
         y[lane], y[lane + 1], y[2], y[3] = x_o - sign * gap, v, x_o, v_o
-        y[U_L + side] = sign * (y[lane] - x_o)
+        y[U.L + side] = sign * (y[lane] - x_o)
         if not is_far(Plant(rows, rows, np.zeros((2, 2)), 0.0), y, side, span):
             continue
         far += 1

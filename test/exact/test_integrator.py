@@ -18,10 +18,10 @@ from numba.core.registry import CPUDispatcher
 from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.hybrid import advance
+from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.numba_internals import Kernel
-from grasp_ros.exact.sight import Wanted
+from grasp_ros.observe.observer import watch
+from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.layout import Work
 from grasp_ros.physics.system import System
 from grasp_ros.simulation import ensemble, simulate
@@ -120,7 +120,7 @@ READ_ONLY.setflags(write=False)
 
 def compiled() -> dict[str, int]:
     """How often each function that Python calls has been compiled."""
-    doors = [item for item in gc.get_objects() if isinstance(item, CPUDispatcher) and not isinstance(item, Kernel)]
+    doors = [item for item in gc.get_objects() if type(item) is CPUDispatcher]
     return {f"{door.py_func.__module__}.{door.__name__}": len(door.signatures) for door in doors}
 
 
@@ -130,13 +130,13 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
     scene = scenes.load("case_01", ["time.duration_s=1"])
     ensemble(scene, {"object.mass_kg": [1.0]}, ("energy",))
     integrator = Integrator(scene.system, continuous=True)
-    integrator.watch(Wanted.LOSSES, 0.02)
+    watch(integrator, Wanted.LOSSES, 0.02)
     for name in ("exact", "rk4", "paper", "discrete_gradient"):
         simulate(scene, method=name, grid=np.zeros(1))
     known = compiled()
     for one in (1, np.float32(1.0), True):
         integrator = Integrator(scene.system, continuous=True, accuracy=np.float32(1e-6), max_work=1e8, max_events=1e6)
-        integrator.watch(Wanted.LOSSES, np.float32(0.5))
+        watch(integrator, Wanted.LOSSES, np.float32(0.5))
         integrator.advance(one, grid, start=0)
     table = ensemble(scene, {"object.mass_kg": [1, 2]}, setup=Setup(accuracy=np.float32(1e-6), max_work=1e8))
     assert table.done.all()
@@ -234,7 +234,7 @@ def test_everything_runs_uncompiled() -> None:
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("mass", [1.0, 1e-12, 1e-16, 1e-18, 1e-20, 1e-50])
+@pytest.mark.parametrize("mass", [1.0, 1e-4, 1e-8, 1e-12])
 @pytest.mark.parametrize("body", ["left_arm", "right_arm"])
 def test_outputs_of_an_arm_without_inertia_are_its_creep(mass: float, body: str) -> None:
     """The product of c/m and the time is large."""

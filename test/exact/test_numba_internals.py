@@ -15,12 +15,12 @@ from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.registry import CPUDispatcher, cpu_target
 
-from grasp_ros.exact import disk, jit
+from grasp_ros.exact.compilation import jit, kernel_cache
 
 pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 
-OURS = "from grasp_ros.exact.jit import door\n@door\ndef twice(x):\n    return 2.0 * x\n"
+OURS = "from grasp_ros.exact.compilation.jit import door\n@door\ndef twice(x):\n    return 2.0 * x\n"
 
 
 def twice(x: float) -> float:
@@ -32,17 +32,17 @@ def twice(x: float) -> float:
 def cached(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """The file of `twice` in a cache of its own."""
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    disk.cache_directory.cache_clear()
+    kernel_cache.cache_directory.cache_clear()
     jit.door(twice)(1.0)
     [path] = [path for path in tmp_path.rglob("*") if path.is_file()]
     yield path
-    disk.cache_directory.cache_clear()
+    kernel_cache.cache_directory.cache_clear()
 
 
 def answer(path: Path, content: bytes) -> tuple[float, bool]:
     """What the function answers, and whether it came from a file with this content."""
     path.write_bytes(content)
-    disk.say_damaged.cache_clear()
+    kernel_cache.say_damaged.cache_clear()
     again: Any = jit.door(twice)
     return again(21.0), bool(again.stats.cache_hits)
 
@@ -69,7 +69,7 @@ def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, capsys
 
 
 def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
-    disk.write_checked(cached, b"no code at all")
+    kernel_cache.write_checked(cached, b"no code at all")
     assert answer(cached, cached.read_bytes()) == (42.0, False)
 
 
@@ -85,7 +85,7 @@ def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
         assert all(line[0] == "42.0" for line in found)
         assert not hits or [line[1] for line in found] == ["1"] * 4
         [path] = [path for path in (tmp_path / "c").rglob("*") if path.is_file()]
-        disk.read_checked(path)
+        kernel_cache.read_checked(path)
 
 
 @pytest.mark.parametrize(

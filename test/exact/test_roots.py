@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from grasp_ros.exact.roots import first_rise, safe_step, shift
+from grasp_ros.exact.numerics.roots import first_rise, safe_step, shift
 from grasp_ros.physics.layout import Work
 
 

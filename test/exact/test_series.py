@@ -9,38 +9,20 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from grasp_ros.exact.orders import higher_order, lower_order, series_order
-from grasp_ros.exact.polynomial import curvatures, invert_time, lane_range, values
-from grasp_ros.exact.records import NEITHER, Order, Plant, Settings, Start, State, Step, Tables
-from grasp_ros.exact.scales import impact_scales, new_settings, new_step
-from grasp_ros.exact.series import expand_one, new_tables
-from grasp_ros.exact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length, pulls
-from grasp_ros.exact.taylor_step import expand as expand_step
-from grasp_ros.physics.layout import (
-    CHECK,
-    DISSIPATION,
-    HERTZIAN,
-    LANES,
-    LEFT,
-    RIGHT,
-    TIME,
-    U_L,
-    U_R,
-    V_L,
-    V_O,
-    V_R,
-    X_O,
-    Z_L,
-    Z_R,
-    Pair,
-    Slide,
-    Work,
-)
+from grasp_ros.exact.contact.series import expand_one
+from grasp_ros.exact.contact.step_order import higher_order, lower_order, series_order
+from grasp_ros.exact.contact.step_unit import impact_scales, new_settings, new_step
+from grasp_ros.exact.contact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length, pulls
+from grasp_ros.exact.contact.taylor_step import expand as expand_step
+from grasp_ros.exact.driver.workspace import new_workspace
+from grasp_ros.exact.numerics.polynomial import curvatures, invert_time, lane_range, values
+from grasp_ros.exact.records import Order, Plant, Settings, State, Step, Tables
+from grasp_ros.physics.layout import LANES, LEFT, RIGHT, Lane, Law, Pair, Slide, U, V, Work, X, Z
 from grasp_ros.physics.model import Array
 
 BODIES = np.array([[1.0, 15.0, 0.7, 0.4], [2.0, 12.0, 1.1, -0.3], [5.0, 3.0, 0.9, 0.2]])
 PAIRS = np.array([[1e2, 0.3], [3e2, 0.7]])
-LANES_OF_MOTION = [TIME, V_L, X_O, V_O, V_R, Z_L, Z_R]
+LANES_OF_MOTION = [Lane.TIME, V.L, X.O, V.O, V.R, Z.L, Z.R]
 # x_o, v_l, v_o, v_r, u_l, u_r
 START = {
     "left": (0.02, 0.9, -0.1, 0.2, 0.01, -0.3),
@@ -50,28 +32,21 @@ START = {
     "right at its touch": (0.02, 0.9, 0.1, -0.2, -0.4, 0.0),
     "both, left at its touch": (0.02, 0.9, 0.1, -0.2, 0.0, 0.02),
     "both, right at its touch": (0.02, 0.9, 0.1, -0.2, 0.01, 0.0),
-    "both, left grows": (0.02, 0.1006, 0.1, -0.6, 1e-6, 0.02),
-    "both, right grows": (0.02, 0.9, 0.1, 0.09927, 0.02, 1e-6),
 }
-ROWS = (X_O, V_L, V_O, V_R, U_L, U_R)  # of a start
-
-
-def growing(name: str) -> int:
-    """Which side grows."""
-    return NEITHER if "grows" not in name else LEFT if "left" in name else RIGHT
+ROWS = (X.O, V.L, V.O, V.R, U.L, U.R)  # of a start
 
 
 def step_of(name: str, n: int, unit: float) -> Step:
     """The step of a table of n orders."""
-    return Step(Order(n, 0.0, n), unit, *sides(name), growing(name))
+    return Step(Order(n, 0.0, n), unit, *sides(name))
 
 
 def new_start(name: str, n: int) -> Tables:
     """A workspace with order 0 of a start."""
-    tables = new_tables(n)
+    tables = new_workspace(n).tables
     tables.f[:] = np.nan  # the workspace of another step
     tables.c[list(ROWS)] = START[name]
-    for z, touching in zip((Z_L, Z_R), sides(name), strict=True):
+    for z, touching in zip((Z.L, Z.R), sides(name), strict=True):
         if touching:
             tables.c[z] = math.sqrt(tables.c[z])
     return tables
@@ -95,7 +70,7 @@ def tables_of(table: Array, value: Array | None = None, size: Array | None = Non
     """A workspace with a finished table, and what was computed from it."""
     empty = np.zeros(LANES)
     value, size = (empty if given is None else given for given in (value, size))
-    return Tables(table.ravel(), empty, value, size, empty, Start(empty, empty))
+    return Tables(table.ravel(), empty, value, size, empty, empty)
 
 
 def sides(name: str) -> tuple[bool, bool]:
@@ -115,59 +90,49 @@ def picard(name: str, n: int) -> dict[int, list[Any]]:
             total = [sum((total[i] * factor[k - i] for i in range(k + 1)), mpf(0)) for k in range(n + 1)]
         return total
 
-    def over(f: list[Any], g: list[Any]) -> list[Any]:
-        total: list[Any] = []
-        for k in range(n + 1):
-            total.append((f[k] - sum((total[i] * g[k - i] for i in range(k)), mpf(0))) / g[0])
-        return total
-
     def linear(offset: Any, *terms: tuple[Any, list[Any]]) -> list[Any]:
         total = [sum((factor * row[k] for factor, row in terms), mpf(0)) for k in range(n + 1)]
         return [total[0] + offset, *total[1:]]
 
-    (left, right), grown = sides(name), growing(name)
+    left, right = sides(name)
     bodies, pairs = (np.vectorize(mpf, otypes=[object])(table) for table in (BODIES, PAIRS))
     start = dict(zip(ROWS, (mpf(value) for value in START[name]), strict=True))
-    start[TIME] = mpf(0)
-    for row, touching in ((Z_L, left), (Z_R, right)):
+    start[Lane.TIME] = mpf(0)
+    for row, touching in ((Z.L, left), (Z.R, right)):
         if touching:
-            start[row] = mpf(math.sqrt(START[name][4 if row == Z_L else 5]))
+            start[row] = mpf(math.sqrt(START[name][4 if row == Z.L else 5]))
     z = {row: [value] + [mpf(0)] * n for row, value in start.items()}
     one, zero = [mpf(1)] + [mpf(0)] * n, [mpf(0)] * (n + 1)
     for _ in range(n + 1):
-        d_l, d_r = linear(0, (1, z[V_L]), (-1, z[V_O])), linear(0, (1, z[V_O]), (-1, z[V_R]))
-        clock = times(z[Z_L] if left else one, z[Z_R] if right else one)
-        if grown != NEITHER:
-            clock = over(times(z[Z_L + grown], z[Z_L + grown]), (d_l, d_r)[grown])
-        u_l = times(z[Z_L], z[Z_L]) if left else z[Z_L]
-        u_r = times(z[Z_R], z[Z_R]) if right else z[Z_R]
+        d_l, d_r = linear(0, (1, z[V.L]), (-1, z[V.O])), linear(0, (1, z[V.O]), (-1, z[V.R]))
+        clock = times(z[Z.L] if left else one, z[Z.R] if right else one)
+        u_l = times(z[Z.L], z[Z.L]) if left else z[Z.L]
+        u_r = times(z[Z.R], z[Z.R]) if right else z[Z.R]
         force = [zero, zero]
-        for side, w, d, touching in ((LEFT, z[Z_L], d_l, left), (RIGHT, z[Z_R], d_r, right)):
+        for side, w, d, touching in ((LEFT, z[Z.L], d_l, left), (RIGHT, z[Z.R], d_r, right)):
             if touching:
-                damped = linear(1, (pairs[side, DISSIPATION], d))
-                force[side] = linear(0, (pairs[side, HERTZIAN], times(w, w, w, damped)))
+                damped = linear(1, (pairs[side, Law.DISSIPATION], d))
+                force[side] = linear(0, (pairs[side, Law.HERTZIAN], times(w, w, w, damped)))
         m_l, k_l, c_l, f_l = bodies[0]
         m_r, k_r, c_r, f_r = bodies[1]
         m_o, k_o, c_o, f_o = bodies[2]
-        x_l, x_r = linear(0, (1, z[X_O]), (1, u_l)), linear(0, (1, z[X_O]), (-1, u_r))
+        x_l, x_r = linear(0, (1, z[X.O]), (1, u_l)), linear(0, (1, z[X.O]), (-1, u_r))
         rates = {
-            TIME: one,
-            X_O: z[V_O],
-            Z_L: d_l,
-            Z_R: d_r,
-            V_L: linear(f_l / m_l, (-k_l / m_l, x_l), (-c_l / m_l, z[V_L]), (-1 / m_l, force[0])),
-            V_O: linear(
-                f_o / m_o, (-k_o / m_o, z[X_O]), (-c_o / m_o, z[V_O]), (1 / m_o, force[0]), (-1 / m_o, force[1])
+            Lane.TIME: one,
+            X.O: z[V.O],
+            Z.L: d_l,
+            Z.R: d_r,
+            V.L: linear(f_l / m_l, (-k_l / m_l, x_l), (-c_l / m_l, z[V.L]), (-1 / m_l, force[0])),
+            V.O: linear(
+                f_o / m_o, (-k_o / m_o, z[X.O]), (-c_o / m_o, z[V.O]), (1 / m_o, force[0]), (-1 / m_o, force[1])
             ),
-            V_R: linear(f_r / m_r, (-k_r / m_r, x_r), (-c_r / m_r, z[V_R]), (1 / m_r, force[1])),
+            V.R: linear(f_r / m_r, (-k_r / m_r, x_r), (-c_r / m_r, z[V.R]), (1 / m_r, force[1])),
         }
         rates = {row: [2 * value for value in times(clock, rate)] for row, rate in rates.items()}
         if left:
-            rates[Z_L] = times(d_l, z[Z_R]) if right else d_l
+            rates[Z.L] = times(d_l, z[Z.R]) if right else d_l
         if right:
-            rates[Z_R] = times(d_r, z[Z_L]) if left else d_r
-        if grown != NEITHER:
-            rates[Z_L], rates[Z_R] = over(times(clock, d_l), z[Z_L]), over(times(clock, d_r), z[Z_R])
+            rates[Z.R] = times(d_r, z[Z.L]) if left else d_r
         for row, rate in rates.items():
             z[row] = [start[row], *(rate[k] / (k + 1) for k in range(n))]
     return z
@@ -191,45 +156,44 @@ def test_the_table_solves_its_equation(name: str) -> None:
     c = expand(name, n)
     value = at(c, s)
     rate = np.array([np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(lane)) for lane in c.T])
-    w_l, w_r = value[Z_L] if left else 1.0, value[Z_R] if right else 1.0
-    d_l, d_r = value[V_L] - value[V_O], value[V_O] - value[V_R]
-    grown = growing(name)
-    g = w_l * w_r if grown == NEITHER else (w_l**2 / d_l, w_r**2 / d_r)[grown]
+    w_l, w_r = value[Z.L] if left else 1.0, value[Z.R] if right else 1.0
+    d_l, d_r = value[V.L] - value[V.O], value[V.O] - value[V.R]
+    g = w_l * w_r
     clock = 2.0 * g
-    assert value[TIME] > 0.0
-    assert rate[TIME] == pytest.approx(clock, rel=1e-12)
-    assert value[CHECK] == pytest.approx(g if left and right else g**2, rel=1e-12)
-    assert rate[Z_L] == pytest.approx((g / w_l if left else clock) * d_l, rel=1e-12)
-    assert rate[Z_R] == pytest.approx((g / w_r if right else clock) * d_r, rel=1e-12)
-    force_l = PAIRS[LEFT, HERTZIAN] * w_l**3 * (1.0 + PAIRS[LEFT, DISSIPATION] * d_l) if left else 0.0
-    force_r = PAIRS[RIGHT, HERTZIAN] * w_r**3 * (1.0 + PAIRS[RIGHT, DISSIPATION] * d_r) if right else 0.0
-    x_o = value[X_O]
-    x_l, x_r = x_o + (w_l**2 if left else value[Z_L]), x_o - (w_r**2 if right else value[Z_R])
-    a_l = (0.4 - 15.0 * x_l - 0.7 * value[V_L] - force_l) / 1.0
-    a_r = (-0.3 - 12.0 * x_r - 1.1 * value[V_R] + force_r) / 2.0
-    a_o = (0.2 - 3.0 * x_o - 0.9 * value[V_O] + force_l - force_r) / 5.0
-    got = [rate[row] / clock for row in (V_L, V_R, V_O, X_O)]
-    assert got == pytest.approx([a_l, a_r, a_o, value[V_O]], rel=1e-11, abs=1e-12)
+    assert value[Lane.TIME] > 0.0
+    assert rate[Lane.TIME] == pytest.approx(clock, rel=1e-12)
+    assert value[Lane.CHECK] == pytest.approx(g if left and right else g**2, rel=1e-12)
+    assert rate[Z.L] == pytest.approx((g / w_l if left else clock) * d_l, rel=1e-12)
+    assert rate[Z.R] == pytest.approx((g / w_r if right else clock) * d_r, rel=1e-12)
+    force_l = PAIRS[LEFT, Law.HERTZIAN] * w_l**3 * (1.0 + PAIRS[LEFT, Law.DISSIPATION] * d_l) if left else 0.0
+    force_r = PAIRS[RIGHT, Law.HERTZIAN] * w_r**3 * (1.0 + PAIRS[RIGHT, Law.DISSIPATION] * d_r) if right else 0.0
+    x_o = value[X.O]
+    x_l, x_r = x_o + (w_l**2 if left else value[Z.L]), x_o - (w_r**2 if right else value[Z.R])
+    a_l = (0.4 - 15.0 * x_l - 0.7 * value[V.L] - force_l) / 1.0
+    a_r = (-0.3 - 12.0 * x_r - 1.1 * value[V.R] + force_r) / 2.0
+    a_o = (0.2 - 3.0 * x_o - 0.9 * value[V.O] + force_l - force_r) / 5.0
+    got = [rate[row] / clock for row in (V.L, V.R, V.O, X.O)]
+    assert got == pytest.approx([a_l, a_r, a_o, value[V.O]], rel=1e-11, abs=1e-12)
 
 
 @pytest.mark.parametrize("other", ["left", "right"])
 def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
     n, tau = 30, 0.01
     pairs = PAIRS.copy()
-    pairs[LEFT if other == "right" else RIGHT, HERTZIAN] = 0.0
+    pairs[LEFT if other == "right" else RIGHT, Law.HERTZIAN] = 0.0
     left = other == "left"
     ends = []
     for touching, high, start in (((True, True), 1.0, expand("both", n, pairs)), ((left, not left), 0.15, None)):
         if start is None:
             tables = new_start("both", n)
-            tables.c[Z_R if left else Z_L] = START["both"][5 if left else 4]
+            tables.c[Z.R if left else Z.L] = START["both"][5 if left else 4]
             expand_one(tables.c, tables.f, BODIES, PAIRS, LEFT if left else RIGHT, 1.0, n)
             start = tables.c[: LANES * (n + 1)].reshape(n + 1, LANES)
-        step = Step(Order(n, 0.0, n), 1.0, *touching, NEITHER)
-        s = invert_time(tables_of(start), step, tau, high, at(start, high)[TIME])
+        step = Step(Order(n, 0.0, n), 1.0, *touching)
+        s = invert_time(tables_of(start), step, tau, high, at(start, high)[Lane.TIME])
         end = at(start, s)
-        end[[Z_L, Z_R]] **= np.where(touching, 2, 1)
-        ends.append(end[[V_L, X_O, V_O, V_R, Z_L, Z_R]])
+        end[[Z.L, Z.R]] **= np.where(touching, 2, 1)
+        ends.append(end[[V.L, X.O, V.O, V.R, Z.L, Z.R]])
     assert ends[0] == pytest.approx(ends[1], rel=1e-12, abs=1e-14)
     assert abs(ends[0][0] - START["both"][1]) > 1e-3
 
@@ -238,8 +202,8 @@ def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
 @pytest.mark.parametrize("n", [6, 8, 12])
 def test_order_by_slope(name: str, n: int) -> None:
     best, table = expand(name, 46), expand(name, n)
-    largest = 0.24 if "both" not in name else 0.5 if "grows" in name else 1.0
-    errors = [np.abs(at(table, s) - at(best, s))[[V_L, V_O, V_R]].max() for s in (largest, largest / 4.0)]
+    largest = 0.24 if "both" not in name else 1.0
+    errors = [np.abs(at(table, s) - at(best, s))[[V.L, V.O, V.R]].max() for s in (largest, largest / 4.0)]
     slope = math.log(errors[0] / max(errors[1], 1e-17), 4.0)
     # coefficients have gaps at a touch: the next one present may be up to five orders later
     assert n + 0.2 < slope < n + 6.5
@@ -250,7 +214,8 @@ def motion(name: str) -> tuple[Plant, State]:
     x_o, v_l, v_o, v_r, u_l, u_r = START[name]
     y = np.array([x_o + u_l, v_l, x_o, v_o, x_o - u_r, v_r, u_l, u_r])
     mode = [Pair.CONTACT if touching else Pair.OPEN for touching in sides(name)]
-    return Plant(BODIES, BODIES.copy(), PAIRS, 0.0), State(y, np.array([*mode, Slide.FREE]), np.zeros(8), np.zeros(3))
+    state = State(y, np.array([*mode, Slide.FREE]), np.zeros(6), np.zeros(3), np.zeros(3))
+    return Plant(BODIES, BODIES.copy(), PAIRS, 0.0, np.zeros(3)), state
 
 
 def settings_of(tolerance: float) -> Settings:
@@ -264,7 +229,7 @@ def expanded(name: str, settings: Settings, unit: float | None = None) -> tuple[
     step = new_step(plant, state, settings, np.inf)
     if unit is not None:
         step = step._replace(unit=unit)
-    tables = new_tables(settings.one.number)
+    tables = new_workspace(settings.one.number).tables
     tables.f[:] = np.nan
     begin_series(tables, state)
     expand_step(tables, plant, step)
@@ -283,7 +248,7 @@ def test_a_step_neglects_little_of_what_moves_in_each_lane(name: str) -> None:
         table = tables.c[: LANES * (step.order.number + 1)].reshape(-1, LANES)
         best = expand(name, 60, unit=step.unit)
         moved = np.abs(best[1:6] * h ** np.arange(1, 6)[:, None]).max(axis=0)
-        moved[X_O] = max(moved[X_O], moved[TIME] * moved[V_O])
+        moved[X.O] = max(moved[X.O], moved[Lane.TIME] * moved[V.O])
         error, beyond = (np.abs(at(table, s) - at(best, s))[LANES_OF_MOTION] / moved[LANES_OF_MOTION]
                          for s in (h, 2.0 * h))
         assert error.max() <= 30.0 * tolerance
@@ -297,7 +262,6 @@ def test_a_unit_that_does_not_fit_is_replaced(name: str, orders: int) -> None:
     settings = settings_of(1e-16)
     plant, state = motion(name)
     _, fit, good = expanded(name, settings)
-    assert fit.growing == growing(name)
     tables, step, h = expanded(name, settings, math.ldexp(fit.unit, orders))
     step, h = fitted_step(tables, plant, state, settings, step, 1.0)
     h = accepted_length(tables, step, h, settings, np.zeros(len(Work), dtype=np.int64))
@@ -311,7 +275,7 @@ def test_a_step_that_is_too_long_is_shortened_without_another_expansion(name: st
     settings, work = settings_of(1e-16), np.zeros(len(Work), dtype=np.int64)
     tables, step, h = expanded(name, settings)
     order = settings.both if all(sides(name)) else settings.one
-    assert step.order == (order if growing(name) == NEITHER else order._replace(early=order.number))
+    assert step.order == order
     coefficients = tables.c.copy()
     assert accepted_length(tables, step, h, settings, work) == h
     assert work[Work.REJECTED_STEPS] == 0
@@ -329,12 +293,13 @@ def test_terms_of_a_high_order_do_not_cancel() -> None:
     plant = plant._replace(pairs=np.array([[1e2, 0.3], [3e2, 1e9]]))
     settings, terms = settings_of(1e-16), []
     for order in (settings.both, settings.both._replace(early=settings.both.number)):
-        step, tables = new_step(plant, state, settings._replace(both=order), np.inf), new_tables(settings.one.number)
+        step = new_step(plant, state, settings._replace(both=order), np.inf)
+        tables = new_workspace(settings.one.number).tables
         begin_series(tables, state)
         expand_step(tables, plant, step)
         accepted_length(tables, step, length(tables, pulls(plant, state.y), step, settings, 1.0), settings,
                         np.zeros(len(Work), dtype=np.int64))
-        terms.append(tables.size[V_R] / abs(tables.at[V_R] - tables.c[V_R]))
+        terms.append(tables.size[V.R] / abs(tables.at[V.R] - tables.c[V.R]))
     assert terms[0] < 300.0
     assert terms[1] > 10.0 * terms[0]
 
@@ -360,9 +325,9 @@ def test_scales_are_those_of_a_hertz_impact() -> None:
         assert math.frexp(w)[0] == math.frexp(v)[0] == 0.5  # powers of two: scaling a scene costs no rounding
 
 
-@pytest.mark.parametrize("orders", [-100, 100, 250, 300])
+@pytest.mark.parametrize("orders", [-100, 100])
 def test_scales_of_shallow_impacts_do_not_underflow(orders: int) -> None:
-    """O7: a length that is shorter by a power of 4 leaves all digits, also where its powers are no numbers."""
+    """O7: a length that is shorter by a power of 4 leaves all digits."""
     for u, d in ((0.3, 2.0), (0.3, 0.0), (0.0, 2.0)):
         w, v = impact_scales(100.0, 0.75, u, d)
         root, length = math.ldexp(1.0, -orders), math.ldexp(1.0, -2 * orders)
@@ -374,9 +339,9 @@ def test_time_is_inverted_to_rounding(name: str) -> None:
     unit, n = 0.25, 30
     c, high = expand(name, n, unit=unit), 0.3 if "both" in name else 0.2
     for s in (1e-9, 0.03, 0.17, high):
-        tau, total = at(c, s)[TIME], at(c, high)[TIME]
+        tau, total = at(c, s)[Lane.TIME], at(c, high)[Lane.TIME]
         found = invert_time(tables_of(c), step_of(name, n, unit), tau, high, total)
-        assert at(c, found)[TIME] == pytest.approx(tau, rel=1e-15, abs=1e-17)
+        assert at(c, found)[Lane.TIME] == pytest.approx(tau, rel=1e-15, abs=1e-17)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -407,11 +372,11 @@ def test_the_step_of_an_impact_scales_with_its_speed(speed: float, both: bool) -
     modes = np.array([Pair.CONTACT, Pair.CONTACT if both else Pair.OPEN, Slide.FREE])
     state = State(y, modes, np.zeros(8), np.zeros(3))
     plant, settings = Plant(bodies, bodies, pairs, 0.0), settings_of(1e-14)._replace(rate=0.0)
-    step, tables = new_step(plant, state, settings, np.inf), new_tables(settings.one.number)
+    step, tables = new_step(plant, state, settings, np.inf), new_workspace(settings.one.number).tables
     begin_series(tables, state)
     expand_step(tables, plant, step)
     h = length(tables, pulls(plant, y), step, settings, 1.0)
     assert 0.25 < h < 4.0
     duration = 2.9432751843247047 * depth / speed
     table = tables.c[: LANES * (step.order.number + 1)].reshape(-1, LANES)
-    assert 0.01 * duration < at(table, h)[TIME] < duration
+    assert 0.01 * duration < at(table, h)[Lane.TIME] < duration

@@ -53,9 +53,9 @@ EDGES: tuple[tuple[str, str, float, float, Sections], ...] = (  # rule, key, ins
      {"left_feedback": PUSH | {"feed_forward_N": 1e8}, "left_contact": LOSSLESS}),
     ("speed at which a pair", "left_arm.position_m", 109.0, 110.0,
      {"object": {"mass_kg": 1e-5}, "left_contact": LOSSLESS | {"hertz_N_per_m1_5": 1e10}}),
-    ("p J / mu", "left_contact.dissipation_s_per_m", 0.99e9, 1.01e9, {"object": {"velocity_m_per_s": -1.0}}),
-    ("p J / mu", "left_contact.dissipation_s_per_m", 1.57e6, 1.59e6, {"left_arm": {"position_m": 0.1}}),
-    ("p J / mu", "right_contact.dissipation_s_per_m", 3.3e8, 3.4e8,
+    ("p J / mu", "left_contact.dissipation_s_per_m", 0.99e8, 1.01e8, {"object": {"velocity_m_per_s": -1.0}}),
+    ("p J / mu", "left_contact.dissipation_s_per_m", 1.57e5, 1.59e5, {"left_arm": {"position_m": 0.1}}),
+    ("p J / mu", "right_contact.dissipation_s_per_m", 3.3e7, 3.4e7,
      {"left_feedback": PUSH | {"feed_forward_N": 1.0}, "right_feedback": PUSH | {"feed_forward_N": -1.0}}),
 )
 

@@ -42,12 +42,12 @@ STATES = {
 
 def test_layout_indexes_every_column_once() -> None:
     assert sorted((layout.LEFT, layout.RIGHT, layout.OBJECT)) == [0, 1, 2]
-    assert sorted((layout.MASS, layout.STIFFNESS, layout.DAMPING, layout.FORCE)) == [0, 1, 2, 3]
-    assert sorted((layout.HERTZIAN, layout.DISSIPATION)) == [0, 1]
-    state = (layout.X_L, layout.V_L, layout.X_O, layout.V_O, layout.X_R, layout.V_R, layout.U_L, layout.U_R)
-    assert state == tuple(range(8))
-    assert layout.U_R == layout.U_L + layout.RIGHT
-    for enum in (layout.Pair, layout.Transition, layout.Outcome, layout.Work):
+    assert sorted([*layout.X, *layout.V, *layout.U]) == list(range(8))
+    assert [layout.V[name] - layout.X[name] for name in "LOR"] == [1, 1, 1]
+    assert layout.U.R == layout.U.L + layout.RIGHT
+    assert {layout.Lane.TIME, layout.Lane.CHECK} == {layout.X.L, layout.X.R}
+    assert list(layout.Z) == list(layout.U)
+    for enum in (layout.Of, layout.Law, layout.Entry, layout.Pair, layout.Transition, layout.Outcome, layout.Work):
         assert sorted(enum) == list(range(min(enum), min(enum) + len(enum)))
 
 

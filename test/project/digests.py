@@ -2,7 +2,8 @@
 
     python test/project/digests.py > test/project/digests.json
 
-records them anew, with the versions that they depend on; `test_digests.py` compares. Do this only for a new scene or
+records them anew, with the versions that they depend on, and the last states, for machines whose last bits differ;
+`test_digests.py` compares. Do this only for a new scene or
 for a change of the numerics that the CHANGELOG names: what only moves or renames keeps every bit.
 """
 
@@ -36,14 +37,24 @@ def digest(trajectory: Trajectory) -> str:
     return found.hexdigest()
 
 
-def digests() -> dict[str, str]:
+def runs() -> dict[str, Trajectory]:
     """Of every scene, by name and kind of run."""
     return {
-        f"{name} {kind}": digest(simulate(scene.load(name), sampled=sampled))
+        f"{name} {kind}": simulate(scene.load(name), sampled=sampled)
         for name in sorted(scene.names())
         for kind, sampled in (("as written", False), ("sampled", True))
     }
 
 
+def last_state(trajectory: Trajectory) -> list[float]:
+    """Positions and velocities at the end, of the bodies that are there."""
+    state = trajectory.state[-1]
+    return [float(number) for number in state[~np.isnan(state)]]
+
+
 if __name__ == "__main__":
-    print(json.dumps({"versions": versions(), "digests": digests()}, indent=1))
+    found = runs()
+    print(json.dumps({
+        "versions": versions(), "digests": {key: digest(run) for key, run in found.items()},
+        "last states": {key: last_state(run) for key, run in found.items()},
+    }, indent=1))

@@ -266,7 +266,7 @@ sys.path.insert(0, sys.argv[1])
 import ours
 print(ours.twice(21.0))
 """
-KERNEL = "from grasp_ros.exact.jit import kernel\n@kernel\ndef twice(x):\n    return 2.0 * x\n"
+KERNEL = "from grasp_ros.exact.compilation.jit import kernel\n@kernel\ndef twice(x):\n    return 2.0 * x\n"
 
 
 def test_a_full_disk_under_the_cache_of_kernels_only_costs_time(tmp_path: Path) -> None:

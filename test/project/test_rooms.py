@@ -16,14 +16,17 @@ LINES = 300
 BELOW = {  # what the files of a room may import beside their own room
     "physics": (),
     "exact": ("physics",),
+    "observe": ("physics", "exact"),
     "scene": ("physics",),
     "methods": ("physics", "exact", "scene"),
-    "simulation": ("physics", "exact", "scene", "methods"),
-    "maps": ("physics", "exact", "scene", "simulation"),
-    "graph": ("physics", "exact", "scene", "simulation"),
-    "verification": ("physics", "exact", "scene", "simulation"),
-    "studies": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification"),
-    "cli": ("physics", "exact", "scene", "methods", "simulation", "maps", "graph", "verification", "studies"),
+    "simulation": ("physics", "exact", "observe", "scene", "methods"),
+    "maps": ("physics", "exact", "observe", "scene", "simulation"),
+    "graph": ("physics", "exact", "observe", "scene", "simulation"),
+    "verification": ("physics", "exact", "observe", "scene", "simulation"),
+    "studies": ("physics", "exact", "observe", "scene", "methods", "simulation", "maps", "graph", "verification"),
+    "cli": (
+        "physics", "exact", "observe", "scene", "methods", "simulation", "maps", "graph", "verification", "studies",
+    ),
 }
 ROOMS = tuple(BELOW)
 DRAW = (
@@ -64,7 +67,7 @@ def room_of(module: str) -> str:
 
 
 def test_the_search_finds_the_files() -> None:
-    files = {"exact/hybrid.py", "graph/nodes/plant.py", "graph/bag.py", "simulation/plots.py", "scene/scene.py"}
+    files = {"exact/driver/advance.py", "graph/nodes/plant.py", "graph/bag.py", "simulation/plots.py", "scene/scene.py"}
     assert files <= set(SOURCES)
     assert "rclpy" in tops("graph/nodes/node.py")
     assert "rosbags" in tops("graph/bag.py")
@@ -97,11 +100,11 @@ def test_each_library_has_its_place(name: str) -> None:
         assert "matplotlib" not in found
     if name != "studies/paper/page.py":
         assert "jinja2" not in found
-    if not name.startswith("exact/"):
+    if not name.startswith(("exact/", "observe/")):
         assert "numba" not in found
     if not name.startswith("verification/"):
         assert not {"gmpy2", "mpmath"} & found
-    if name.startswith(("physics/", "exact/")) and name not in ("exact/disk.py", "exact/jit.py"):
+    if name.startswith(("physics/", "exact/", "observe/")) and name != "exact/compilation/kernel_cache.py":
         assert not {"yaml", "pathlib", "time", "datetime"} & found
 
 

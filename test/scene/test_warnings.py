@@ -61,7 +61,7 @@ SENSOR = ("loop={}", "left_sensor.noise_seed=1")
         ("case_01", (*SENSOR, "left_sensor.position_noise_m=1", "left_sensor.velocity_step_m_per_s=1",
                      "left_feedback.position_gain_N_per_m=0"),
          "left_sensor.position_noise_m: 1.0 has no effect: left_feedback.position_gain_N_per_m is 0"),
-        ("case_01", ("left_arm.position_m=0.9", "right_arm.position_m=1e9"),
+        ("case_01", ("left_arm.position_m=0.9", "right_arm.position_m=1e7"),
          "left_arm.position_m: 0.9 lies 0.9 m inside"),
         ("case_01", ("left_arm.position_m=0.6",), "left_arm.position_m: 0.6 lies right of the right arm"),
         ("case_01", ("right_arm.position_m=-0.4",), "right_arm.position_m: -0.4 lies left of the left arm"),

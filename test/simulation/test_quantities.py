@@ -46,7 +46,7 @@ def test_what_is_lost_adds_up_to_what_V_c_has_fallen(name: str) -> None:
     assert (float(lost.friction) > 0.0) == (name == "friction")
 
 
-@pytest.mark.parametrize("p", [1e2, 1e4, 1e6, 1e8])
+@pytest.mark.parametrize("p", [1e2, 1e4, 1e6, 1e7])
 def test_what_is_lost_in_a_relaxation_is_not_missed(p: float) -> None:
     changes = [f"{side}_contact.dissipation_s_per_m={p}" for side in ("left", "right")]
     run = simulate(scenes.load("case_01", [*changes, "left_arm.velocity_m_per_s=1"]))
@@ -54,7 +54,7 @@ def test_what_is_lost_in_a_relaxation_is_not_missed(p: float) -> None:
     assert float(losses(run).total) == pytest.approx(level[0] - level[-1], rel=1e-11)
 
 
-@pytest.mark.parametrize("settings", [(), ("left_contact.dissipation_s_per_m=1e8", "left_arm.velocity_m_per_s=1")])
+@pytest.mark.parametrize("settings", [(), ("left_contact.dissipation_s_per_m=1e7", "left_arm.velocity_m_per_s=1")])
 def test_running_sums_follow_V_c(settings: tuple[str, ...]) -> None:
     scene = scenes.load("case_03", settings)
     t, lost = running_losses(simulate(scene))

@@ -11,11 +11,10 @@ import pytest
 from documents import case_of, scene_of
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact import control as compiled
+from grasp_ros.exact.driver import control as compiled
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics import control
 from grasp_ros.physics.control import NO_NOISE
-from grasp_ros.physics.energy import energy_balance
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
@@ -211,10 +210,8 @@ def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:
                      "left_feedback.velocity_gain_Ns_per_m=50", "left_sensor.noise_seed=1",
                      "left_sensor.velocity_step_m_per_s=1e-12")
     run = simulate(scene)
-    assert run.status is Status.NOT_FINITE
-    assert np.isfinite(run.state[:, :2]).all()
-    assert run.energy.V_c[-1] == np.inf
-    assert energy_balance(scene.system, run.state[:-1], run.state[1:], run.inputs[:-1]).alarm[-1]
+    assert run.status is Status.OUTSIDE
+    assert 1e9 < np.abs(run.state[:, :2]).max() <= 1e12
 
 
 def test_quantised_measurements_are_whole_steps() -> None:

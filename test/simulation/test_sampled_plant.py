@@ -7,7 +7,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.layout import LEFT, MASS, RIGHT
+from grasp_ros.physics.layout import LEFT, RIGHT, Of
 from grasp_ros.physics.system import ExternalForce, System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import SampledPlant, simulate
@@ -22,7 +22,7 @@ def case_01(period: float = 0.001) -> Scene:
 def free_arm(delay: int) -> System:
     """An arm of 2 kg without a spring, pushed by 10 N from tick 1 on."""
     system = System(delay=delay, external=[ExternalForce(LEFT, lambda tick: 10.0 * (tick > 0), lambda _: [1])])
-    system.bodies[LEFT, MASS] = KILOGRAMS
+    system.bodies[LEFT, Of.MASS] = KILOGRAMS
     return system
 
 

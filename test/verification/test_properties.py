@@ -14,9 +14,9 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.workspace import workspace
+from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.physics.accuracy import ACCURACY
-from grasp_ros.physics.layout import DAMPING
+from grasp_ros.physics.layout import Of
 from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.verification import fuzz, properties
@@ -62,9 +62,8 @@ def test_no_kernel_reads_what_it_has_not_written(rubbish: float) -> None:
         product = Product(properties.MOST_EVENTS, properties.MOST_WORK)
         bits = []
         for left_over in (0.0, rubbish):
-            with workspace(ACCURACY) as (tables, _):
-                for table in (*tables[:-1], *tables.start):
-                    table[...] = left_over
+            with workspace(ACCURACY) as memory:
+                memory.block[...] = left_over
             with suppress(Unfinished):
                 product.run(scene, None if scene.sampled else np.linspace(0.0, scene.duration, 50))
             bits.append((product.runs[-1].state.tobytes(), product.runs[-1].event_table.tobytes()))
@@ -81,7 +80,7 @@ def test_ordinary_scenes_cover_what_they_should() -> None:
     stiffness = [contact["hertz_N_per_m1_5"] for contact in contacts]
     assert max(stiffness) / min(stiffness) > 1e9
     assert sum("right_arm" not in scene.values for scene in drawn) > 5
-    assert sum(not scene.system.closed_loop[:, DAMPING].any() for scene in drawn) > 5
+    assert sum(not scene.system.closed_loop[:, Of.DAMPING].any() for scene in drawn) > 5
     effects = {"left_actuator", "left_sensor", "loop", "object_friction", "tilt", "object_pulse"}
     assert effects <= {section for scene in drawn for section in scene.values}
 

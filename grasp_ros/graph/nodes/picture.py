@@ -12,7 +12,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.node import GraspNode
-from grasp_ros.physics.layout import OBJECT, STIFFNESS
+from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
@@ -53,7 +53,7 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
         shown = ASIDE[name]
         pressed = name in touching or (body == OBJECT and touching)
         found.append(_box(body, time_ns, x + shown, TOUCHING if pressed else COLORS[name]))
-        if body != OBJECT and system.bodies[body, STIFFNESS] > 0.0:
+        if body != OBJECT and system.bodies[body, Of.STIFFNESS] > 0.0:
             found.append(_line(10 + body, "springs", Marker.LINE_LIST, time_ns, (shown, x + shown), COLORS[name]))
     for number, (side, force) in enumerate(forces.items()):
         sign, x = (1.0 if side == "left" else -1.0), float(state[COLUMN[OBJECT]])

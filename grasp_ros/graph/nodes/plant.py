@@ -16,7 +16,7 @@ from typing import Any
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.disk import COMPILING, kernels_on_disk
+from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.beats import digest

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.layout import DAMPING, MASS, OBJECT, STIFFNESS
+from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import SIDES, Effect, Problem, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -23,9 +23,9 @@ DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper 
 def _build(section: str, body: int, sections: Sections, system: System) -> None:
     """m x'' + c x' + k x = ..., (1) to (3)."""
     numbers = sections[section]
-    system.bodies[body, MASS] = numbers["mass_kg"]
-    system.bodies[body, STIFFNESS] = numbers.get("stiffness_N_per_m", 0.0)
-    system.bodies[body, DAMPING] = numbers.get("damping_Ns_per_m", 0.0)
+    system.bodies[body, Of.MASS] = numbers["mass_kg"]
+    system.bodies[body, Of.STIFFNESS] = numbers.get("stiffness_N_per_m", 0.0)
+    system.bodies[body, Of.DAMPING] = numbers.get("damping_Ns_per_m", 0.0)
     column = COLUMN[body]
     system.state[column : column + 2] = numbers["position_m"], numbers["velocity_m_per_s"]
 

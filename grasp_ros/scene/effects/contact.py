@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.layout import DISSIPATION, FORCE, HERTZIAN, LEFT, MASS, OBJECT, RIGHT, STIFFNESS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
 from grasp_ros.physics.model import Array, impact_force_of, penetration
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections
@@ -24,7 +24,7 @@ PARAMETERS = (
 def _build(side: str, sections: Sections, system: System) -> None:
     numbers = sections[f"{side}_contact"]
     row = system.pairs[SIDES[side]]
-    row[HERTZIAN], row[DISSIPATION] = numbers["hertz_N_per_m1_5"], numbers.get("dissipation_s_per_m", 0.0)
+    row[Law.HERTZIAN], row[Law.DISSIPATION] = numbers["hertz_N_per_m1_5"], numbers.get("dissipation_s_per_m", 0.0)
 
 
 def _force(side: int, system: System, _: int, state: Array) -> float:
@@ -51,7 +51,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
     place = sections["object"]["position_m"]
     if depth <= ROUNDING * min(1.0, max(map(abs, system.state[0::2].tolist()))):
         return
-    stored, pressing = 0.4 * system.pairs[at, HERTZIAN] * depth**2.5, _pressing(system, at, depth)
+    stored, pressing = 0.4 * system.pairs[at, Law.HERTZIAN] * depth**2.5, _pressing(system, at, depth)
     if SIDES[far] in system.contacts and 0.0 < gap < depth:
         why = f"lies {far} of the {far} arm, which does not touch the object"
         yield Oddity(key, value, why, f"each arm on its side of the object at {place!r}")
@@ -67,8 +67,8 @@ def _pressing(system: System, side: int, depth: float) -> float:
     inward = 1.0 if side == LEFT else -1.0  # for the arm
     for body, sign in ((side, inward), (OBJECT, -inward)):
         x, v = system.state[COLUMN[body] : COLUMN[body] + 2]
-        force = sign * (loop[body, FORCE] - loop[body, STIFFNESS] * x) + abs(external[body])
-        energy += 0.5 * loop[body, MASS] * v**2 + max(force, 0.0) * depth
+        force = sign * (loop[body, Of.FORCE] - loop[body, Of.STIFFNESS] * x) + abs(external[body])
+        energy += 0.5 * loop[body, Of.MASS] * v**2 + max(force, 0.0) * depth
     return float(energy)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.layout import DAMPING, OBJECT
+from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -14,7 +14,7 @@ from grasp_ros.scene.parameter import Parameter
 def _build(sections: Sections, system: System) -> None:
     """m_o x_o'' = ... - c x_o' - F sign(x_o'); at x_o' = 0 the friction balances up to F."""
     numbers = sections["object_friction"]
-    system.bodies[OBJECT, DAMPING] += numbers.get("viscous_Ns_per_m", 0.0)
+    system.bodies[OBJECT, Of.DAMPING] += numbers.get("viscous_Ns_per_m", 0.0)
     system.coulomb += numbers.get("coulomb_N", 0.0)
 
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.layout import FORCE, MASS
+from grasp_ros.physics.layout import Of
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import Effect, Oddity, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -17,7 +17,7 @@ def _build(sections: Sections, system: System) -> None:
     numbers = sections["tilt"]
     pull = numbers["gravity_m_per_s2"] * math.sin(numbers["angle_rad"])
     for body in system.present:
-        system.bodies[body, FORCE] -= system.bodies[body, MASS] * pull
+        system.bodies[body, Of.FORCE] -= system.bodies[body, Of.MASS] * pull
 
 
 def _odd(sections: Sections, _: System) -> Iterable[Oddity]:

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import LogLocator
 
-from grasp_ros.physics.layout import DISSIPATION
+from grasp_ros.physics.layout import Law
 from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
@@ -42,7 +42,7 @@ def gap(found: Gap) -> Drawing:
             top.set_title(run.scene.title, fontsize="small")
             _, d_l, _, d_r = penetration(run.state)
             for d, row, letter, color, dash in ((d_l, 0, "l", LEFT_COLOR, "-"), (d_r, 1, "r", RIGHT_COLOR, "--")):
-                p = run.scene.system.pairs[row, DISSIPATION]
+                p = run.scene.system.pairs[row, Law.DISSIPATION]
                 bottom.plot(run.t, p * d, color=color, linestyle=dash, label=f"$p\\,\\dot u_{letter}$")
             bottom.axhline(-1.0, color="black", linewidth=0.8, label="-1: second half of (10)")
             bottom.set_ylim(-1.6, 0.6)

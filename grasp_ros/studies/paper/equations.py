@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 
 from grasp_ros.physics import lyapunov
-from grasp_ros.physics.layout import LEFT, RIGHT, X_L, X_O, X_R, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition, X
 from grasp_ros.physics.model import acceleration, impact_force, in_contact, penetration
 from grasp_ros.scene import SceneError
 from grasp_ros.studies.paper import by_hand
@@ -144,7 +144,7 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
         squared = np.einsum("ni,nij,nj->n", y, written, y)
         form = max(form, relative(squared, sample.level.V))
         form = max(form, relative(lyapunov.quadratic_form(sample.system, y), squared))
-        moving = [x for x in (X_L, X_O, X_R) if y[:, x + 1].any()]  # the object of a symmetric case rests
+        moving = [x for x in (X.L, X.O, X.R) if y[:, x + 1].any()]  # the object of a symmetric case rests
         order = max(order, *(relative(sample.rate[:, x], y[:, x + 1]) for x in moving))
         for side, stored in enumerate(lyapunov.parts(sample.system, y)[3:]):
             if stored.max() > 0.0:

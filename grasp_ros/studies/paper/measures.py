@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.layout import DAMPING, DISSIPATION, Transition
+from grasp_ros.physics.layout import Law, Of, Transition
 from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -130,7 +130,7 @@ def _measure(scene: Scene, settle: bool) -> Measures:
 def lossy(scene: Scene) -> bool:
     """Whether anything takes energy; what loses none comes back to near its start (Poincare) and never settles."""
     system = scene.system
-    return bool(system.closed_loop[:, DAMPING].any() or system.pairs[:, DISSIPATION].any())
+    return bool(system.closed_loop[:, Of.DAMPING].any() or system.pairs[:, Law.DISSIPATION].any())
 
 
 def _of(scene: Scene, states: Array, integrator: Integrator, last: Array) -> Measures:

@@ -9,7 +9,7 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import energy, pairs_of
-from grasp_ros.physics.layout import DISSIPATION, LEFT, MASS, OBJECT, RIGHT, STIFFNESS, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Transition
 from grasp_ros.physics.lyapunov import largest_deformation
 from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
 from grasp_ros.physics.system import COLUMN, System
@@ -68,7 +68,7 @@ def rates(scene: Scene) -> Rates:
     x_l, x_o, x_r = (run.state[:, COLUMN[body]] for body in (LEFT, OBJECT, RIGHT))
     clearance = min(float((x_o - x_l + epsilon[LEFT]).min()), float((x_r + epsilon[RIGHT] - x_o).min()))
     terms = [
-        2.0 * scene.system.pairs[side, DISSIPATION] * hertzian_force(Contact(*scene.system.pairs[side]), u) * d * d
+        2.0 * scene.system.pairs[side, Law.DISSIPATION] * hertzian_force(Contact(*scene.system.pairs[side]), u) * d * d
         for side, u, d in pairs_of(scene.system, run.state)
     ]
     return Rates(
@@ -110,7 +110,7 @@ def separates_slowly(scene: Scene) -> Found:
     """No pair separates faster than 1/p while it penetrates: the smallest p u' where u > 0."""
     system, run = scene.system, run_of(scene)
     slowest = [
-        float((system.pairs[side, DISSIPATION] * d)[u > 0.0].min(initial=0.0))
+        float((system.pairs[side, Law.DISSIPATION] * d)[u > 0.0].min(initial=0.0))
         for side, u, d in pairs_of(system, run.state)
     ]
     return Found(min(slowest), min(slowest) > -1.0)
@@ -151,7 +151,7 @@ def keeps_V(scene: Scene) -> Found:
 
 def state_weights(system: System) -> Array:
     """Square roots of K, m, K, m_o, K, m: the norm of a state is then sqrt(V) without contacts; the object by K_l."""
-    m, K = system.bodies[:, MASS], system.closed_loop[:, STIFFNESS]
+    m, K = system.bodies[:, Of.MASS], system.closed_loop[:, Of.STIFFNESS]
     return np.asarray(np.sqrt(np.array([K[LEFT], m[LEFT], K[LEFT], m[OBJECT], K[RIGHT], m[RIGHT]])))
 
 

@@ -1,0 +1,1 @@
+"""The modes of pairs and object, and every transition between them."""

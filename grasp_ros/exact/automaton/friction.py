@@ -1,0 +1,226 @@
+"""Dry friction of the object: it slides against a constant force, or sticks and is a wall.
+
+A sliding object has the friction in its constant force. A stuck one gets an infinite mass: whatever pushes it moves it
+as little as a wall, in the same equations. Both are the row OBJECT of `Plant.bodies`; `Plant.given` keeps what the
+scene says. Which of them it is, `modes` decides.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.impact import damping_factor, elastic_force
+from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
+from grasp_ros.exact.numerics.polynomial import product, values
+from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
+from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
+from grasp_ros.exact.tolerances import FRICTION
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, Slide, U, V, Z
+
+FIRST = whole(0)  # row of factors
+
+
+@kernel
+def lift_friction(plant: Plant) -> None:
+    """Let the bodies act as the scene and the inputs say."""
+    for body in range(3):
+        for column in range(4):
+            plant.bodies[body, column] = plant.given[body, column]
+
+
+@kernel
+def apply_friction(plant: Plant, mode: Integers) -> None:
+    """Put the mode of the object into its row of the bodies."""
+    slide, row = mode[OBJECT], plant.bodies[OBJECT]
+    given = plant.given[OBJECT]
+    if slide == Slide.FREE:
+        return
+    row[Of.MASS] = math.inf if slide == Slide.STUCK else given[Of.MASS]
+    against = -plant.coulomb if slide == Slide.RIGHTWARD else plant.coulomb
+    row[Of.FORCE] = 0.0 if slide == Slide.STUCK else given[Of.FORCE] + against
+
+
+@kernel
+def impact_noise(plant: Plant, side: Body, elastic: float, y: Array) -> float:
+    """Rounding of an impact, of its own terms alone; of 1 + p u', which may have cancelled, these count."""
+    front, back = rate_lanes(side)
+    return 0.5 * FRICTION * (elastic * (1.0 + plant.pairs[side, Law.DISSIPATION] * (abs(y[front]) + abs(y[back]))))
+
+
+@kernel
+def still_noise(plant: Plant) -> float:
+    """Rounding of what else pushes an object at rest, and of its friction."""
+    return FRICTION * (abs(plant.given[OBJECT, Of.FORCE]) + plant.coulomb)
+
+
+@kernel
+def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
+    """The impact of a pair on an object at rest; where rounding hides that of a glide at u' = -1/p, the arm's force."""
+    x, v, sign = arm_of(state.y, side)
+    body, loss = plant.bodies[side], plant.pairs[side, Law.DISSIPATION]
+    elastic = elastic_force(plant.pairs[side, Law.HERTZIAN], state.y[U.L + side])
+    force = elastic * damping_factor(loss, approach(state.y, side))
+    noise = impact_noise(plant, side, elastic, state.y)
+    own = sign * (body[Of.MASS] * own_acceleration(body, x, v))
+    if abs(force) <= noise and 0.0 < own <= noise:
+        return Push(own, FRICTION * (body[Of.MASS] * own_size(body, x, v)), noise)
+    return Push(force, noise, noise)
+
+
+@kernel
+def push_on_object(plant: Plant, state: State) -> Push:
+    """What pushes the object beside its dry friction, by (3), and the rounding of that and of the friction.
+
+    This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
+    by more than the rounding. A series from the state, which knows nothing of glides, is held against the noise.
+    """
+    given = plant.given[OBJECT, Of.FORCE]
+    value, rounding, noise = 0.0, 0.0, 0.0  # of both sides first, for mirror images
+    for side in (LEFT, RIGHT):
+        if state.mode[side] == Pair.CONTACT:
+            impact = impact_on_object(plant, state, side)
+            value += impact.value if side == LEFT else -impact.value
+            rounding += impact.rounding
+            noise += impact.noise
+    still = still_noise(plant)
+    return Push(value + given, rounding + still, noise + still)
+
+
+@inlined
+def slide_in_flight(plant: Plant, state: State) -> SlideCandidate:
+    """When a sliding object stops in flight: v' = a - c v is solved exactly."""
+    slide, v = state.mode[OBJECT], state.y[V.O]
+    none = SlideCandidate(math.inf, Slide.STUCK)
+    if slide == Slide.FREE or slide == Slide.STUCK:
+        return none
+    body = plant.bodies[OBJECT]
+    a, c = body[Of.FORCE] / body[Of.MASS], body[Of.DAMPING] / body[Of.MASS]
+    if v == 0.0 or a == 0.0 or (a > 0.0) == (v > 0.0):
+        return none
+    return SlideCandidate(-v / a if c == 0.0 else math.log1p(-c * v / a) / c, Slide.STUCK)
+
+
+@kernel
+def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
+    """Write the series of the impact forces on the object, H w^3 (1 + p u'), up to the order n, to `tables.row`.
+
+    The table of factors is free after the expansion and holds the series on the way.
+    """
+    f, row = tables.f, tables.row
+    w, e, square, cube = FIRST, n + 1, 2 * (n + 1), 3 * (n + 1)
+    for k in range(n + 1):
+        row[k] = 0.0
+    for side in (LEFT, RIGHT):
+        if mode[side] != Pair.CONTACT:
+            continue
+        front, back = rate_lanes(side)
+        for k in range(n + 1):
+            f[w + k] = tables.c[LANES * k + Z.L + side]
+            f[e + k] = plant.pairs[side, Law.DISSIPATION] * (tables.c[LANES * k + front] - tables.c[LANES * k + back])
+        f[e] += 1.0
+        product(f, w, w, square, n)
+        product(f, square, w, cube, n)
+        product(f, cube, e, square, n)
+        hertzian = plant.pairs[side, Law.HERTZIAN] if side == LEFT else -plant.pairs[side, Law.HERTZIAN]
+        for k in range(n + 1):
+            row[k] += hertzian * f[square + k]
+
+
+@kernel
+def noise_at(tables: Tables, plant: Plant, mode: Integers, n: int, s: float) -> float:
+    """Rounding of what pushes an object at rest at s in a Taylor step; the state there is left in `tables.at`."""
+    at = tables.at
+    values(tables.c, n, s, at)
+    noise = 0.0  # of both sides first, for mirror images
+    for side in (LEFT, RIGHT):
+        if mode[side] == Pair.CONTACT:
+            root = max(at[Z.L + side], 0.0)
+            noise += impact_noise(plant, side, elastic_force(plant.pairs[side, Law.HERTZIAN], root * root), at)
+    return noise + still_noise(plant)
+
+
+@inlined
+def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
+    """By how much what pushes the object at s, with the impacts `tables.row`, exceeds the friction, N."""
+    return abs(value_and_rate(tables.row, n, s)[0] + plant.given[OBJECT, Of.FORCE]) - plant.coulomb
+
+
+@kernel
+def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> SlideCandidate:
+    """Since when a push exceeds the friction by more than its rounding, as it does at h."""
+    low, high = 0.0, h
+    while high - low > 4.0 * EPS * high and high > EPS * EPS * h:
+        middle = 0.5 * (low + high)
+        if excess(tables, plant, n, middle) > noise_at(tables, plant, mode, n, middle):
+            high = middle
+        else:
+            low = middle
+    push = value_and_rate(tables.row, n, high)[0] + plant.given[OBJECT, Of.FORCE]
+    return SlideCandidate(high, Slide.RIGHTWARD if push > 0.0 else Slide.LEFTWARD)
+
+
+@kernel
+def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integers) -> float:
+    """First s in (0, h] at which a push is beyond the friction by f(s), and that more than the rounding of f.
+
+    That at 0 counts, if it hides f there, otherwise the smaller one of those at 0 and at h.
+    """
+    if f[0] > noise[0]:
+        return EPS * EPS * h
+    f[0] -= noise[0] if f[0] >= -noise[0] else min(noise[0], noise[1])
+    return first_rise(f, n, h, 0.0, work)
+
+
+@kernel
+def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[float, float], work: Integers
+                   ) -> SlideCandidate:
+    """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction.
+
+    `noise` is the rounding of what pushes it at 0 and at h.
+    """
+    row, copy = tables.row, tables.copy
+    push = row[0] + plant.given[OBJECT, Of.FORCE]
+    for k in range(n + 1):
+        copy[k] = -row[k]
+    row[0], copy[0] = push - plant.coulomb, -push - plant.coulomb
+    to_right, to_left = overcome(row, n, h, noise, work), overcome(copy, n, h, noise, work)
+    if math.isnan(to_right) or math.isnan(to_left):
+        return SlideCandidate(math.nan, Slide.STUCK)
+    return SlideCandidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else SlideCandidate(to_left, Slide.LEFTWARD)
+
+
+@kernel
+def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
+    """First s in a Taylor step of length h at which an object under dry friction stops or slips.
+
+    `tables.at` is at h, or lost. The next order decides of one that has just slipped, unless more than half of the
+    rounding pushes it. What hides a push may be far less at h.
+    """
+    slide, row, c = state.mode[OBJECT], tables.row, tables.c
+    if slide != Slide.STUCK:
+        factor = -1.0 if slide == Slide.RIGHTWARD else 1.0
+        for k in range(n + 1):
+            row[k] = factor * c[LANES * k + V.O]
+        if row[0] == 0.0:
+            accelerating = c[LANES + Lane.TIME] * push_on_object(plant, state).noise / plant.bodies[OBJECT, Of.MASS]
+            if abs(row[1]) <= 0.5 * accelerating:
+                row[1] = 0.0
+        return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
+    impact_series(tables, plant, state.mode, n)
+    noise = push_on_object(plant, state).noise
+    begin, end = excess(tables, plant, n, 0.0), excess(tables, plant, n, h)
+    if begin < -noise:
+        found = slip_candidate(tables, plant, n, h, (0.0, 0.0), work)
+        if not found.when <= h:  # most steps
+            return found
+    later = noise_at(tables, plant, state.mode, n, h)
+    if begin < -noise:
+        if end > later:
+            return found
+        impact_series(tables, plant, state.mode, n)  # it is near the friction without exceeding it for certain
+    found = slip_candidate(tables, plant, n, h, (noise, later), work)
+    if -noise <= begin <= noise and (found.when <= h or end > later):
+        impact_series(tables, plant, state.mode, n)
+        return since_certain(tables, plant, state.mode, n, min(found.when, h))
+    return found

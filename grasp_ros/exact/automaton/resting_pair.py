@@ -1,0 +1,164 @@
+"""A pair at u = u' = 0: which way it goes, how long that is certain, and whether its force matters.
+
+Each body obeys m x'' + c x' + k x = f, so its derivatives follow from each other, and the first one in which arm and
+object differ decides. Their motion relative to each other obeys an equation of order five: no difference up to order
+six means that they move together for ever.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
+from grasp_ros.exact.kinematics import (
+    approach,
+    arm_of,
+    bound,
+    derivatives,
+    other,
+    reduced_mass,
+    relative_motion,
+    surface_factor,
+)
+from grasp_ros.exact.records import Array, Leaning, Plant, State
+from grasp_ros.exact.tolerances import CLAMPS, DERIVATIVE, SHORT_START, SURFACE, TURNS
+from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
+
+LOWEST, HIGHEST = 2, 6  # derivatives
+UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
+
+
+@kernel
+def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]:
+    """Acceleration in m/s^2, and its rate, that the force of the other pair gives the object towards `side`."""
+    beside = other(side)
+    u = state.y[U.L + beside]
+    if state.mode[beside] != Pair.CONTACT or u <= 0.0:
+        return 0.0, 0.0
+    hertzian, loss = plant.pairs[beside, Law.HERTZIAN], plant.pairs[beside, Law.DISSIPATION]
+    mass = plant.bodies[OBJECT, Of.MASS]
+    d, a = relative_motion(plant, state.y, beside)
+    elastic, factor = elastic_force(hertzian, u), surface_factor(plant, state.y, beside, SURFACE)
+    a -= elastic * factor / reduced_mass(plant.bodies, beside)
+    pace = elastic_slope(hertzian, u) * d * factor + elastic * loss * a
+    return elastic * factor / mass, pace / mass
+
+
+@kernel
+def leaning(plant: Plant, state: State, side: Body) -> Leaning:
+    """The first derivative of u of a pair at rest that differs from zero by more than its rounding.
+
+    The force of the other pair takes part with its value and its rate. Where that pair begins at u = 0 itself, its
+    force presses this one if nothing else moves it.
+    """
+    y, beside = state.y, other(side)
+    closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
+    if closed and state.mode[beside] == Pair.CONTACT and y[U.L + beside] > 0.0:
+        push, pace = impact_beside(plant, state, side)
+        found = first_difference(plant, y, side, push, pace, LOWEST, 3)
+        return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
+    found = own_difference(plant, y, side, LOWEST)
+    begins = closed and own_motion(plant, y, beside).order < NEVER
+    return Leaning(UNDECIDED, math.inf) if found.order == NEVER and begins else found
+
+
+@kernel
+def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, lowest: int, highest: int
+                     ) -> Leaning:
+    """The first derivative of u beyond its rounding, with an acceleration of the object and its rate added; NEVER."""
+    drag = plant.bodies[OBJECT, Of.DAMPING] / plant.bodies[OBJECT, Of.MASS]
+    for order in range(lowest, highest + 1):
+        value, size = difference(plant, y, side, order)
+        added = push if order == 2 else (pace - drag * push if order == 3 else 0.0)
+        value += added
+        if abs(value) > DERIVATIVE * (size + abs(added)):
+            return Leaning(float(order), value)
+    return Leaning(NEVER, 0.0)
+
+
+@kernel
+def own_difference(plant: Plant, y: Array, side: Body, lowest: int) -> Leaning:
+    """`first_difference` of arm and object by themselves, from an order on."""
+    return first_difference(plant, y, side, 0.0, 0.0, lowest, HIGHEST)
+
+
+@kernel
+def own_motion(plant: Plant, y: Array, side: Body) -> Leaning:
+    """The first derivative of u by which arm and object part or meet by themselves, that of order 1 included."""
+    d = approach(y, side)
+    return Leaning(1.0, d) if d != 0.0 else own_difference(plant, y, side, LOWEST)
+
+
+@kernel
+def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, float]:
+    """A derivative of u without impact forces, and the sum of the sizes of its terms."""
+    x, v, sign = arm_of(y, side)
+    value, _, size = derivatives(plant.bodies[side], x, v, order)
+    value_o, _, size_o = derivatives(plant.bodies[OBJECT], y[X.O], y[V.O], order)
+    return sign * (value - value_o), size + size_o
+
+
+@kernel
+def certain_time(plant: Plant, y: Array, side: Body, order: int, value: float, span: float) -> float:
+    """How long, in s, u of a flight from u = 0 has the sign of its first derivative, for certain.
+
+    Derivatives of the same sign only help, so each of them may be the one that a bound on the next is held against;
+    half of what that proves leaves room for rounding.
+    """
+    x, v, _ = arm_of(y, side)
+    arm, body = plant.bodies[side], plant.bodies[OBJECT]
+    longest = 0.0
+    for n in range(order, HIGHEST + 1):
+        here, size = (value, 0.0) if n == order else difference(plant, y, side, n)
+        if abs(here) <= DERIVATIVE * size:
+            continue
+        if (here > 0.0) != (value > 0.0):
+            break
+        q, q_rate, _ = derivatives(arm, x, v, n + 1)
+        q_o, q_o_rate, _ = derivatives(body, y[X.O], y[V.O], n + 1)
+        largest = bound(arm, q, q_rate, span) + bound(body, q_o, q_o_rate, span)
+        longest = max(longest, 0.5 * (n + 1) * abs(here) / largest if largest > 0.0 else math.inf)
+    return longest
+
+
+@kernel
+def is_negligible(plant: Plant, side: Body, u: float, d: float, part: float) -> bool:
+    """Whether the impulse of a pair between u = 0 and u is below a part of that of its motion u'.
+
+    What decides about an object that sticks is the force.
+    """
+    pair, d = plant.pairs[side], abs(d)
+    if u <= 0.0 or d == 0.0:
+        return u <= 0.0
+    force = elastic_force(pair[Law.HERTZIAN], u) * damping_factor(pair[Law.DISSIPATION], d)
+    if plant.bodies[OBJECT, Of.MASS] == math.inf and force > DERIVATIVE * plant.coulomb:
+        return False
+    return force * (u / d) <= part * reduced_mass(plant.bodies, side) * d
+
+
+@kernel
+def parts(plant: Plant, y: Array, side: Body) -> bool:
+    """Whether a pair separates, and nothing but its force can turn it back, or take u' to -1/p, before u = 0."""
+    d, loss = approach(y, side), plant.pairs[side, Law.DISSIPATION]
+    if not d < 0.0:
+        return False
+    t = y[U.L + side] / -d
+    a, jerk = abs(difference(plant, y, side, 2)[0]), abs(difference(plant, y, side, 3)[0])
+    change = max(t * a, 0.5 * t * (t * jerk))  # in this order, because squares underflow
+    clamps = 0.0 < surface_factor(plant, y, side, SURFACE) < CLAMPS * loss * change
+    return bool(TURNS * change < -d and not clamps)
+
+
+@kernel
+def parting_time(plant: Plant, state: State, side: Body, span: float) -> float:
+    """How long, in s, a pair at rest keeps the sign of u in a flight, for certain; it is a short flight."""
+    order, value = own_difference(plant, state.y, side, LOWEST)
+    if order == NEVER:
+        return math.inf
+    rate = 0.0
+    for body in (side, OBJECT):
+        row = plant.bodies[body]
+        rate = max(rate, abs(row[Of.DAMPING]) / row[Of.MASS] + math.sqrt(row[Of.STIFFNESS] / row[Of.MASS]))
+    certain = certain_time(plant, state.y, side, int(order), value, span)
+    return min(certain, SHORT_START / rate) if rate > 0.0 else certain

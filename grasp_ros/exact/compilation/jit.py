@@ -1,0 +1,129 @@
+"""How the kernels are compiled, and where their machine code is kept.
+
+`NUMBA_DISABLE_JIT=1` in the environment runs the same source uncompiled.
+"""
+
+import gc
+from collections.abc import Callable
+from functools import cache, partial, wraps
+from types import FunctionType
+from typing import Any, TypeVar
+
+import numba
+import numpy as np
+
+from grasp_ros.exact.compilation.kernel_cache import cache_directory
+from grasp_ros.exact.compilation.numba_internals import Kernel, KernelCache
+
+# Off by default in numba; it turns the eight independent sums of `series.convolve` into vector instructions, which
+# makes a contact several times faster. It never reorders a floating-point sum.
+numba.config.SLP_VECTORIZE = 1
+
+K = TypeVar("K", bound=Callable[..., Any])  # a kernel has the types of its source
+
+COMPILED = not numba.config.DISABLE_JIT
+_UNCOMPILED: dict[int, Any] = {}
+DEEP_STACK = 70_000  # slots; more than half a megabyte
+
+
+def whole(number: int) -> int:
+    """A whole number that numba does not take for a literal, for each of which it would compile a kernel anew."""
+    return np.int64(number)  # type: ignore[return-value]
+
+
+def kernel(function: K) -> K:
+    """A function that kernels call, compiled as a part of each door that needs it.
+
+    It may not make arrays: without them nothing counts references, which makes a kernel a quarter faster.
+    """
+    return _compiled(function, door=False, inline=False)
+
+
+def inlined(function: K) -> K:
+    """A kernel that becomes part of its callers.
+
+    Handing over many arrays can cost as much as a short function.
+    """
+    return _compiled(function, door=False, inline=True)
+
+
+def door(function: K) -> K:
+    """A kernel that Python calls, or C by its address; its machine code is kept on disk, with all that it calls.
+
+    Of the kernels that it calls nothing else is kept: they would be most of the files, and save time only where a door
+    is compiled in a process that has not compiled its kernels for another one.
+    """
+    return _compiled(function, door=True)
+
+
+def allocating(function: K) -> K:
+    """A door that may make arrays."""
+    return _compiled(function, door=True, counts=True)
+
+
+@cache
+def _door(function: Callable[..., Any]) -> Any:
+    return door(function)
+
+
+def compiling(function: Callable[[], None]) -> Callable[[], None]:
+    """A function that compiles kernels, with room on CPython's stack for all the compiler's frames.
+
+    CPython asks the system for 16 kB more whenever a call does not fit, and gives it back when that call returns.
+    Compiling makes millions of calls; where they go back and forth over such an edge, this took seconds. So did looking
+    for garbage, again and again, among millions of objects that are none.
+    """
+    code = function.__code__.replace(co_stacksize=DEEP_STACK)
+    deep = FunctionType(code, function.__globals__, function.__name__)
+
+    @wraps(function)
+    def compile_all() -> None:
+        collects = gc.isenabled()
+        gc.disable()
+        try:
+            deep()
+        finally:
+            if collects:
+                gc.enable()
+
+    return compile_all
+
+
+def compiled_address(function: Any, signature: str) -> int:
+    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been.
+
+    Where nothing is compiled it is a number that `function_at` knows.
+    """
+    if not COMPILED:
+        _UNCOMPILED[id(function)] = function
+        return id(function)
+    function.compile(signature)
+    (result,) = function.overloads.values()
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+
+
+def function_at(address: int) -> Any:
+    """The function of an address, where nothing is compiled."""
+    return _UNCOMPILED[address]
+
+
+def _compiled(function: K, *, door: bool, counts: bool = False, inline: bool = False) -> K:
+    """Every option is said for every kernel: numba would take what is not said from whoever calls it first."""
+    found = numba.njit(
+        error_model="numpy", nogil=True, _nrt=counts, forceinline=inline, no_cpython_wrapper=not door,
+        no_cfunc_wrapper=not door,
+    )(function)
+    if COMPILED and door:
+        found._cache = _cache_of(function)
+    elif COMPILED:
+        found.__class__, found.door = Kernel, partial(_door, function)
+    return found
+
+
+def _cache_of(function: Callable[..., Any]) -> KernelCache:
+    before = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = str(cache_directory())
+    try:
+        return KernelCache(function)
+    finally:
+        numba.config.CACHE_DIR = before

@@ -1,0 +1,87 @@
+"""Where the machine code of the kernels is kept, and whether it is there: without a compiler."""
+
+import hashlib
+import os
+import sys
+import tempfile
+import uuid
+from functools import cache
+from pathlib import Path
+
+COMPILING = "compiling the kernels; this happens once after an installation and takes some 20 s"
+
+
+PACKAGE = Path(__file__).parents[2]
+COMPILED_ROOMS = ("physics", "exact", "observe", "methods", "studies")
+
+
+@cache
+def sources_digest() -> str:
+    """A short name of the sources of all kernels, and of what they use.
+
+    numba looks for changes only in the file of the function that is called, not in those that it calls from other
+    files: without the digest an edited kernel would go on running as it was.
+    """
+    digest = hashlib.sha256()
+    for room in COMPILED_ROOMS:
+        for source in sorted((PACKAGE / room).rglob("*.py")):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _base() -> Path:
+    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "grasp_ros"
+
+
+@cache
+def cache_directory() -> Path:
+    """A writable directory for the kernels."""
+    directory = _base() / sources_digest()
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        directory = Path(tempfile.mkdtemp(prefix="grasp_ros"))
+    return directory
+
+
+def kernels_on_disk() -> bool:
+    """Whether the integrator has machine code on disk, so that its first call need not wait for the compiler."""
+    uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+    return uncompiled or any(cache_directory().rglob("*.advance-*.nbc"))
+
+
+def code_file(directory: str, name: str, key: object) -> Path:
+    """Where the machine code of a function for some key is kept: types, machine, versions."""
+    return Path(directory) / f"{name}.{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
+
+
+def write_checked(path: Path, content: bytes) -> None:
+    """Write a file with its checksum, whole or not at all: others may read and write it at the same time."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    own = path.with_name(f"{path.name}.{uuid.uuid4().hex}")
+    try:
+        own.write_bytes(hashlib.sha256(content).digest() + content)
+        own.replace(path)
+    finally:
+        own.unlink(missing_ok=True)
+
+
+def read_checked(path: Path) -> bytes:
+    """Content of a file that `write_checked` has written.
+
+    Raises
+    ------
+    ValueError
+        If the checksum is wrong.
+    """
+    whole, size = path.read_bytes(), hashlib.sha256().digest_size
+    if hashlib.sha256(whole[size:]).digest() != whole[:size]:
+        raise ValueError(path)
+    return whole[size:]
+
+
+@cache
+def say_damaged() -> None:
+    """Say, once, that something on disk is of no use."""
+    print(f"the kernel cache in {_base()} is damaged; what cannot be loaded is compiled anew", file=sys.stderr)

@@ -1,0 +1,102 @@
+"""All that rests on classes of numba that it may move: code of parts of a program, and the cache of machine code.
+
+`test_numba_internals` names what is missing in another version of numba.
+"""
+
+import pickle
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import Any
+
+import llvmlite
+import numba
+from numba.core.caching import FunctionCache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import CPUDispatcher
+from numba.core.serialize import dumps
+
+from grasp_ros.exact.compilation.kernel_cache import code_file, read_checked, say_damaged, write_checked
+
+
+class Part(JITCodeLibrary):
+    """The code of a function that others call, without machine code: theirs has a copy of it.
+
+    Machine code of every function by itself would be a fifth of the time of compiling.
+    """
+
+    def _finalize_final_module(self) -> None:
+        self._finalized = True
+
+
+class InlinedPart(Part):
+    """The same of a function that goes into its callers as a whole, which optimize it there."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+
+class Kernel(CPUDispatcher):
+    """A function that other kernels call; for Python it is compiled once more.
+
+    A call from Python goes through a wrapper that unpacks the arguments, as large as many a kernel: without it
+    compiling takes a sixth less. Nothing but a test calls such a function.
+    """
+
+    door: Callable[[], Any]
+
+    def compile(self, signature: Any) -> Any:
+        """Compile for arguments of some types."""
+        with global_compiler_lock, _libraries(self, InlinedPart if self.targetoptions["forceinline"] else Part):
+            return super().compile(signature)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """What the function returns."""
+        return self.door()(*arguments)
+
+
+@contextmanager
+def _libraries(dispatcher: CPUDispatcher, kind: type[Part]) -> Iterator[None]:
+    """Of what kind the code is that this thread compiles meanwhile; it must have numba's lock."""
+    own = vars(dispatcher.targetctx.codegen())
+    before = own.copy()
+    own.update(_library_class=kind, set_env=_no_environment)
+    try:
+        yield
+    finally:
+        own.clear()
+        own.update(before)
+
+
+def _no_environment(*_: object) -> None:
+    """Hand nothing over to machine code that is not there."""
+
+
+class KernelCache(FunctionCache):
+    """Machine code of a function on disk: a file for each signature and machine, with its checksum.
+
+    What is damaged is compiled anew. numba itself keeps an index beside the files, loads whatever is there, and two
+    processes that write at once can leave an index that names the code of another machine.
+    """
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Machine code for arguments of some types; None if there is none."""
+        target.refresh()
+        path = self._path(signature, target.codegen())
+        try:
+            return self._impl.rebuild(target, pickle.loads(read_checked(path)))
+        except FileNotFoundError:
+            return None
+        except Exception:
+            say_damaged()
+            return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep machine code. It is a help, no need: a disk that is full only means to compile again."""
+        if self._impl.check_cachable(result):
+            with suppress(OSError):
+                write_checked(self._path(signature, result.codegen), dumps(self._impl.reduce(result)))
+
+    def _path(self, signature: Any, codegen: Any) -> Any:
+        key = self._index_key(signature, codegen), numba.__version__, llvmlite.__version__
+        return code_file(self.cache_path, self._impl.filename_base, key)

@@ -1,0 +1,1 @@
+"""Motion in contact: Taylor steps in regularised time."""

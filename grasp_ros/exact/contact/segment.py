@@ -1,0 +1,233 @@
+"""A segment in contact: one Taylor step in regularised time, its events, and where it ends."""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.automaton.begin import leaves_force_out
+from grasp_ros.exact.automaton.friction import slide_in_contact
+from grasp_ros.exact.compensated import add, move_arm_in_contact, move_in_flight
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.contact.step_unit import new_step
+from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
+from grasp_ros.exact.flight.closed_form import fly, free_flights
+from grasp_ros.exact.impact import damping_factor
+from grasp_ros.exact.kinematics import rate_lanes
+from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values, values_and_ways
+from grasp_ros.exact.numerics.powers_of_two import power_of_two
+from grasp_ros.exact.numerics.roots import first_rise
+from grasp_ros.exact.records import (
+    Array,
+    Candidate,
+    Ends,
+    Integers,
+    Plant,
+    Segment,
+    Settings,
+    SlideCandidate,
+    State,
+    Tables,
+)
+from grasp_ros.exact.tolerances import CANCELS, NOISE, TOGETHER
+from grasp_ros.physics.layout import (
+    EPS,
+    LANES,
+    LEFT,
+    OBJECT,
+    RIGHT,
+    Body,
+    Kind,
+    Lane,
+    Law,
+    Pair,
+    Slide,
+    Transition,
+    V,
+    Work,
+    X,
+    Z,
+)
+
+ALONE = whole(-1)  # no second lane
+MOST_HALVINGS = 64  # of a step
+
+
+@inlined
+def rise_of_lanes(tables: Tables, n: int, h: float, factor: float, front: int, back: int, offset: float, work: Integers
+                  ) -> float:
+    """First s in (0, h] at which offset + factor (c_front - c_back) rises through zero; back < 0: without it."""
+    c, row = tables.c, tables.row
+    for k in range(n + 1):
+        i = LANES * k
+        row[k] = factor * (c[i + front] - c[i + back] if back >= 0 else c[i + front])
+    row[0] += offset
+    noise = abs(c[front]) + abs(c[back]) if back >= 0 else abs(c[front])
+    return first_rise(row, n, h, EPS * (abs(offset) + abs(factor) * noise), work)
+
+
+@inlined
+def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers
+                   ) -> Candidate:
+    """First event of one pair within a Taylor step of length h.
+
+    Most steps have none, and the ranges of the lanes prove it.
+    """
+    mode, c = state.mode[side], tables.c
+    if mode in (Pair.RESTING, Pair.ABSENT, Pair.BEGINNING):
+        return Candidate(math.inf, Transition.TOUCH)
+    z = Z.L + side
+    low, high = lane_range(tables, z, h)
+    if mode == Pair.OPEN:
+        if c[z] <= 0.0 and high < 0.0:
+            return Candidate(math.inf, Transition.TOUCH)
+        return Candidate(rise_of_lanes(tables, n, h, 1.0, z, ALONE, 0.0, work), Transition.TOUCH)
+    released = math.inf
+    if not (c[z] >= 0.0 and low > 0.0):
+        released = rise_of_lanes(tables, n, h, -1.0, z, ALONE, 0.0, work)
+        if math.isnan(released):
+            return Candidate(released, Transition.RELEASE)
+    crossed, kind = surface_candidate(tables, plant, state, n, side, min(h, released), work)
+    return Candidate(released, Transition.RELEASE) if crossed >= released else Candidate(crossed, kind)
+
+
+@inlined
+def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers
+                      ) -> tuple[float, Transition]:
+    """First s in (0, h] at which u' crosses -1/p, down out of contact or up back into it; inf if there is none."""
+    mode, c = state.mode[side], tables.c
+    loss = plant.pairs[side, Law.DISSIPATION]
+    front, back = rate_lanes(side)
+    if mode == Pair.CONTACT and loss > 0.0:
+        slowest = lane_range(tables, front, h)[0] - lane_range(tables, back, h)[1]
+        if damping_factor(loss, c[front] - c[back]) >= 0.0 and damping_factor(loss, slowest) > NOISE:
+            return math.inf, Transition.CLAMP
+        return rise_of_lanes(tables, n, h, -loss, front, back, -1.0, work), Transition.CLAMP
+    if mode == Pair.CLAMPED:
+        return rise_of_lanes(tables, n, h, loss, front, back, 1.0, work), Transition.REENTRY
+    return math.inf, Transition.CLAMP
+
+
+@inlined
+def is_blurred(tables: Tables, plant: Plant, n: int, side: Body, candidate: Candidate, s: float) -> bool:
+    """Whether u' crosses -1/p at s, where it has the roundings of terms far larger than itself."""
+    if candidate.when > s * TOGETHER or candidate.what not in (Transition.CLAMP, Transition.REENTRY):
+        return False
+    (front, back), slow, total = rate_lanes(side), 1.0 / plant.pairs[side, Law.DISSIPATION], 0.0
+    for k in range(n, -1, -1):
+        total = total * s + abs(tables.c[LANES * k + front] - tables.c[LANES * k + back])
+    return total > CANCELS * max(abs(tables.c[front] - tables.c[back]), slow)
+
+
+@inlined
+def clear_end(tables: Tables, plant: Plant, n: int, left: Candidate, right: Candidate, h: float) -> float:
+    """Where a step of length h ends for its pairs: at their first event, or half-way if that is blurred from here."""
+    s = min(h, left.when, right.when)
+    if s < h and (is_blurred(tables, plant, n, LEFT, left, s) or is_blurred(tables, plant, n, RIGHT, right, s)):
+        s *= 0.5
+    return s
+
+
+@inlined
+def press(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Integers) -> Segment:
+    """One Taylor step as far as it is exact; its series and the values at its end stand in the tables."""
+    work[Work.CONTACT_STEPS] += 1
+    step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
+    h = accepted_length(tables, step, h, settings, work)
+    return Segment(Kind.CONTACT, tables.at[Lane.TIME], h, step, free_flights(plant, state.y, step.left, step.right))
+
+
+@inlined
+def step_ends(tables: Tables, plant: Plant, state: State, segment: Segment, work: Integers) -> Ends:
+    """First events of the pairs and of the object within a step, in its variable."""
+    n, h = segment.step.order.number, segment.s
+    left = pair_candidate(tables, plant, state, n, LEFT, h, work)
+    right = pair_candidate(tables, plant, state, n, RIGHT, h, work)
+    slide = SlideCandidate(math.inf, Slide.FREE)
+    if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when):
+        return Ends(left, right, slide, math.nan)
+    s = clear_end(tables, plant, n, left, right, h)
+    if state.mode[OBJECT] != Slide.FREE:
+        if s < h:
+            values_and_ways(tables.c, n, s, tables.at)
+        slide = slide_in_contact(tables, plant, state, n, s, work)
+    return Ends(left, right, slide, math.nan if math.isnan(slide.when) else min(s, slide.when))
+
+
+@inlined
+def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends: Ends, span: float) -> Segment:
+    """A step until its first event, the end of the span, or until the force of a pair that begins shows.
+
+    The values at its end, and how far the lanes have come, are left in `tables.at`.
+    """
+    c, at, step, s = tables.c, tables.at, segment.step, ends.known
+    if math.isnan(s):
+        return Segment(segment.kind, math.nan, math.nan, step, segment.flights)
+    if s < segment.s or state.mode[OBJECT] != Slide.FREE:  # the search for a slip leaves another state in `at`
+        values_and_ways(c, step.order.number, s, at)
+    if state.mode[LEFT] == Pair.BEGINNING or state.mode[RIGHT] == Pair.BEGINNING:
+        s = force_free_length(tables, plant, state, step.order.number, s)
+        values_and_ways(c, step.order.number, s, at)
+    t = at[Lane.TIME]
+    if t > span:
+        s, t = invert_time(tables, step, span, s, t), span
+        values_and_ways(c, step.order.number, s, at)
+    return Segment(segment.kind, t, s, step, segment.flights)
+
+
+@kernel
+def force_free_length(tables: Tables, plant: Plant, state: State, n: int, s: float) -> float:
+    """Part of a step until s in which a pair that begins may be without its force: the longest before one that is not.
+
+    From near the begin on, because what it has come back from is no longer seen.
+    """
+    part = power_of_two(-MOST_HALVINGS)
+    while part < 1.0:
+        values(tables.c, n, 2.0 * part * s, tables.at)
+        if not (may_last(plant, state, LEFT, tables.at) and may_last(plant, state, RIGHT, tables.at)):
+            break
+        part *= 2.0
+    return part * s
+
+
+@inlined
+def may_last(plant: Plant, state: State, side: Body, at: Array) -> bool:
+    """Whether a pair that begins has neither come back at the values `at`, nor a force that shows there."""
+    if state.mode[side] != Pair.BEGINNING:
+        return True
+    u = at[Z.L + side]
+    return bool(u >= -EPS * abs(at[X.O]) and leaves_force_out(plant, side, at, u))
+
+
+@inlined
+def move_by_step(tables: Tables, segment: Segment, state: State) -> None:
+    """Move the state on to the end of a step, whose values stand in `tables.at`."""
+    at, (left, right, _) = tables.at, segment.flights
+    add(state, X.O, at[LANES + X.O])
+    add(state, V.O, at[LANES + V.O])
+    if segment.step.left:
+        move_arm_in_contact(state, LEFT, at[LANES + X.O], at[Z.L], at[LANES + Z.L])
+        add(state, V.L, at[LANES + V.L])
+    else:
+        move_in_flight(state, LEFT, fly(left, segment.t))
+    if segment.step.right:
+        move_arm_in_contact(state, RIGHT, at[LANES + X.O], at[Z.R], at[LANES + Z.R])
+        add(state, V.R, at[LANES + V.R])
+    else:
+        move_in_flight(state, RIGHT, fly(right, segment.t))
+
+
+@inlined
+def state_in_step(tables: Tables, segment: Segment, tau: float, row: Array) -> None:
+    """Write positions and velocities after tau s of a step."""
+    at = tables.at
+    values_and_ways(
+        tables.c, segment.step.order.number, invert_time(tables, segment.step, tau, segment.s, segment.t), at)
+    row[X.O], row[V.O] = at[X.O], at[V.O]
+    if segment.step.left:
+        row[X.L], row[V.L] = at[X.O] + at[Z.L] * at[Z.L], at[V.L]
+    else:
+        row[X.L], row[V.L], _, _ = fly(segment.flights.left, tau)
+    if segment.step.right:
+        row[X.R], row[V.R] = at[X.O] - at[Z.R] * at[Z.R], at[V.R]
+    else:
+        row[X.R], row[V.R], _, _ = fly(segment.flights.right, tau)

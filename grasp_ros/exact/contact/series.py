@@ -1,0 +1,199 @@
+"""Contact in regularised variables, integrated by Taylor series of high order.
+
+u^(3/2) is only once differentiable at a touch. With w = sqrt(u) and a new independent variable s,
+
+    dt = 2 G ds,   dw/ds = (G / w) u',   d(.)/ds = 2 G d(.)/dt,   G = w, or w_l w_r with both sides in contact,
+
+every right-hand side is a polynomial in w, the positions and the velocities: the solution is analytic through
+touch and release, and w simply crosses zero at release. Its Taylor coefficients follow from recurrences whose
+only nonlinear operation is the product of two series (Cauchy product), so one step is one loop over the order.
+The coefficients are also the dense output, and bounds on them prove where an event function has no root.
+
+With g = w^4, or w_l^4 w_r, the impulse of (6) per 2 ds is H g (1 + p u'). An order waits only for the newest
+coefficients of the velocities, and they pass through one product; w, u = w^2 and g are known one order ahead.
+"""
+
+
+import numpy as np
+
+from grasp_ros.exact.compilation.fma import fma
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
+from grasp_ros.exact.records import FACTORS, Array, Lanes, PerMass
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Lane, Law, Of, V, X, Z
+
+SECOND = 16  # where the second factors of an order begin
+LARGEST = 960  # binary exponent of a unit
+FIRST, UPPER, ONE, TWO = (whole(number) for number in (0, 8, 1, 2))  # typed, or `convolve` is compiled for each
+
+
+@kernel
+def convolve(f: Array, k: int, lane: int, skip: int) -> Lanes:
+    """Coefficients k of eight products of series, without the terms that hold a coefficient below `skip`.
+
+    f has FACTORS numbers for each order. Eight sums in one loop, written out, become one vector instruction each;
+    unsigned indices spare the test for negative ones. The caller adds the terms that are left out: they hold the
+    newest coefficients, which have just been stored one by one, and reading those as a vector would wait.
+    """
+    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
+    end = np.uint64(k)
+    for j in range(np.uint64(skip), np.uint64(max(k + 1 - skip, skip))):
+        i = np.uint64(FACTORS) * j + np.uint64(lane)
+        m = np.uint64(FACTORS) * (end - j) + np.uint64(SECOND + lane)
+        s0 = fma(f[i], f[m], s0)
+        s1 = fma(f[i + np.uint64(1)], f[m + np.uint64(1)], s1)
+        s2 = fma(f[i + np.uint64(2)], f[m + np.uint64(2)], s2)
+        s3 = fma(f[i + np.uint64(3)], f[m + np.uint64(3)], s3)
+        s4 = fma(f[i + np.uint64(4)], f[m + np.uint64(4)], s4)
+        s5 = fma(f[i + np.uint64(5)], f[m + np.uint64(5)], s5)
+        s6 = fma(f[i + np.uint64(6)], f[m + np.uint64(6)], s6)
+        s7 = fma(f[i + np.uint64(7)], f[m + np.uint64(7)], s7)
+    return s0, s1, s2, s3, s4, s5, s6, s7
+
+
+@kernel
+def per_mass(body: Array) -> PerMass:
+    """Inverse mass, k / m, c / m and f / m of a body."""
+    inverse = 1.0 / body[Of.MASS]
+    return inverse, body[Of.STIFFNESS] * inverse, body[Of.DAMPING] * inverse, body[Of.FORCE] * inverse
+
+
+@kernel
+def accelerations(left: PerMass, right: PerMass, middle: PerMass, one: float, x_o: float, u_l: float, u_r: float,
+                  v_l: float, v_o: float, v_r: float) -> tuple[float, float, float]:
+    """A coefficient of the bodies' accelerations without impact, (1) to (3); `one` is 1 in order 0, then 0."""
+    return (
+        fma(-left[2], v_l, fma(-left[1], x_o + u_l, one * left[3])),
+        fma(-right[2], v_r, fma(-right[1], x_o - u_r, one * right[3])),
+        fma(-middle[2], v_o, fma(-middle[1], x_o, one * middle[3])),
+    )
+
+
+@kernel
+def put(table: Array, i: int, x0: float, x1: float, x2: float, x3: float, x4: float, x5: float, x6: float,
+        x7: float) -> None:
+    """Store eight neighbouring numbers."""
+    table[i], table[i + 1], table[i + 2], table[i + 3] = x0, x1, x2, x3
+    table[i + 4], table[i + 5], table[i + 6], table[i + 7] = x4, x5, x6, x7
+
+
+@kernel
+def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: float, b_1: float, a_before: float,
+              b_before: float) -> float:
+    """A sum of `convolve` with its four outer terms; a, the newest coefficient, comes last."""
+    return fma(a, b_0, fma(a_0, b, total) + fma(a_before, b_1, a_1 * b_before))
+
+
+@inlined
+def scale_of(unit: float) -> float:
+    """The power of two of a unit; 1 for one so large that nothing moves but numbers at the end of their range."""
+    e = exponent(unit)
+    return power_of_two(e) if e <= LARGEST else 1.0
+
+
+@inlined
+def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit: float, n: int) -> None:
+    """Fill the Taylor table c from its order 0, with one side in contact: G = w. The series are in s / unit.
+
+    Products: w v_o, w u' of the open side, w a_l, w a_r, w a_o, w w, u u, H g (1 + p u'). Their terms with coefficients
+    0 and 1 are added here: a term of two such coefficients occurs once, so a constant that multiplies the newest
+    coefficient is set after its own order.
+    """
+    hertzian, loss = pairs[side, Law.HERTZIAN], pairs[side, Law.DISSIPATION]
+    left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
+    on_left = side == LEFT
+    push_l, push_r, push_o = (left[0], 0.0, middle[0]) if on_left else (0.0, right[0], -middle[0])
+    x_o, v_l, v_o, v_r = c[X.O], c[V.L], c[V.O], c[V.R]
+    w, gap = (c[Z.L], c[Z.R]) if on_left else (c[Z.R], c[Z.L])
+    w_0, g_0, w_end, u_end = w, hertzian * ((w * w) * (w * w)), w, w * w  # w_end, u_end multiply the newest w, u
+    w_1 = g_1 = w_next = u_next = w_before = u_before = g_before = 0.0
+    first = second = before = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(np.uint64(n)):
+        gv, gd, gl, gr, go, u, q, z = convolve(f, k, FIRST, TWO)
+        u = fma(w_end, w, fma(w_next, w_before, u))
+        q = fma(u_end, u, fma(u_next, u_before, q))
+        g = hertzian * q  # H w^4: the elastic force H w^3, times the w of dt = 2 w ds
+        u_l, u_r = (u, gap) if on_left else (gap, u)
+        one = 1.0 if k == 0 else 0.0
+        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
+        d, d_open = (v_l - v_o, v_o - v_r) if on_left else (v_o - v_r, v_l - v_o)
+        e = fma(loss, d, one)  # 1 + p u'
+        now = (v_o, d_open, a_l, a_r, a_o, e)
+        # The impact law (6) per 2 ds: H w^4 (1 + p u').
+        z = with_ends(z, e, g, first[5], g_0, second[5], g_1, before[5], g_before)
+        gv = with_ends(gv, v_o, w, first[0], w_0, second[0], w_1, before[0], w_before)
+        gd = with_ends(gd, d_open, w, first[1], w_0, second[1], w_1, before[1], w_before)
+        gl = with_ends(gl, a_l, w, first[2], w_0, second[2], w_1, before[2], w_before)
+        gr = with_ends(gr, a_r, w, first[3], w_0, second[3], w_1, before[3], w_before)
+        go = with_ends(go, a_o, w, first[4], w_0, second[4], w_1, before[4], w_before)
+        put(f, FACTORS * k, v_o, d_open, a_l, a_r, a_o, w, u, e)
+        put(f, FACTORS * k + SECOND, w, w, w, w, w, w, u, g)
+        if k == 0:
+            first, w_end, u_end = now, 2.0 * w, 2.0 * u
+        elif k == 1:
+            w_1, g_1, w_next, u_next = w, g, w, u
+        elif k == 2:
+            second, w_next, u_next = before, 2.0 * w_next, 2.0 * u_next
+        before, w_before, u_before, g_before = now, w, u, g
+        step = unit / (k + 1)
+        c[LANES * k + Lane.CHECK] = u
+        time, w = 2.0 * step * w, step * d
+        x_o, gap = 2.0 * step * gv, 2.0 * step * gd
+        v_l, v_r = 2.0 * step * fma(-push_l, z, gl), 2.0 * step * fma(push_r, z, gr)
+        v_o = 2.0 * step * fma(push_o, z, go)
+        z_l, z_r = (w, gap) if on_left else (gap, w)
+        put(c, LANES * (k + 1), time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r)
+
+
+@inlined
+def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n: int) -> None:
+    """Fill the Taylor table c from its order 0, with both sides in contact: G = w_l w_r. The series are in s / unit.
+
+    The power of two of the unit is a part of G here: in shallow contacts products of G alone with accelerations would
+    underflow.
+
+    Products: G v_o, G a_l, G a_r, G a_o, w_l w_r in both orders, so that a mirrored grasp has mirrored roundings,
+    w_r u_l', w_l u_r'; then for each side w w, u u, w^4 w of the other side, H g (1 + p u').
+    """
+    hertz_l, loss_l = pairs[LEFT, Law.HERTZIAN], pairs[LEFT, Law.DISSIPATION]
+    hertz_r, loss_r = pairs[RIGHT, Law.HERTZIAN], pairs[RIGHT, Law.DISSIPATION]
+    left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
+    x_o, v_l, v_o, v_r, w_l, w_r = c[X.O], c[V.L], c[V.O], c[V.R], c[Z.L], c[Z.R]
+    scale = scale_of(unit)
+    unit /= scale
+    s_l, s_r = scale * w_l, scale * w_r
+    b = (w_l * s_r, s_l, s_r, hertz_l * ((w_l * w_l) * (w_l * w_l) * s_r),
+         hertz_r * ((w_r * w_r) * (w_r * w_r) * s_l))
+    w_end_l, w_end_r, u_end_l, u_end_r = w_l, w_r, w_l * w_l, w_r * w_r
+    a = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for k in range(np.uint64(n)):
+        gv, gl, gr, go, ww, ww_mirrored, wd_l, wd_r = convolve(f, k, FIRST, ONE)
+        u_l, u_r, q_l, q_r, g_l, g_r, z_l, z_r = convolve(f, k, UPPER, ONE)
+        u_l, u_r = fma(w_end_l, w_l, u_l), fma(w_end_r, w_r, u_r)
+        q_l, q_r = fma(u_end_l, u_l, q_l), fma(u_end_r, u_r, q_r)
+        g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[8], s_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[9], s_l, g_r))
+        g = 0.5 * (fma(w_l, b[2], fma(a[4], s_r, ww)) + fma(w_r, b[1], fma(a[5], s_l, ww_mirrored)))
+        one = 1.0 if k == 0 else 0.0
+        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
+        d_l, d_r = v_l - v_o, v_o - v_r
+        e_l, e_r = fma(loss_l, d_l, one), fma(loss_r, d_r, one)
+        # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
+        z_l, z_r = fma(e_l, b[3], fma(a[10], g_l, z_l)), fma(e_r, b[4], fma(a[11], g_r, z_r))
+        wd_l, wd_r = fma(d_l, b[2], fma(a[6], s_r, wd_l)), fma(d_r, b[1], fma(a[7], s_l, wd_r))
+        gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
+        gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
+        put(f, FACTORS * k, v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r)
+        put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r)
+        put(f, FACTORS * k + SECOND, g, g, g, g, s_r, s_l, s_r, s_l)
+        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r)
+        if k == 0:
+            a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
+            w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
+        step = unit / (k + 1)
+        twice = 2.0 * step
+        c[LANES * k + Lane.CHECK] = g
+        w_l, w_r, x_o = step * wd_l, step * wd_r, twice * gv
+        s_l, s_r = scale * w_l, scale * w_r
+        v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
+        v_o = twice * fma(middle[0], z_l - z_r, go)
+        put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)

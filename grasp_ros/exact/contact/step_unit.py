@@ -1,0 +1,118 @@
+"""The unit of a Taylor step, near the inverse of the fastest rate, from the state alone; the step may correct it."""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.automaton.resting_pair import impact_beside
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.contact.step_order import LEAST, RADIUS, lower_order, new_order, order_for
+from grasp_ros.exact.impact import stored_energy
+from grasp_ros.exact.kinematics import approach, other, reduced_mass, relative_motion
+from grasp_ros.exact.numerics.powers_of_two import near_inverse, power_of_two_root
+from grasp_ros.exact.records import Array, Integers, Plant, Settings, State, Step
+from grasp_ros.exact.tolerances import DECAYS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U
+
+
+@kernel
+def rate_bound(bodies: Array) -> float:
+    """Power of two above the rates, in 1/s, at which the bodies (3, 4) move by themselves."""
+    rate = 0.0
+    for i in range(3):
+        body = bodies[i]
+        rate = max(rate, abs(body[Of.DAMPING]) / body[Of.MASS], math.sqrt(body[Of.STIFFNESS] / body[Of.MASS]))
+    return power_of_two_root(rate, 1)
+
+
+@kernel
+def new_settings(tolerance: float, highest: int, given: Array) -> Settings:
+    """What the accuracy of a run rests on; the workspace holds series of the `highest` order, that with both pairs.
+
+    Its terms must have fallen by two thirds of the order with one pair: later, they are large beside what moves.
+    """
+    one = lower_order(highest)
+    both = new_order(tolerance, highest, max(lower_order(one), LEAST))
+    return Settings(tolerance, new_order(tolerance, one, one), both, rate_bound(given))
+
+
+@inlined
+def impact_scales(hertzian: float, mu: float, u: float, d: float) -> tuple[float, float]:
+    """Scales of sqrt(u) and u' of an impact: those at which a free impact has the same energy (O1 read backwards)."""
+    energy = 0.5 * mu * d * d + stored_energy(hertzian, u)
+    return power_of_two_root(2.5 * energy / hertzian, 5), power_of_two_root(2.0 * energy / mu, 2)
+
+
+@inlined
+def turning_rate(plant: Plant, state: State, side: Body) -> tuple[float, float]:
+    """Scale of w of a pair in contact, and the rate at which w turns in its own regularised time.
+
+    dt = 2 w ds: like an impact, with v / w; under a steady acceleration a with sqrt(2 a); under the dissipation with
+    2 p H w^4 / mu. The other pair pushes, too.
+    """
+    hertzian, mu, u = plant.pairs[side, Law.HERTZIAN], reduced_mass(plant.bodies, side), state.y[U.L + side]
+    d, a = relative_motion(plant, state.y, side)
+    w, v = impact_scales(hertzian, mu, u, d)
+    a = abs(a)
+    beside = other(side)
+    if state.mode[beside] == Pair.CONTACT:
+        a += abs(impact_beside(plant, state, side)[0])
+    rate = max(v * near_inverse(w) if w > 0.0 else 0.0, math.sqrt(2.0 * a))
+    stiff = plant.pairs[side, Law.DISSIPATION] * hertzian / mu
+    return w, max(rate, 2.0 * stiff * (u * u))
+
+
+@inlined
+def reach_of_span(state: State, left: bool, right: bool, unit: float, span: float) -> float:
+    """About the s / unit at which a contact has lasted for a span in s: dt = 2 G ds, with G and G' as they begin."""
+    y, g, bend = state.y, 1.0, 0.0
+    if left:
+        g, bend = math.sqrt(y[U.L]), approach(y, LEFT)
+    if right:
+        w = math.sqrt(y[U.R])
+        bend = w * w * bend + g * g * approach(y, RIGHT) if left else approach(y, RIGHT)
+        g *= w
+    pace = unit * (g + math.sqrt(max(g * g + bend * span, 0.0)))
+    return span / pace if pace > 0.0 else math.inf
+
+
+@inlined
+def outlasts(y: Array, w_l: float, w_r: float, unit: float, span: float, reach: float) -> bool:
+    """Whether a span outlasts `reach` in s / unit for certain: as in `reach_of_span`, with scales that bound G, G'."""
+    bend = w_r * w_r * abs(approach(y, LEFT)) + w_l * w_l * abs(approach(y, RIGHT))
+    return span >= (2.0 * w_l * w_r + reach * unit * bend) * reach * unit
+
+
+@inlined
+def within_decay(plant: Plant, mode: Integers, span: float) -> float:
+    """A span in s, or the part of it in which a damper leaves enough of a velocity for its series to have digits.
+
+    An arm that touches nothing flies.
+    """
+    for body in (LEFT, OBJECT, RIGHT):
+        damping, mass = plant.bodies[body, Of.DAMPING], plant.bodies[body, Of.MASS]
+        if damping * span > DECAYS * mass and (body == OBJECT or mode[body] == Pair.CONTACT):
+            span = DECAYS * mass / damping
+    return span
+
+
+@inlined
+def new_step(plant: Plant, state: State, settings: Settings, span: float) -> Step:
+    """A step from here, in a unit of s in which its coefficients neither grow nor shrink by many decades.
+
+    With both pairs in contact dt = 2 w_l w_r ds: each turns at its rate times the w of the other one. A step that a
+    span will end needs fewer orders.
+    """
+    left, right = state.mode[LEFT] == Pair.CONTACT, state.mode[RIGHT] == Pair.CONTACT
+    w_l, rate_l, w_r, rate_r = 1.0, 0.0, 1.0, 0.0
+    if left:
+        w_l, rate_l = turning_rate(plant, state, LEFT)
+    if right:
+        w_r, rate_r = turning_rate(plant, state, RIGHT)
+    highest = settings.both if left and right else settings.one
+    fastest = max(rate_l * w_r, rate_r * w_l, 2.0 * w_l * w_r * settings.rate)
+    unit = near_inverse(fastest) if fastest > 0.0 else 1.0
+    if outlasts(state.y, w_l, w_r, unit, span, RADIUS * highest.first):
+        return Step(highest, unit, left, right)
+    order = order_for(settings.tolerance, highest, reach_of_span(state, left, right, unit, span))
+    return Step(order, unit, left, right)

@@ -1,0 +1,1 @@
+"""The loop over intervals and segments, with its outputs, checks and controllers."""

@@ -1,0 +1,133 @@
+"""The event-driven integrator: closed-form flights and Taylor contacts, joined at the transitions of `modes`.
+
+Within a segment the mode of both pairs is frozen. A segment ends at its first event in (t, t + h], at the end of
+the span, or after one Taylor step; events closer to each other than a few roundings happen together.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.automaton.modes import make_transitions, settle_pairs
+from grasp_ros.exact.compilation.jit import door, inlined
+from grasp_ros.exact.contact.segment import cut_step, press, step_ends
+from grasp_ros.exact.contact.step_unit import new_settings, within_decay
+from grasp_ros.exact.driver.callback import notify
+from grasp_ros.exact.driver.clock import tick, until
+from grasp_ros.exact.driver.energy_check import check_segment, energy_level
+from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
+from grasp_ros.exact.driver.outputs import may_go_on, write_reached
+from grasp_ros.exact.driver.rest import keep_scale, rests
+from grasp_ros.exact.driver.segment import deliver, move
+from grasp_ros.exact.flight.segment import cut_flight, flight_ends, fly_free
+from grasp_ros.exact.records import (
+    Array,
+    Ends,
+    Integers,
+    Level,
+    Loop,
+    Output,
+    Plant,
+    Segment,
+    Settings,
+    State,
+    Tables,
+    plant_of,
+    state_of,
+    tables_of,
+)
+from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Outcome, Pair, Place
+
+plant_in, state_in, tables_in = inlined(plant_of), inlined(state_of), inlined(tables_of)
+
+
+@inlined
+def next_segment(tables: Tables, plant: Plant, state: State, settings: Settings, span: float, work: Integers
+                 ) -> tuple[Segment, Ends]:
+    """The motion to its first event, to the end of the span, or as far as it is known; t: nan where a search fails."""
+    if state.mode[LEFT] == Pair.CONTACT or state.mode[RIGHT] == Pair.CONTACT:
+        span = within_decay(plant, state.mode, span)
+        segment = press(tables, plant, state, settings, span, work)
+        ends = step_ends(tables, plant, state, segment, work)
+        return cut_step(tables, plant, state, segment, ends, span), ends
+    segment = fly_free(plant, state, span, work)
+    ends = flight_ends(plant, state, segment, work)
+    return cut_flight(segment, ends), ends
+
+
+@inlined
+def end_segment(tables: Tables, plant: Plant, state: State, settings: Settings, segment: Segment, ends: Ends,
+                out: Output) -> None:
+    """Move on to the end of a segment, write what it leaves behind, and make the transitions of its events."""
+    move(tables, plant, segment, state)
+    deliver(tables, plant, segment, state, settings, out)
+    tick(state.clock, segment.t)
+    notify(out.observer, segment)
+    make_transitions(plant, state, ends, segment.s, out)
+
+
+@door
+def advance(
+    block: Array, order: int, plant_block: Array, state_block: Array, mode: Integers, tolerance: float, max_work: int,
+    grid: Array, rows: Array, events: Array, filled: Integers, work: Integers, observer: Integers, loop: Loop,
+) -> int:
+    """Integrate interval by interval, each segment by segment, from where the loop and the clock stand.
+
+    Parameters
+    ----------
+    block, order : array and int
+        Workspace, `records.tables_of`, for series up to an order.
+    plant_block, state_block, mode : arrays
+        `records.plant_of` and `records.state_of`, updated in place.
+    tolerance : float
+        First neglected Taylor term, relative to the impact.
+    max_work : int
+        Budget of flights, contact steps and evaluations of event functions together.
+    grid, rows, events, filled, work, observer : arrays (n,), (n, 6), (m, 5), (2,), (4,) and (2,)
+        `records.Output`, filled in place; output times in s from the begin of their interval.
+    loop : Loop
+        Updated in place.
+
+    Returns
+    -------
+    int
+        A `layout.Outcome`. If it is none of DONE, EVENTS_FULL, WORK_USED and NO_COMMAND, `rows` holds nothing of the
+        segment that failed.
+    """
+    tables, plant, state = tables_in(block, order), plant_in(plant_block), state_in(state_block, mode)
+    settings = new_settings(tolerance, order, plant.given)
+    out = Output(grid, rows, events, filled, work, observer)
+    if loop.lengths.shape[0] == 0:
+        return answer_end(state, loop)
+    end, idle, before, enters = 0.0, 0, Level(0.0, 0.0, 0.0, 0.0), True
+    while True:
+        if enters:
+            if not open_interval(plant, state, loop):
+                return Outcome.NO_COMMAND
+            end, out = loop.lengths[loop.place[Place.INTERVAL]], enter_interval(plant, state, loop, out, grid)
+            idle, before, enters = 0, energy_level(plant, state, 0.0), False
+            keep_scale(state, before)
+        reached = write_reached(state, out)
+        span = until(state.clock, end)
+        outcome = may_go_on(span, max_work, out)
+        enters = outcome == Outcome.DONE and close_interval(loop)
+        if enters:
+            continue
+        if outcome != Outcome.GO_ON:
+            return outcome
+        settle_pairs(plant, state, settings, out)
+        if rests(plant, state):
+            rest(state, loop)
+            continue
+        modes = (state.mode[LEFT], state.mode[RIGHT])
+        segment, ends = next_segment(tables, plant, state, settings, span, out.work)
+        if math.isnan(segment.t):
+            return Outcome.STALLED
+        end_segment(tables, plant, state, settings, segment, ends, out)
+        idle = 0 if segment.t > 0.0 else idle + 1
+        after = energy_level(plant, state, segment.t)
+        outcome = check_segment(plant, state, settings, before, after, segment.t, idle, modes)
+        if outcome != Outcome.GO_ON:
+            out.filled[Filled.OUTPUTS] = reached
+            return outcome
+        before = after

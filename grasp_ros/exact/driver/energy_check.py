@@ -1,0 +1,139 @@
+"""The check of a segment: its energy cannot rise, nor fall by more than its losses, and no touch may be missed."""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.impact import elastic_force, stored_energy
+from grasp_ros.exact.kinematics import approach, arm_of, reduced_mass
+from grasp_ros.exact.records import Array, Level, Plant, Settings, State
+from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
+from grasp_ros.physics.body_energy import body_energy
+from grasp_ros.physics.domain import LARGEST_POSITION, LARGEST_SPEED
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Outcome, Pair, U, V, X
+
+own_energy = kernel(body_energy)
+
+
+@kernel
+def level_of(body: Array, x: float, v: float, way: float, t: float) -> tuple[float, float]:
+    """Energy in J of V of a body (4,) at the end of a segment of t s, and the sum of the sizes of its terms.
+
+    An arm that touches the object takes its place, with the roundings of a `way` in m. A force that carries the body
+    away and a weak spring that brings it back leave small terms at both ends.
+    """
+    mass, stiffness, force = body[Of.MASS], body[Of.STIFFNESS], body[Of.FORCE]
+    value, size = own_energy(mass, stiffness, force, x, v, abs(x) + way)
+    if force != 0.0:
+        away = t * (abs(v) + 0.5 * t * abs(force) / mass)
+        size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
+    return value, size
+
+
+@kernel
+def jump(plant: Plant, y: Array, side: Body, t: float) -> float:
+    """What an arm gains or loses, J of V, where a touch after t s puts it to u = 0: by the rounding of that time."""
+    if y[U.L + side] != 0.0:
+        return 0.0
+    body = plant.given[side]
+    held = abs(body[Of.FORCE]) + abs(body[Of.STIFFNESS] * arm_of(y, side)[0])
+    return 2.0 * held * EPS * t * abs(approach(y, side))
+
+
+@inlined
+def energy_level(plant: Plant, state: State, t: float) -> Level:
+    """V_c - 2 sum f x at the end of a segment of t s. Dry friction is left out, because it only takes."""
+    y, given = state.y, plant.given
+    value, size = level_of(given[OBJECT], y[X.O], y[V.O], 0.0, t)
+    way = abs(y[X.O]) + t * abs(y[V.O])
+    left, size_l = level_of(given[LEFT], y[X.L], y[V.L], way, t)
+    right, size_r = level_of(given[RIGHT], y[X.R], y[V.R], way, t)
+    impact = 0.0
+    for side in (LEFT, RIGHT):
+        u = y[U.L + side]
+        if u > 0.0 and state.mode[side] != Pair.ABSENT:
+            impact += 2.0 * stored_energy(plant.pairs[side, Law.HERTZIAN], u)
+    return Level(left + right + value + impact, size_l + size_r + size + impact, y[U.L], y[U.R])
+
+
+@kernel
+def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: float) -> float:
+    """Bound, in J of V, on what is taken in t s from motions that have the energy `size`.
+
+    A damper takes c v^2, friction F |v|, and a pair in contact p H u^1.5 u'^2; one without force loses what it stored.
+    """
+    rate = 0.0
+    for body in (LEFT, OBJECT, RIGHT):
+        rate = max(rate, plant.given[body, Of.DAMPING] / plant.given[body, Of.MASS])
+    loss = 2.0 * rate * t * size + 2.0 * plant.coulomb * t * math.sqrt(size / plant.given[OBJECT, Of.MASS])
+    for side in (LEFT, RIGHT):
+        mode, u = (modes[0], before.u_l) if side == LEFT else (modes[1], before.u_r)
+        hertzian, u = plant.pairs[side, Law.HERTZIAN], max(u, 0.0)
+        if mode == Pair.CONTACT:
+            d = math.sqrt(size / reduced_mass(plant.given, side))
+            loss += 2.0 * plant.pairs[side, Law.DISSIPATION] * elastic_force(hertzian, u + d * t) * d * d * t
+        elif mode in (Pair.CLAMPED, Pair.LEAVING):
+            loss += 2.0 * stored_energy(hertzian, u)
+    return loss
+
+
+@inlined
+def may_be_damped(plant: Plant, fall: float, size: float, t: float) -> bool:
+    """Whether the damper of one body can take a fall of the energy: what most segments need to know, for less."""
+    arm, body, far = plant.given[LEFT], plant.given[OBJECT], plant.given[RIGHT]
+    most = 2.0 * t * size
+    return bool(fall * arm[Of.MASS] <= most * arm[Of.DAMPING] or fall * far[Of.MASS] <= most * far[Of.DAMPING]
+                or fall * body[Of.MASS] <= most * body[Of.DAMPING])
+
+
+@inlined
+def penetrates(plant: Plant, state: State, side: Body, before: float, size: float, t: float) -> bool:
+    """Whether an open pair is closed by more than the roundings of its ways in t s: a touch has been missed.
+
+    A body goes no faster than the energy `size` allows. What has DIED_OUT is not followed. What u was `before`,
+    roundings of a longer way may have left.
+    """
+    u = state.y[U.L + side]
+    if state.mode[side] != Pair.OPEN or u <= max(before, 0.0):
+        return False
+    fastest = math.sqrt(size / plant.given[side, Of.MASS]) + math.sqrt(size / plant.given[OBJECT, Of.MASS])
+    way = abs(arm_of(state.y, side)[0]) + abs(state.y[X.O]) + t * fastest
+    return u > ENERGY * EPS * way + DIED_OUT
+
+
+@inlined
+def is_outside(y: Array) -> bool:
+    """Whether a body is farther away, or faster, than the domain allows."""
+    return bool(max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])) > LARGEST_POSITION
+                or max(abs(y[V.L]), abs(y[V.O]), abs(y[V.R])) > LARGEST_SPEED)
+
+
+@inlined
+def check_segment(plant: Plant, state: State, settings: Settings, before: Level, after: Level, t: float, idle: int,
+                  modes: tuple[int, int]) -> Outcome:
+    """Whether a segment of t s, which began with both pairs in `modes`, can be believed.
+
+    It must be finite, within the domain, not stalled, without a touch that was missed, and its energy may neither rise
+    nor fall by more than rounding and losses explain. Where a feedback drives an arm (c + Kv < 0) energy may come.
+    """
+    rise, size = after.value - before.value, max(after.size, before.size)
+    if not math.isfinite(state.y.sum()):
+        return Outcome.NOT_FINITE
+    if is_outside(state.y):
+        return Outcome.OUTSIDE
+    if math.isnan(t) or idle > MAX_IDLE:
+        return Outcome.STALLED
+    if penetrates(plant, state, LEFT, before.u_l, size, t) or penetrates(plant, state, RIGHT, before.u_r, size, t):
+        return Outcome.PENETRATES
+    rounding = (ENERGY * EPS + NEGLECTED * settings.tolerance) * size + ENERGY_UNDERFLOW
+    driven = plant.given[LEFT, Of.DAMPING] < 0.0 or plant.given[RIGHT, Of.DAMPING] < 0.0
+    if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
+        return Outcome.GO_ON
+    rounding += jump(plant, state.y, LEFT, t) + jump(plant, state.y, RIGHT, t)
+    if rise > rounding:
+        return Outcome.ENERGY_RISES
+    fall = -rise - rounding
+    if fall <= 0.0 or may_be_damped(plant, fall, size, t) or fall <= losses(plant, before, modes, size, t):
+        return Outcome.GO_ON
+    return Outcome.ENERGY_FALLS

@@ -1,0 +1,112 @@
+"""The intervals of a run: what acts in each of them, and the controllers that answer at its begin.
+
+Inputs are constant within an interval. In a sampled loop it is a control period: each controller measures its arm,
+answers, and the command waits for the periods of the delay. Under continuous feedback an interval lasts until an
+external force changes; without one it is the whole run.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.automaton.modes import begin_interval
+from grasp_ros.exact.compensated import put
+from grasp_ros.exact.compilation.jit import inlined, whole
+from grasp_ros.exact.driver.control import feedback, limited, measured
+from grasp_ros.exact.driver.rest import SINCE
+from grasp_ros.exact.driver.user_controller import call
+from grasp_ros.exact.kinematics import arm_of
+from grasp_ros.exact.records import Array, Loop, Output, Plant, State
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Answer, Of, Outcome, Place, V
+
+FIRST = whole(0)  # interval
+
+
+@inlined
+def answer(state: State, loop: Loop, k: int) -> bool:
+    """Write what the controllers answer to the state at the begin of interval k; whether all of it is a number.
+
+    What a scene's own law makes of a state that overflows is not refused here: it ends the run with its status.
+    """
+    for side in (LEFT, RIGHT):
+        callee, row = loop.callee[side], loop.laws[side]
+        if callee == Answer.GIVEN:
+            continue
+        x, v, _ = arm_of(state.y, side)
+        x, v = measured(row, loop.normals[side, min(k, loop.normals.shape[1] - 1)], x, v)
+        if callee == Answer.LAW:
+            force = feedback(row, x, v)
+        else:
+            force = call(callee, loop.place[Place.TICK] + k, state.clock[2], x, v)
+            if not math.isfinite(force):
+                loop.place[Place.FAILED] = side
+                return False
+        loop.answers[k, side] = limited(row, force)
+    return True
+
+
+@inlined
+def set_inputs(plant: Plant, loop: Loop, k: int) -> None:
+    """Let the commands that arrive at the begin of interval k act, and the external forces."""
+    held, pushed, delay = loop.answers.shape[0] > 0, loop.external.shape[0] > 0, loop.waiting.shape[0]
+    slot = (loop.place[Place.TICK] + k) % delay if delay > 0 else 0
+    for body in (LEFT, RIGHT, OBJECT):
+        force = loop.answers[k, body] if held else 0.0
+        if delay > 0:
+            force, loop.waiting[slot, body] = loop.waiting[slot, body], force
+        if pushed:  # -0.0 + 0.0 is another bit pattern
+            force = force + loop.external[k, body] if held else loop.external[k, body]
+        loop.inputs[k, body] = force
+        plant.given[body, Of.FORCE] = plant.own[body] + force
+
+
+@inlined
+def open_interval(plant: Plant, state: State, loop: Loop) -> bool:
+    """Begin the next interval, unless it has begun; False if a controller gives no number."""
+    if loop.place[Place.BEGUN]:
+        return True
+    k = loop.place[Place.INTERVAL]
+    state.clock[0], state.clock[1], state.clock[2] = 0.0, 0.0, loop.begins[k]
+    if loop.inputs.shape[0] > 0:
+        if loop.answers.shape[0] > 0 and not answer(state, loop, k):
+            return False
+        set_inputs(plant, loop, k)
+    loop.place[Place.BEGUN] = 1
+    return True
+
+
+@inlined
+def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Array) -> Output:
+    """Modes under the inputs of an interval that begins or goes on; what it writes: the output times up to its end."""
+    end = loop.bounds[loop.place[Place.INTERVAL] + 1]
+    out = Output(grid[:end], out.rows, out.events, out.filled, out.work, out.observer)
+    begin_interval(plant, state, out)
+    return out
+
+
+@inlined
+def rest(state: State, loop: Loop) -> None:
+    """Let the rest of an interval pass; in the last one, where no controller answers any more, it is rest for good."""
+    put(state, V.L, 0.0)
+    put(state, V.O, 0.0)
+    put(state, V.R, 0.0)
+    last = loop.place[Place.INTERVAL] + 1 == loop.lengths.shape[0] and loop.answers.shape[0] == 0
+    if last and state.rest[SINCE] == math.inf:
+        state.rest[SINCE] = (state.clock[0] + state.clock[1]) + state.clock[2]
+    state.clock[0], state.clock[1] = loop.lengths[loop.place[Place.INTERVAL]], 0.0
+
+
+@inlined
+def close_interval(loop: Loop) -> bool:
+    """End an interval; whether another one follows."""
+    loop.place[Place.INTERVAL] += 1
+    loop.place[Place.BEGUN] = 0
+    following: bool = loop.place[Place.INTERVAL] < loop.lengths.shape[0]
+    return following
+
+
+@inlined
+def answer_end(state: State, loop: Loop) -> Outcome:
+    """Answers to the last state of a run, which nothing follows: what a loop without intervals is for."""
+    state.clock[0], state.clock[1], state.clock[2] = 0.0, 0.0, loop.begins[0]
+    return Outcome.DONE if answer(state, loop, FIRST) else Outcome.NO_COMMAND

@@ -1,0 +1,70 @@
+"""A motion that has come to rest: it moves by less than REST of the scale of the scene, and will not start again.
+
+Positions and velocities are relative to the largest position and the largest energy with which an interval has begun.
+"""
+
+from __future__ import annotations
+
+from grasp_ros.exact.automaton.friction import impact_on_object
+from grasp_ros.exact.compensated import velocity_lane
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.impact import elastic_slope
+from grasp_ros.exact.kinematics import own_acceleration, own_size
+from grasp_ros.exact.records import Level, Plant, State
+from grasp_ros.exact.tolerances import DERIVATIVE, REST
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V, X
+
+ENERGY, LENGTH, SINCE = range(3)  # places of `State.rest`: J of V and m, so far, and the time of rest in s
+
+
+@inlined
+def keep_scale(state: State, begin: Level) -> None:
+    """Remember the largest energy and position with which an interval has begun."""
+    y, rest = state.y, state.rest
+    rest[ENERGY] = max(rest[ENERGY], begin.size)
+    rest[LENGTH] = max(rest[LENGTH], abs(y[X.L]), abs(y[X.O]), abs(y[X.R]))
+
+
+@inlined
+def may_rest(plant: Plant, state: State) -> bool:
+    """Whether no body moves any more: what most segments need to know, for less."""
+    y, most = state.y, REST * REST * state.rest[ENERGY]
+    return bool(plant.given[LEFT, Of.MASS] * y[V.L] * y[V.L] <= most
+                and plant.given[RIGHT, Of.MASS] * y[V.R] * y[V.R] <= most
+                and plant.given[OBJECT, Of.MASS] * y[V.O] * y[V.O] <= most)
+
+
+@kernel
+def contact_stiffness(plant: Plant, state: State, side: Body) -> float:
+    """Slope of the Hertzian force of a pair in contact, N/m."""
+    if state.mode[side] != Pair.CONTACT:
+        return 0.0
+    return elastic_slope(plant.pairs[side, Law.HERTZIAN], max(state.y[U.L + side], 0.0))
+
+
+@kernel
+def stays(plant: Plant, state: State, body: Body) -> bool:
+    """Whether a body stays where it is, but for a part REST of the largest position.
+
+    A spring or a contact holds what is near its balance; a body without either rests if nothing moves it at all.
+    """
+    row, lane = plant.bodies[body], velocity_lane(body)
+    x, v = state.y[lane - 1], state.y[lane]
+    push_l = impact_on_object(plant, state, LEFT).value if state.mode[LEFT] == Pair.CONTACT else 0.0
+    push_r = impact_on_object(plant, state, RIGHT).value if state.mode[RIGHT] == Pair.CONTACT else 0.0
+    held_l, held_r = contact_stiffness(plant, state, LEFT), contact_stiffness(plant, state, RIGHT)
+    push = push_l - push_r if body == OBJECT else (-push_l if body == LEFT else push_r)
+    stiffness = row[Of.STIFFNESS] + (held_l + held_r if body == OBJECT else (held_l if body == LEFT else held_r))
+    a = own_acceleration(row, x, v) + push / row[Of.MASS]
+    if row[Of.DAMPING] < 0.0:
+        return False
+    if stiffness > 0.0:
+        return bool(abs(a) * row[Of.MASS] <= stiffness * REST * max(state.rest[LENGTH], abs(x)))
+    return bool(v == 0.0 and abs(a) <= DERIVATIVE * own_size(row, x, v))
+
+
+@inlined
+def rests(plant: Plant, state: State) -> bool:
+    """Whether everything is at rest for as long as the inputs stay the same."""
+    return (may_rest(plant, state) and stays(plant, state, LEFT) and stays(plant, state, OBJECT)
+            and stays(plant, state, RIGHT))

@@ -1,0 +1,1 @@
+"""Motion without contact: closed forms, and the search for the first touch."""

@@ -1,0 +1,155 @@
+"""Free flight: m x'' + c x' + k x = f with f constant, solved in closed form.
+
+Every body between contacts obeys this equation, so a flight of any length costs one evaluation.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.numerics.polynomial import INVERSE
+from grasp_ros.exact.records import Array, Flight, Flights, Flown, Plant, Regime
+from grasp_ros.exact.tolerances import FAR, FAR_SHORT, SETTLED, SHORT_FLIGHT
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Of, V, X
+
+FLIGHT_ORDER = whole(16)  # (1/2)^16 / 16! is below rounding; typed, or numba compiles its users once more
+
+
+@kernel
+def launch(body: Array, x: float, v: float) -> Flight:
+    """Constants of one body's flight from (x, v), for `fly`; body is its row (4,)."""
+    m = body[Of.MASS]
+    k = body[Of.STIFFNESS]
+    sigma = 0.5 * body[Of.DAMPING] / m
+    omega0_2 = k / m
+    push = (body[Of.FORCE] - k * x) / m
+    discriminant = omega0_2 - sigma * sigma
+    rate = math.sqrt(abs(discriminant))
+    if omega0_2 == 0.0 and sigma == 0.0:
+        return Flight(Regime.DRIFT, x, v, 0.0, 0.0, push, 0.0, 0.0, 0.0)
+    x_e = body[Of.FORCE] / k if k > 0.0 else math.inf
+    if discriminant <= 0.0 and rate > 0.5 * sigma and abs(x_e) > abs(x):
+        return Flight(Regime.OVER, x, v, 0.0, 0.0, push, sigma, rate, omega0_2)
+    regime = Regime.UNDER if discriminant > 0.0 else Regime.NEAR
+    return Flight(regime, x, v, x - x_e, x_e, push, sigma, rate, omega0_2)
+
+
+@inlined
+def flights_of(plant: Plant, y: Array) -> Flights:
+    """Flights of all bodies from y."""
+    return Flights(
+        launch(plant.bodies[LEFT], y[X.L], y[V.L]), launch(plant.bodies[RIGHT], y[X.R], y[V.R]),
+        launch(plant.bodies[OBJECT], y[X.O], y[V.O]),
+    )
+
+
+@inlined
+def free_flights(plant: Plant, y: Array, left: bool, right: bool) -> Flights:
+    """Flights of the arms that touch nothing while another one does; the others are of no use."""
+    still = Flight(Regime.DRIFT, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    return Flights(
+        still if left else launch(plant.bodies[LEFT], y[X.L], y[V.L]),
+        still if right else launch(plant.bodies[RIGHT], y[X.R], y[V.R]), still,
+    )
+
+
+@kernel
+def fly(flight: Flight, t: float) -> Flown:
+    """Position and velocity after the time t >= 0 of flight, and how far they have come.
+
+    `UNDER` and `NEAR` (critical or over-damped) describe the swing around the rest position, which decays without
+    loss of digits. `OVER` is for an over-damped body whose rest position is too far away to be subtracted from,
+    or does not exist; for the same reason short flights use the power series of the equation. expm1 keeps the
+    digits in the limits of equal roots and of a vanishing spring; where the roots are far apart, a velocity is a
+    difference of two decays, never of a decay and what has nearly the same size.
+    """
+    regime, x, v, swing, x_e, push, sigma, rate, omega0_2 = flight
+    if regime == Regime.DRIFT:
+        way, change = t * (v + 0.5 * t * push), t * push
+        return Flown(x + way, v + change, way, change)
+    if t * (2.0 * abs(sigma) + math.sqrt(omega0_2)) < (FAR_SHORT if abs(x_e) > FAR * abs(x) else SHORT_FLIGHT):
+        way, change = short_flight(v, push, sigma, omega0_2, t)
+        return Flown(x + way, v + change, way, change)
+    if regime == Regime.UNDER:
+        decay = math.exp(-sigma * t)
+        response = decay * math.sin(rate * t) / rate
+        cosine = decay * math.cos(rate * t)
+        return Flown(
+            x_e + swing * (cosine + sigma * response) + v * response,
+            v * (cosine - sigma * response) + push * response, math.nan, math.nan,
+        )
+    fast = -(sigma + rate) if sigma >= 0.0 else omega0_2 / (rate - sigma)
+    slow = omega0_2 / fast if sigma >= 0.0 else rate - sigma
+    slow_decay, fast_decay = math.exp(slow * t), math.exp(fast * t)
+    response = slow_decay * (t if rate == 0.0 else -math.expm1(-2.0 * rate * t) / (2.0 * rate))
+    velocity = v * (fast_decay + slow * response) + push * response
+    if regime == Regime.NEAR:
+        return Flown(x_e + swing * (slow_decay - slow * response) + v * response, velocity, math.nan, math.nan)
+    slow_part = t if slow == 0.0 else math.expm1(slow * t) / slow
+    fast_part = t if fast == 0.0 else math.expm1(fast * t) / fast
+    x += v * response + push * (slow_part - fast_part) / (2.0 * rate)
+    return Flown(x, velocity, math.nan, math.nan)
+
+
+@inlined
+def settling_time(flight: Flight, span: float) -> float:
+    """Time in s after which a flight has died out; 0 of a body at rest, inf where it never does within a span."""
+    _, _, v, _, _, push, sigma, rate, omega0_2 = flight
+    if v == 0.0 and push == 0.0:
+        return 0.0
+    if sigma * span <= SETTLED or (omega0_2 == 0.0 and push + 2.0 * sigma * v != 0.0):
+        return math.inf
+    if flight.regime == Regime.UNDER:
+        return SETTLED / sigma
+    return SETTLED / (sigma + rate) if omega0_2 == 0.0 else SETTLED * (sigma + rate) / omega0_2
+
+
+@kernel
+def short_flight(v: float, push: float, sigma: float, omega0_2: float, t: float) -> tuple[float, float]:
+    """Changes of position and velocity in a time below both time constants: the power series of the flight."""
+    before = v  # (n+1) y_(n+1) t^n
+    term = (push - 2.0 * sigma * v) * t
+    position = v * t
+    change = 0.0
+    n = 1
+    drag, spring = -2.0 * sigma * t, -omega0_2 * t * t
+    while n < 24:
+        change += term
+        share = INVERSE[n + 1]
+        position += (term * t) * share
+        following = (drag * term + spring * (before * INVERSE[n])) * share
+        before, term = term, following
+        n += 1
+        if abs(term) <= 1e-18 * abs(change) and abs(before) <= 1e-18 * abs(change):
+            break
+    return position, change
+
+
+@kernel
+def expand_flight(bodies: Array, flights: Flights, t: float, c: Array) -> None:
+    """Write the Taylor table about the time t of flight: positions and velocities in their places of the state.
+
+    Within half of the time constants one table serves many outputs: a polynomial costs less than a closed form.
+    """
+    for i in range(LANES):
+        c[i] = 0.0
+    expand_body(bodies, LEFT, flights.left, t, c)
+    expand_body(bodies, OBJECT, flights.object, t, c)
+    expand_body(bodies, RIGHT, flights.right, t, c)
+
+
+@kernel
+def expand_body(bodies: Array, body: Body, flight: Flight, t: float, c: Array) -> None:
+    """Write the Taylor coefficients of one body's position and velocity."""
+    row, lane = bodies[body], X.O if body == OBJECT else (X.L if body == LEFT else X.R)
+    m = row[Of.MASS]
+    force, k, d = row[Of.FORCE] / m, row[Of.STIFFNESS] / m, row[Of.DAMPING] / m
+    x, v, _, _ = fly(flight, t)
+    c[lane], c[lane + 1] = x, v
+    for n in range(FLIGHT_ORDER):
+        share = 1.0 / (n + 1)
+        x, v = share * v, share * ((force - k * x) - d * v)
+        force = 0.0
+        i = LANES * (n + 1) + lane
+        c[i], c[i + 1] = x, v

@@ -1,0 +1,1 @@
+"""Polynomials, their roots, and powers of two."""

@@ -1,0 +1,179 @@
+"""Tables of eight polynomials side by side: their values, their ranges, and the inverse of the time; products of one.
+
+Coefficient k of a lane stands at LANES k + lane, so that one pass evaluates all lanes in vector instructions. Orders
+are even: the even and the odd powers are summed side by side, which halves the time until the result is there.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from grasp_ros.exact.compilation.fma import fma
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.records import Array, Lanes, Step, Tables
+from grasp_ros.exact.tolerances import NOISE
+from grasp_ros.physics.layout import EPS, LANES, Lane, V, Z
+
+FIRST, SECOND = whole(0), whole(2)  # typed: numba would compile `lanes` and `sizes` once more for a literal
+INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would keep the next one waiting
+
+
+@kernel
+def lanes(c: Array, k: int) -> Lanes:
+    """The coefficients k."""
+    i = np.uint64(LANES) * np.uint64(k)  # unsigned indices spare the test for negative ones
+    return (
+        c[i], c[i + np.uint64(1)], c[i + np.uint64(2)], c[i + np.uint64(3)],
+        c[i + np.uint64(4)], c[i + np.uint64(5)], c[i + np.uint64(6)], c[i + np.uint64(7)],
+    )
+
+
+@kernel
+def sizes(c: Array, k: int) -> Lanes:
+    """The absolute coefficients k."""
+    x = lanes(c, k)
+    return (
+        abs(x[0]), abs(x[1]), abs(x[2]), abs(x[3]),
+        abs(x[4]), abs(x[5]), abs(x[6]), abs(x[7]),
+    )
+
+
+@kernel
+def larger(x: Lanes, z: Lanes) -> Lanes:
+    """The larger number of each lane."""
+    return (
+        max(x[0], z[0]), max(x[1], z[1]), max(x[2], z[2]), max(x[3], z[3]),
+        max(x[4], z[4]), max(x[5], z[5]), max(x[6], z[6]), max(x[7], z[7]),
+    )
+
+
+@kernel
+def sums(x: Lanes, z: Lanes) -> Lanes:
+    """The sum of each lane."""
+    return (x[0] + z[0], x[1] + z[1], x[2] + z[2], x[3] + z[3], x[4] + z[4], x[5] + z[5], x[6] + z[6], x[7] + z[7])
+
+
+@kernel
+def products(x: Lanes, s: float) -> Lanes:
+    """Each lane times s."""
+    return (x[0] * s, x[1] * s, x[2] * s, x[3] * s, x[4] * s, x[5] * s, x[6] * s, x[7] * s)
+
+
+@kernel
+def horner(total: Lanes, s: float, x: Lanes) -> Lanes:
+    """One more coefficient of each lane."""
+    return (
+        fma(total[0], s, x[0]), fma(total[1], s, x[1]), fma(total[2], s, x[2]), fma(total[3], s, x[3]),
+        fma(total[4], s, x[4]), fma(total[5], s, x[5]), fma(total[6], s, x[6]), fma(total[7], s, x[7]),
+    )
+
+
+@inlined
+def ways(c: Array, n: int, s: float) -> Lanes:
+    """How far the lanes come on the way to s, of the even degree n."""
+    square = s * s
+    even, odd = lanes(c, n), lanes(c, n - 1)
+    for k in range(n - 2, 0, -2):
+        even, odd = horner(even, square, lanes(c, k)), horner(odd, square, lanes(c, k - 1))
+    return products(horner(even, s, odd), s)
+
+
+@inlined
+def values(c: Array, n: int, s: float, at: Array) -> None:
+    """Write the lanes' values at s, of the even degree n, to `at`.
+
+    The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
+    """
+    total = sums(ways(c, n, s), lanes(c, FIRST))
+    for lane in range(LANES):
+        at[lane] = total[lane]
+
+
+@inlined
+def values_and_ways(c: Array, n: int, s: float, at: Array) -> None:
+    """Write the lanes' values at s, of the even degree n, to `at`, and behind them how far they have come."""
+    way = ways(c, n, s)
+    total = sums(way, lanes(c, FIRST))
+    for lane in range(LANES):
+        at[lane], at[LANES + lane] = total[lane], way[lane]
+
+
+@inlined
+def curvatures(c: Array, n: int, s: float, size: Array) -> None:
+    """Write the lanes' sums of |c_k| s^k over k >= 2 to `size`."""
+    square = s * s
+    even, odd = sizes(c, n), sizes(c, n - 1)
+    for k in range(n - 2, 2, -2):
+        even, odd = horner(even, square, sizes(c, k)), horner(odd, square, sizes(c, k - 1))
+    even = horner(even, square, sizes(c, SECOND))
+    for lane in range(LANES):
+        size[lane] = (even[lane] + s * odd[lane]) * square
+
+
+@inlined
+def lane_range(tables: Tables, lane: int, s: float) -> tuple[float, float]:
+    """Bounds (low, high) of a lane in (0, s], in proportion to the distance from its value c_0 at 0.
+
+    With at = f(s) and size = sum of |c_k| s^k over k >= 2, the terms of one sign beyond the linear one lie between 0
+    and half of their signed and absolute sums: f stays between the lines from c_0 to `low` and to `high`.
+    """
+    begin, size = tables.c[lane], tables.size[lane]
+    line = begin + s * tables.c[LANES + lane]
+    middle, width = 0.5 * (line + tables.at[lane]), 0.5 * size + NOISE * (abs(begin) + abs(line) + size)
+    return middle - width, middle + width
+
+
+@inlined
+def invert_time(tables: Tables, step: Step, tau: float, high: float, total: float) -> float:
+    """The s / unit in [0, high] at which the time since the begin of a step is tau; `total` is the time at high.
+
+    dt = 2 G ds with G = w_l w_r of the sides in contact. Halley's iteration with bisection: its error is cubed each
+    time, or squared where u' is little more than rounding, so a correction of 1e-8 is the last one needed. It starts
+    from the parabola through both ends.
+    """
+    c, at, n, unit = tables.c, tables.at, step.order.number, step.unit
+    slope = c[LANES + Lane.TIME]
+    bend = (total - slope * high) / (high * high)
+    s = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))
+    low = 0.0
+    if not low < s < high:
+        s = 0.5 * high
+    for _ in range(200):
+        values(c, n, s, at)
+        w_l, d_l = (at[Z.L], at[V.L] - at[V.O]) if step.left else (1.0, 0.0)
+        w_r, d_r = (at[Z.R], at[V.O] - at[V.R]) if step.right else (1.0, 0.0)
+        rest = at[Lane.TIME] - tau
+        if rest > 0.0:
+            high = s
+        else:
+            low = s
+        g, turn = w_l * w_r, w_r * w_r * d_l + w_l * w_l * d_r
+        twice = 2.0 * g
+        newton = rest / (unit * twice)
+        bend = newton * unit * turn / twice  # large where w has a root near
+        following = s - newton / (1.0 - bend)
+        if not low <= following <= high:
+            following = 0.5 * (low + high)
+        elif abs(following - s) <= 1e-8 * s and abs(bend) <= 1e-8:
+            return following
+        if high - low <= 2.0 * EPS * high:
+            return following
+        s = following
+    return s
+
+
+@kernel
+def product(f: Array, a: int, b: int, out: int, n: int) -> None:
+    """Cauchy product up to the order n of two series that begin at a and b in f, and not at `out`.
+
+    The terms of a coefficient are added in their order, but those of the others in between: no sum waits for the last.
+    """
+    first, second, product = f[a : a + n + 1], f[b : b + n + 1], f[out : out + n + 1]
+    for k in range(n + 1):
+        product[k] = 0.0
+    for j in range(n + 1):
+        factor = first[j]
+        for k in range(n + 1 - j):
+            product[j + k] += factor * second[k]

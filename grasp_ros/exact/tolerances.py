@@ -1,0 +1,45 @@
+"""Tolerances: all bounds by which a rounding, or what an accuracy may neglect, decides; each with its reason.
+
+Bounds that only save work, such as how long a search goes on in one way, stand where they are used.
+"""
+
+from __future__ import annotations
+
+from grasp_ros.physics.layout import EPS
+
+# Events and modes.
+TOGETHER = 1.0 + 4.0 * EPS  # events closer than this happen together: their times are sums of a few roundings
+DERIVATIVE = 64.0 * EPS  # of the sum of its terms: a derivative below it is none, it is their cancellation
+SURFACE = 4.0  # roundings of the terms of 1 + p u', within which a pair is at u' = -1/p
+SURFACE_DRIFT = 1024.0  # the same after flights, which leave roundings in u'
+FRICTION = 16.0 * EPS  # of the terms of what holds an object: of a force, and of a state that rests under it
+LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the accuracy
+TURNS, CLAMPS = 20.0, 4.0  # times what u' may change before u = 0: both terms, and those behind them
+
+# The begin of a contact without its force.
+HELD = 56  # binary orders by which the impulse that is left out is below that of the motion: an eighth of a rounding
+OUTWEIGHS = 6  # binary orders by which the first term of u exceeds each later one: u and u' keep their sign
+
+# Rest.
+REST = 2.0**-49  # of the scale of a scene: eight roundings, which forces that balance may have
+SETTLED = 40.0  # time constants after which a flight may rest: e^-40 is less than a rounding
+
+# Ways that have digits of their own.
+SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants: there the power series has all digits; where rest is FAR
+FAR = 4.0  # times the position: a rest position whose roundings would take digits of a flight that hardly moves
+SHORT_START = 0.2  # of the time constants, well within those of a short flight
+SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of its end
+FLIGHT_PARTS = 2.0**44  # of a flight, beyond which a rounding of the time may be longer than a part
+
+# Taylor steps.
+NOISE = 100.0 * EPS  # of a polynomial with some tens of terms
+STILL = 2.0**-4  # of a rounding of the fastest velocity: what a step may neglect of each
+CANCELS = 16.0  # times u' at either end: terms so large leave their roundings in what a relaxation ends with
+DECAYS = 2.0  # time constants of a damper in a step: e^2 is by how much terms that cancel exceed what is left
+
+# The check of a segment.
+ENERGY = 128.0  # roundings of the sum of all terms: flights, impacts and differences of positions
+NEGLECTED = 1000.0  # of it times the accuracy: a contact step may be off by some hundred first neglected terms
+ENERGY_UNDERFLOW = 1e-300  # J; energies of a motion that died out have few digits
+DIED_OUT = 1e-150  # m; squares and products of less have left the range of numbers
+MAX_IDLE = 1000  # segments without progress in time

@@ -1,0 +1,209 @@
+"""Many runs in one call: rows of plants, each integrated to its end as `Integrator` does it, without the interpreter.
+
+The door `driver.advance` is called by its address, because a second copy of its machine code would take as long to
+compile as the first. What is out of the ordinary is left to `Integrator`: a row that ends otherwise than at the end of
+its horizon is only marked.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.core import types
+
+from grasp_ros.exact.compensated import write_penetrations
+from grasp_ros.exact.compilation.jit import door as machine_door
+from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.driver.advance import advance
+from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, call
+from grasp_ros.exact.driver.workspace import workspace
+from grasp_ros.exact.integrator import BREATH, compile_kernels
+from grasp_ros.exact.records import (
+    COULOMB,
+    PLANT_NUMBERS,
+    STATE_NUMBERS,
+    Array,
+    Integers,
+    Loop,
+    Plant,
+    State,
+    new_place,
+    plant_of,
+    state_of,
+)
+from grasp_ros.observe.observe import BEGIN, FINISH
+from grasp_ros.observe.observer import Watcher
+from grasp_ros.observe.sight import Wanted
+from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
+
+
+class Rows(NamedTuple):
+    """Plants of n rows, and what becomes of them."""
+
+    loop: Array  # (n, 3, 4) bodies with the feedback
+    own: Array  # (n, 3, 4) by themselves
+    gains: Array  # (n, 2, 2)
+    pairs: Array  # (n, 2, 2)
+    coulomb: Array  # (n,)
+    state: Array  # (n, 6); that at the end, afterwards
+    seen: Array  # (n, k) what the observer remembers
+    touches: Array  # (n, 2)
+    outcome: Integers  # (n,) `Outcome`; DONE, or why the row is left to `Integrator`
+
+
+class Room(NamedTuple):
+    """Where one row at a time is computed: arguments of `advance`, and the records in their blocks."""
+
+    block: Array  # of the workspace
+    order: int
+    plant_block: Array
+    state_block: Array
+    mode: Integers  # (3,)
+    plant: Plant
+    state: State
+    times: Array  # (0,)
+    rows: Array  # (0, 6)
+    events: Array  # (m, 5)
+    filled: Integers
+    work: Integers
+    observer: Integers  # (2,)
+
+
+class Watch(NamedTuple):
+    """Arrays of a `watcher.Watcher`."""
+
+    loop: Array
+    own: Array
+    base: Array
+    gains: Array
+    seen: Array
+    bound: Array  # (1,)
+
+
+class Limits(NamedTuple):
+    """What bounds a row."""
+
+    tolerance: float
+    max_events: int
+    max_work: int
+    stop: Integers  # (1,) not 0: return after the row
+
+
+def _takes_own_arrays(result: Any) -> bool:
+    """Whether machine code is for arrays as they are here; somebody may have called it with read-only ones, too."""
+    arrays = [kind for kind in result.signature.args if isinstance(kind, types.Array)]
+    return all(kind.layout == "C" and kind.mutable for kind in arrays)
+
+
+class Door(types.WrapperAddressProtocol):
+    """`advance`, for a call by its address."""
+
+    def __init__(self) -> None:
+        compile_kernels()
+        dispatcher: Any = advance
+        self._result = next(filter(_takes_own_arrays, dispatcher.overloads.values()))
+
+    def __wrapper_address__(self) -> int:
+        """Its address."""
+        result = self._result
+        return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+
+    def signature(self) -> Any:
+        """Its types."""
+        return self._result.signature
+
+
+@cache
+def door() -> Door:
+    """`advance`, compiled where it has not been."""
+    return Door()
+
+
+@kernel
+def load_row(rows: Rows, i: int, room: Room, watch: Watch) -> None:
+    """Put one row where it is computed."""
+    for body in range(3):
+        for column in range(4):
+            value = rows.loop[i, body, column]
+            watch.loop[body, column] = watch.base[body, column] = value
+            watch.own[body, column] = rows.own[i, body, column]
+            room.plant.given[body, column] = 1.0 if column == Of.MASS and value == 0.0 else value
+    for side in range(2):
+        for column in range(2):
+            watch.gains[side, column] = rows.gains[i, side, column]
+            room.plant.pairs[side, column] = rows.pairs[i, side, column]
+    for place in range(6):
+        room.state.y[place] = rows.state[i, place]
+    room.plant_block[COULOMB] = rows.coulomb[i]
+    room.mode[:], room.state.clock[:], room.state.low[:], room.state.rest[:] = Pair.UNKNOWN.value, 0.0, 0.0, 0.0
+    room.filled[:], room.work[:] = 0, 0
+    write_penetrations(room.state)
+
+
+@kernel
+def count_events(rows: Rows, i: int, room: Room) -> int:
+    """Count the touches among the events, and forget these; returns their number."""
+    count = room.filled[Filled.EVENTS]
+    for k in range(count):
+        if room.events[k, Entry.KIND] == Transition.TOUCH.value:
+            rows.touches[i, int(room.events[k, Entry.BODY])] += 1.0
+    room.filled[Filled.EVENTS] = 0
+    return int(count)
+
+
+@machine_door
+def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, watch: Watch, limits: Limits) -> int:
+    """Integrate the rows; returns how many, fewer only if a stop was asked for."""
+    n = rows.state.shape[0]
+    for i in range(n):
+        if limits.stop[0] != 0:
+            return i
+        load_row(rows, i, room, watch)
+        loop.place[Place.INTERVAL] = loop.place[Place.BEGUN] = 0
+        if room.observer[ADDRESS] != 0:
+            call(room.observer[ADDRESS], room.observer[CONTEXT], BEGIN, watch.bound[0], 0.0, 0)
+        outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
+        while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
+            outcome = door(
+                room.block, room.order, room.plant_block, room.state_block, room.mode, limits.tolerance,
+                limits.max_work, room.times, room.rows, room.events, room.filled, room.work, room.observer, loop)
+            events += count_events(rows, i, room)
+        rows.outcome[i] = outcome
+        for place in range(6):
+            rows.state[i, place] = room.state.y[place]
+        if room.observer[ADDRESS] != 0:
+            call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
+            for place in range(watch.seen.shape[0]):
+                rows.seen[i, place] = watch.seen[place]
+    return n
+
+
+def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted, settled: float, stop: Integers,
+                   max_events: int, max_work: int) -> int:
+    """Integrate rows of one length under continuous feedback; returns how many.
+
+    Parameters
+    ----------
+    rows : Rows
+        Updated in place.
+    duration, accuracy, wanted, settled
+        As for an `Integrator` and `observer.watch`.
+    stop : array (1,)
+        Another thread may set it, to have the rows stop.
+    max_events, max_work : int
+        Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too.
+    """
+    plant_block, state_block, mode = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64)
+    plant, state = plant_of(plant_block), state_of(state_block, mode)
+    watcher = Watcher(plant, state, wanted)
+    loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
+    watch = Watch(watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]))
+    limits = Limits(accuracy, max_events, min(max_work, BREATH), stop)
+    with workspace(accuracy) as (block, order, tables, events):
+        observer = watcher.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
+        room = Room(block, order, plant_block, state_block, mode, plant, state, np.zeros(0), np.zeros((0, 6)), events,
+                    np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)
+        done = run_rows(door(), loop, rows, room, watch, limits)
+    return int(done)

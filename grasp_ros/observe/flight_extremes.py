@@ -1,0 +1,101 @@
+"""Quantities of a flight: a range that is cheap, and the extremes where they matter.
+
+A quantity a x + b v + c solves the equation of its body, so that the roots of its rate have a closed form.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compensated import velocity_lane
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.flight.closed_form import fly, launch
+from grasp_ros.exact.kinematics import bound, next_derivative, own_acceleration
+from grasp_ros.exact.records import Array, Flight, Regime
+from grasp_ros.observe.sight import POSITION, VELOCITY, Quantity, Sight
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, U, V, X
+
+
+@inlined
+def weights(sight: Sight, q: int) -> tuple[float, float, float]:
+    """a, b, c of the quantity a x + b v + c."""
+    if q == Quantity.INPUT_L or q == Quantity.INPUT_R:
+        side = LEFT if q == Quantity.INPUT_L else RIGHT
+        gains, constant = sight.gains[side], sight.given[side, Of.FORCE] - sight.own[side, Of.FORCE]
+        return -gains[POSITION], -gains[VELOCITY], constant
+    return (1.0, 0.0, 0.0) if q in (X.L, X.O, X.R) else (0.0, 1.0, 0.0)
+
+
+@inlined
+def state_of(q: int) -> tuple[int, int]:
+    """Places of position and velocity of the body whose quantity it is: the state has them in pairs."""
+    if q == Quantity.INPUT_L:
+        return X.L, V.L
+    return (X.R, V.R) if q == Quantity.INPUT_R else (q - q % 2, q - q % 2 + 1)
+
+
+@inlined
+def row_of(x: int) -> int:
+    """Row of the body whose position stands there."""
+    return OBJECT.value if x == X.O else (LEFT.value if x == X.L else RIGHT.value)
+
+
+@kernel
+def first_zero(flight: Flight, r: float, r_rate: float) -> float:
+    """First t > 0 at which a solution of the homogeneous equation, from (r, r'), is zero; inf if there is none."""
+    sigma, rate = flight.sigma, flight.rate
+    b = r_rate + sigma * r
+    if flight.regime == Regime.UNDER:
+        phase = math.atan2(r * rate, -b)
+        return (phase if phase > 0.0 else phase + math.pi) / rate
+    if flight.regime == Regime.DRIFT or rate == 0.0:
+        t = -r / b if b != 0.0 else math.inf
+        return t if t > 0.0 else math.inf
+    part = -r * rate / b if b != 0.0 else math.inf
+    return math.atanh(part) / rate if 0.0 < part < 1.0 else math.inf
+
+
+@inlined
+def in_flight(sight: Sight, q: int) -> tuple[float, float]:
+    """Least and largest value of a quantity in a flight."""
+    a, b, c = weights(sight, q)
+    place, lane = state_of(q)
+    row = sight.bodies[row_of(place)]
+    x, v = sight.before[place], sight.before[lane]
+    flight = launch(row, x, v)
+    push = own_acceleration(row, x, v)
+    jerk = next_derivative(row, v, push)
+    at_begin, at_end = a * x + b * v + c, a * sight.y[place] + b * sight.y[lane] + c
+    low, high = min(at_begin, at_end), max(at_begin, at_end)
+    first = first_zero(flight, a * v + b * push, a * push + b * jerk)
+    if not first < sight.t:
+        return low, high
+    apart = math.pi / flight.rate if flight.regime == Regime.UNDER else math.inf
+    if flight.sigma < 0.0 and apart < math.inf:  # what a feedback drives is largest at the end
+        first += max(math.floor((sight.t - first) / apart) - 1.0, 0.0) * apart
+    for _ in range(2):
+        if first < sight.t:
+            x, v, _, _ = fly(flight, first)
+            low, high = min(low, a * x + b * v + c), max(high, a * x + b * v + c)
+        first += apart
+    return low, high
+
+
+@inlined
+def flight_ranges(sight: Sight, low: Array, high: Array) -> None:
+    """Bounds on positions and velocities in a flight, by the energy of the swing."""
+    for body in (LEFT, OBJECT, RIGHT):
+        row, lane = sight.bodies[body], velocity_lane(body)
+        x, v, at, rate = sight.before[lane - 1], sight.before[lane], sight.y[lane - 1], sight.y[lane]
+        if row[Of.STIFFNESS] > 0.0 and row[Of.MASS] < math.inf:
+            push = own_acceleration(row, x, v)
+            x_e = x + (row[Of.MASS] * push + row[Of.DAMPING] * v) / row[Of.STIFFNESS]
+            swing, speed = bound(row, x - x_e, v, sight.t), bound(row, v, push, sight.t)
+            low[lane - 1], high[lane - 1], low[lane], high[lane] = x_e - swing, x_e + swing, -speed, speed
+        else:
+            way = sight.t * max(abs(v), abs(rate)) if (v > 0.0) != (rate > 0.0) else 0.0
+            low[lane - 1], high[lane - 1] = min(x, at) - way, max(x, at) + way
+            low[lane], high[lane] = min(v, rate), max(v, rate)
+    for lane in (U.L, U.R):
+        low[lane], high[lane] = min(sight.before[lane], sight.y[lane]), max(sight.before[lane], sight.y[lane])
+    low[Quantity.IMPACT_L] = high[Quantity.IMPACT_L] = low[Quantity.IMPACT_R] = high[Quantity.IMPACT_R] = 0.0

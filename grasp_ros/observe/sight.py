@@ -1,0 +1,145 @@
+"""What an observer sees of a segment, and what it remembers of a run."""
+
+from __future__ import annotations
+
+from enum import IntEnum, IntFlag
+from typing import NamedTuple
+
+from numba import carray
+
+from grasp_ros.exact.compilation.jit import allocating
+from grasp_ros.exact.contact.step_order import higher_order, series_order
+from grasp_ros.exact.driver.callback import floats_at, integers_at
+from grasp_ros.exact.records import Array, Integers
+from grasp_ros.physics.accuracy import FINEST
+from grasp_ros.physics.layout import LANES
+
+QUANTITIES = 12
+STATES = 8
+COUNTS, MODES = 4, 3
+POSITION, VELOCITY = 0, 1  # columns of gains
+LOOKS = 6  # rows of scratch, one polynomial each
+LOWER, UPPER = 4, 5  # those of them that hold bounds of the quantities
+LONGEST = higher_order(series_order(FINEST)) + 1
+
+
+class Quantity(IntEnum):
+    """What extremes are kept of, behind the eight numbers of the state."""
+
+    IMPACT_L = 8  # N
+    IMPACT_R = 9
+    INPUT_L = 10  # N
+    INPUT_R = 11
+
+
+class Wanted(IntFlag):
+    """What a run is observed for."""
+
+    MOTION = 1  # extremes of positions and velocities
+    IMPACTS = 2  # of penetrations and impact forces
+    INPUTS = 4  # of the forces of the controllers
+    LOSSES = 8  # energy by cause
+    SETTLING = 16  # the last time outside a bound
+    RISE = 32  # of V_c
+
+
+class Seen(IntEnum):
+    """Places of what is remembered; each extreme has a place of its own beside these."""
+
+    LOW = 0  # of the quantities
+    HIGH = QUANTITIES
+    DAMPERS = 2 * QUANTITIES  # energy taken, J
+    FEEDBACK = 25
+    FRICTION = 26
+    IMPACTS = 27
+    WORK = 28  # of held commands and external forces, J
+    LEVEL = 29  # V_c, J
+    LEAST = 30  # of V_c so far
+    RISE = 31  # largest V_c less the least before it
+    OUTSIDE = 32  # last time at which a body was outside the bound, s
+    BOUND = 33  # m
+    SEGMENTS = 34
+    KEPT = 35  # kind of the segment that is kept, for the last time outside; NONE: it is known
+    KEPT_TIME = 36  # its length, s
+    KEPT_BEGIN = 37
+    KEPT_STEP = 38  # its end in the variable of its polynomials
+    KEPT_DEGREE = 39
+    INSIDE = 40  # 1: no body was outside when the last segment ended
+    STATE = 41  # at the begin of the next segment
+
+
+SEEN = Seen.STATE + STATES
+NONE = -1.0
+KEPT = STATES + 12 + LANES * LONGEST  # numbers of a segment that is kept
+
+
+class Context(IntEnum):
+    """Places of the addresses and numbers that an observer is called with."""
+
+    C = 0  # records.Tables
+    SIZE = 1
+    Y = 2  # records.State
+    MODE = 3
+    CLOCK = 4
+    BODIES = 5  # records.Plant
+    GIVEN = 6
+    PAIRS = 7
+    LOOP = 8  # (3, 4) bodies with the continuous feedback, whose energy is V_c
+    OWN = 9  # (3, 4) bodies by themselves
+    BASE = 10  # (3, 4) those of them that the motion has without held commands and external forces
+    GAINS = 11  # (2, 2) Kp and Kv of the feedback that acts all the time; 0 where commands are held
+    SEEN = 12
+    KEPT = 13  # state (8,), bodies (3, 4) and table of the segment that is kept
+    ROWS = 14  # scratch
+    COUNTS = 15  # scratch, and the modes of the segment that is kept
+    WANTED = 16
+    LOSSES = 17  # address of `observe.observe_losses`, 0: they are not wanted
+
+
+class Sight(NamedTuple):
+    """A segment, with the state at its begin and at its end."""
+
+    kind: int  # `layout.Kind`
+    t: float  # s
+    s: float  # end in the variable of the polynomials
+    degree: int
+    c: Array  # table of polynomials
+    size: Array  # (8,) of a Taylor step: sums of |c_k| s^k, k >= 2
+    before: Array  # (8,) state
+    y: Array  # (8,)
+    mode: Integers  # (3,)
+    bodies: Array  # (3, 4)
+    pairs: Array  # (2, 2)
+    given: Array  # (3, 4)
+    own: Array  # (3, 4)
+    gains: Array  # (2, 2)
+    rows: Array  # (LOOKS, LONGEST) scratch
+    counts: Integers  # (COUNTS + MODES,) scratch
+
+
+@allocating
+def seen_at(context: Integers) -> Array:
+    """What is remembered."""
+    return carray(floats_at(context[Context.SEEN]), (SEEN,))
+
+
+@allocating
+def bodies_at(context: Integers, place: Context) -> Array:
+    """One of the tables (3, 4) of bodies."""
+    return carray(floats_at(context[place]), (3, 4))
+
+
+@allocating
+def sight_of(context: Integers, kind: int, t: float, s: float, degree: int) -> Sight:
+    """The segment that has just ended."""
+    seen = seen_at(context)
+    return Sight(
+        kind, t, s, degree, carray(floats_at(context[Context.C]), (LANES * LONGEST,)),
+        carray(floats_at(context[Context.SIZE]), (LANES,)),
+        seen[Seen.STATE :], carray(floats_at(context[Context.Y]), (STATES,)),
+        carray(integers_at(context[Context.MODE]), (3,)), bodies_at(context, Context.BODIES),
+        carray(floats_at(context[Context.PAIRS]), (2, 2)), bodies_at(context, Context.GIVEN),
+        bodies_at(context, Context.OWN), carray(floats_at(context[Context.GAINS]), (2, 2)),
+        carray(floats_at(context[Context.ROWS]), (LOOKS, LONGEST)),
+        carray(integers_at(context[Context.COUNTS]), (COUNTS + MODES,)),
+    )

@@ -1,0 +1,170 @@
+"""Quantities of a step: a range that is cheap, and the extremes where they matter.
+
+They are polynomials, and `roots.first_rise` finds every root of their rates. No extreme lies between points of a grid,
+because there is none.
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.impact import damping_factor, elastic_force
+from grasp_ros.exact.kinematics import rate_lanes
+from grasp_ros.exact.numerics.roots import first_rise, shift
+from grasp_ros.exact.records import Array, Integers
+from grasp_ros.observe.flight_extremes import in_flight, state_of, weights
+from grasp_ros.observe.sight import Quantity, Sight
+from grasp_ros.physics.layout import LANES, LEFT, RIGHT, Body, Kind, Law, Pair, U, V, X, Z
+
+MOST = 64  # turns of a polynomial in one step
+ROW, RATE, WORK, SQUARE = (whole(row) for row in range(4))  # rows of scratch; typed, or each is compiled anew
+FIRST = whole(0)  # coefficient
+
+
+@inlined
+def lane_bounds(sight: Sight, lane: int, at: float) -> tuple[float, float]:
+    """Bounds of a lane in a Taylor step that ends at the value `at`, see `polynomial.lane_range`."""
+    begin, size = sight.c[lane], sight.size[lane]
+    line = begin + sight.s * sight.c[LANES + lane]
+    middle, width = 0.5 * (line + at), 0.5 * size
+    return min(begin, middle - width), max(begin, middle + width)
+
+
+@inlined
+def penetration_bounds(sight: Sight, side: Body) -> tuple[float, float]:
+    """Bounds of u."""
+    u = sight.y[U.L + side]
+    if sight.mode[side] != Pair.CONTACT:
+        return lane_bounds(sight, Z.L + side, u)
+    low, high = lane_bounds(sight, Z.L + side, math.sqrt(max(u, 0.0)))
+    return max(low, 0.0) * max(low, 0.0), high * high
+
+
+@inlined
+def step_ranges(sight: Sight, low: Array, high: Array) -> None:
+    """Bounds on all quantities but the inputs in a Taylor step."""
+    low[X.O], high[X.O] = lane_bounds(sight, X.O, sight.y[X.O])
+    for lane in (V.L, V.O, V.R):
+        low[lane], high[lane] = lane_bounds(sight, lane, sight.y[lane])
+    low[U.L], high[U.L] = penetration_bounds(sight, LEFT)
+    low[U.R], high[U.R] = penetration_bounds(sight, RIGHT)
+    low[X.L], high[X.L] = low[X.O] + low[U.L], high[X.O] + high[U.L]
+    low[X.R], high[X.R] = low[X.O] - high[U.R], high[X.O] - low[U.R]
+    for side in (LEFT, RIGHT):
+        q, force = Quantity.IMPACT_L + side, 0.0
+        if sight.mode[side] == Pair.CONTACT:
+            front, back = rate_lanes(side)
+            factor = damping_factor(sight.pairs[side, Law.DISSIPATION], high[front] - low[back])
+            force = elastic_force(sight.pairs[side, Law.HERTZIAN], high[U.L + side]) * max(factor, 0.0)
+        low[q], high[q] = 0.0, force
+
+
+@kernel
+def multiply(rows: Array, a: int, b: int, out: int, n: int) -> None:
+    """Cauchy product of two rows up to the order n."""
+    for k in range(n + 1):
+        total = 0.0
+        for j in range(k + 1):
+            total += rows[a, j] * rows[b, k - j]
+        rows[out, k] = total
+
+
+@kernel
+def copy_lane(sight: Sight, lane: int, row: int) -> None:
+    """A lane as one polynomial."""
+    for k in range(sight.degree + 1):
+        sight.rows[row, k] = sight.c[LANES * k + lane]
+
+
+@kernel
+def expand_penetration(sight: Sight, side: Body, row: int) -> None:
+    """Series of u, the square of w in a Taylor step."""
+    copy_lane(sight, int(Z.L + side), row)
+    if sight.mode[side] == Pair.CONTACT:
+        copy_lane(sight, int(Z.L + side), WORK)
+        multiply(sight.rows, WORK, WORK, row, sight.degree)
+
+
+@kernel
+def expand_force(sight: Sight, side: Body) -> None:
+    """Series of the impact force H w^3 (1 + p u') in a Taylor step, in the first row of scratch."""
+    rows, n, pair = sight.rows, sight.degree, sight.pairs[side]
+    front, back = rate_lanes(side)
+    expand_penetration(sight, side, RATE)
+    multiply(rows, RATE, WORK, SQUARE, n)
+    for k in range(n + 1):
+        rows[WORK, k] = pair[Law.DISSIPATION] * (sight.c[LANES * k + front] - sight.c[LANES * k + back])
+    rows[WORK, FIRST] += 1.0
+    multiply(rows, SQUARE, WORK, ROW, n)
+    for k in range(n + 1):
+        rows[ROW, k] *= pair[Law.HERTZIAN]
+
+
+@kernel
+def expand_quantity(sight: Sight, q: int) -> None:
+    """Write the series of a quantity to the first row of scratch."""
+    rows, n = sight.rows, sight.degree
+    if q in (U.L, U.R):
+        expand_penetration(sight, LEFT if q == U.L else RIGHT, ROW)
+    elif q == Quantity.IMPACT_L or q == Quantity.IMPACT_R:
+        expand_force(sight, LEFT if q == Quantity.IMPACT_L else RIGHT)
+    elif q == X.O or q == V.L or q == V.O or q == V.R:
+        copy_lane(sight, q, ROW)
+    else:
+        a, b, c = weights(sight, q)
+        place, lane = state_of(q)
+        sign = 1.0 if place == X.L else -1.0
+        expand_penetration(sight, LEFT if place == X.L else RIGHT, ROW)
+        for k in range(n + 1):
+            x = sight.c[LANES * k + X.O] + sign * rows[ROW, k]
+            rows[ROW, k] = a * x + b * sight.c[LANES * k + lane]
+        rows[ROW, FIRST] += c
+
+
+@kernel
+def value_of(row: Array, n: int, s: float) -> float:
+    """One polynomial at s."""
+    value = row[n]
+    for k in range(n - 1, -1, -1):
+        value = value * s + row[k]
+    return value
+
+
+@kernel
+def polynomial_extremes(rows: Array, n: int, s: float, counts: Integers) -> tuple[float, float]:
+    """Least and largest value in [0, s] of the polynomial of the first row; the others are scratch."""
+    row, rate, work = rows[ROW], rows[RATE], rows[WORK]
+    low = high = row[0]
+    turn, known = -1.0, False
+    for k in range(n):
+        rate[k] = (k + 1) * row[k + 1]
+        if not known and rate[k] != 0.0:
+            known, turn = True, -1.0 if rate[k] > 0.0 else 1.0
+    begin = 0.0
+    for _ in range(MOST):
+        for k in range(n):
+            work[k] = turn * rate[k]
+        if begin > 0.0:
+            shift(work, n - 1, begin)
+        following = begin + first_rise(work, n - 1, s - begin, 0.0, counts)
+        if not following < s:
+            break
+        begin, turn = following, -turn
+        value = value_of(row, n, begin)
+        low, high = min(low, value), max(high, value)
+    value = value_of(row, n, s)
+    return min(low, value), max(high, value)
+
+
+@inlined
+def in_step(sight: Sight, q: int) -> tuple[float, float]:
+    """Least and largest value of a quantity in a step."""
+    expand_quantity(sight, q)
+    return polynomial_extremes(sight.rows, sight.degree, sight.s, sight.counts)
+
+
+@kernel
+def extremes_of(sight: Sight, q: int) -> tuple[float, float]:
+    """Least and largest value of a quantity in a segment."""
+    return in_flight(sight, q) if sight.kind == Kind.FLIGHT else in_step(sight, q)

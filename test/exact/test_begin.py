@@ -1,0 +1,303 @@
+"""Contacts that begin at u = 0 from rest, or both at once: against a motion in 50 digits."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import Any
+
+import gmpy2
+import numpy as np
+import pytest
+from exact.bench import Bench, bench, bits, drive
+from exact.motion import BITS, states_at
+from gmpy2 import mpfr
+from oracles import FREE, done, kinds, run
+
+from grasp_ros.exact.automaton.begin import force_free_time, leaves_force_out, must_begin, time_of_impulse
+from grasp_ros.exact.automaton.friction import apply_friction
+from grasp_ros.exact.automaton.modes import begin_contacts, end_begin, initial_modes
+from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.records import Array
+from grasp_ros.exact.tolerances import HELD
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, Work, X
+from grasp_ros.physics.model import Contact, Grasp
+
+SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
+MOTION = [V.L, V.O, V.R]
+OVERLAPS = [U.L, U.R]
+SHOWS = 5e-4  # s: by then the forces of most scenes have changed the velocities
+OTHERS = {
+    "a light stiff arm beside": 1e-6, "a light stiff arm from rest": 1e-6, "pressed from rest, order 3": 0.02,
+    "pressed from rest, order 4": 0.05,
+}
+
+
+def start(side: Body, **options: Any) -> Bench:
+    """Pairs at u = 0 with the modes that follow, and options of `bench`."""
+    mass, hertzian = options.pop("masses", {}), options.pop("hertzian", {})
+    slide = options.get("slide", Slide.FREE)
+    if side == RIGHT and slide in (Slide.RIGHTWARD, Slide.LEFTWARD):
+        options["slide"] = Slide.RIGHTWARD if slide == Slide.LEFTWARD else Slide.LEFTWARD
+    b = bench(side, 0.0, options.pop("d", 0.0), **options)
+    for name, body in (("side", side), ("object", OBJECT), ("beside", other(side))):
+        b.plant.given[body, Of.MASS] = mass.get(name, 1.0)
+        if name in hertzian:
+            b.plant.pairs[body, Law.HERTZIAN] = hertzian[name]
+    b.plant.bodies[:] = b.plant.given
+    apply_friction(b.plant, b.state.mode)
+    initial_modes(b.plant, b.state)
+    return b
+
+
+SCENES: dict[str, dict[str, Any]] = {
+    "both approaching": {"d": 0.3, "beside": (0.0, 0.5)},
+    "both approaching alike": {"d": 0.3, "beside": (0.0, 0.3)},
+    "touching chain": {"d": 0.3, "beside": (0.0, 0.0)},
+    "touching chain without damping": {"d": 0.3, "beside": (0.0, 0.0), "p": 0.0},
+    "pressed from rest": {"push": 2.0},
+    "pressed from rest, order 3": {"object_speed": -0.3, "stiffness": 2.0},
+    "pressed from rest, order 4": {"push": -1.0, "object_push": -1.0, "stiffness": 2.0},
+    "both pressed from rest": {"push": 2.0, "beside": (0.0, 0.0), "beside_push": -1.0},
+    "one presses the other from rest": {"push": 2.0, "beside": (0.0, 0.0)},
+    "from rest beside a deep contact": {"beside": (0.01, 0.1)},
+    "pulled from rest by less than a deep contact presses": {"push": -5.0, "beside": (0.01, -0.1)},
+    "from rest beside a clamped pair": {"push": 2.0, "beside": (0.01, -9.0)},
+    "parting from rest beside a start": {"push": -2.0, "beside": (0.0, 0.0), "beside_push": -1.0},
+    "parting from rest beside a start, order 3": {
+        "object_speed": 0.3, "stiffness": 2.0, "beside": (0.0, 0.0), "beside_push": -1.0,
+    },
+    "against a stuck object": {"push": 2.0, "slide": Slide.STUCK, "coulomb": 5.0},
+    "a light stiff arm beside": {
+        "d": 0.3, "beside": (0.0, 0.0), "masses": {"beside": 0.025}, "hertzian": {"beside": 1e15},
+    },
+    "a light stiff arm from rest": {"push": 2.0, "masses": {"side": 0.025}, "hertzian": {"side": 1e15}},
+}
+
+
+def shows(name: str) -> float:
+    """Time in s after which the force of a contact has changed a velocity."""
+    return OTHERS.get(name, SHOWS)
+
+
+@cache
+def behind(name: str, side: Body, part: float = 1.0) -> tuple[Bench, Bench, Array]:
+    """A scene before and behind its begin, and the states within it."""
+    before, b, t = start(side, **SCENES[name]), start(side, **SCENES[name]), part * shows(name)
+    return before, b, drive(b, t, [0.01 * t, 0.3 * t, 0.9 * t])
+
+
+@SIDES
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("part", [1.0, 1e-2, 1e-5])
+def test_a_begin_against_50_digits(name: str, side: Body, part: float) -> None:
+    """To some roundings of what has changed, of the fastest velocity and of the longest way; outputs, too."""
+    before, b, rows = behind(name, side, part)
+    t = part * shows(name)
+    assert b.events == []
+    with gmpy2.context(precision=BITS):
+        *within, expected = states_at(before, [0.01 * t, 0.3 * t, 0.9 * t, t])
+        moved = [abs(p - mpfr(float(q))) for p, q in zip(expected, before.state.y, strict=True)]
+        fastest = max(abs(expected[lane]) for lane in MOTION)
+        for lane in (*MOTION, *OVERLAPS):
+            rounding = fastest if lane in MOTION else abs(expected[lane]) + t * fastest
+            bound = 2e-14 * moved[lane] + 2.0 * EPS * rounding
+            assert abs(mpfr(float(b.state.y[lane])) - expected[lane]) <= bound, lane
+        for row, right in zip([*rows, b.state.y[:6]], [*within, expected], strict=True):
+            for lane in range(6):
+                size = max(abs(value) for value in right[lane % 2 : 6 : 2])
+                assert abs(mpfr(float(row[lane])) - right[lane]) <= 1e-15 * size, lane
+
+
+@SIDES
+@pytest.mark.parametrize("name", SCENES)
+def test_behind_a_begin_the_forces_act(name: str, side: Body) -> None:
+    before, b, _ = behind(name, side)
+    assert Pair.BEGINNING not in (b.mode(LEFT), b.mode(RIGHT))
+    changes = []
+    for own in (LEFT, RIGHT):
+        if b.mode(own) is Pair.CONTACT and before.state.y[U.L + own] == 0.0:
+            mass = 1.0 / (1.0 / b.plant.bodies[own, Of.MASS] + 1.0 / b.plant.bodies[OBJECT, Of.MASS])
+            d = abs(b.state.y[V.L] - b.state.y[V.O] if own == LEFT else b.state.y[V.O] - b.state.y[V.R])
+            changes.append(b.plant.pairs[own, Law.HERTZIAN] * b.state.y[U.L + own] ** 1.5 * shows(name) / (mass * d))
+    assert max(changes) > 1e-7  # of the speed u', by the force at the end
+
+
+def reflected(y: Array) -> Array:
+    """The state of the mirror image."""
+    return -y[[X.R, V.R, X.O, V.O, X.L, V.L]]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_mirrored_begin_is_the_same_to_the_bit(name: str) -> None:
+    (_, left, _), (_, right, _) = behind(name, LEFT), behind(name, RIGHT)
+    assert bits(left.state.y[:6] + 0.0) == bits(reflected(right.state.y) + 0.0)
+    assert bits(left.state.y[OVERLAPS]) == bits(right.state.y[[U.R, U.L]])
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    ("metre", "second", "kilogram"), [(4.0, 2.0, 8.0), (2.0**-40, 2.0**7, 2.0**-11), (1.0, 2.0**-30, 1.0)]
+)
+def test_a_begin_in_other_units_is_the_same_to_the_bit(name: str, metre: float, second: float, kilogram: float) -> None:
+    """O7: lengths by powers of 4, times and masses by powers of 2."""
+    _, plain, _ = behind(name, LEFT)
+    b = start(LEFT, **SCENES[name])
+    newton = kilogram * metre / second**2
+    units = np.array([kilogram, newton / metre, newton * second / metre, newton])
+    pairs = np.array([newton / (metre * math.sqrt(metre)), second / metre])
+    state = np.array([metre, metre / second] * 3 + [metre] * 2)
+    plant = b.plant._replace(given=b.plant.given * units, bodies=b.plant.bodies * units, pairs=b.plant.pairs * pairs,
+                             coulomb=b.plant.coulomb * newton)
+    b = b._replace(plant=plant)
+    b.state.y[:] *= state
+    drive(b, shows(name) * second)
+    assert bits(b.state.y) == bits(plain.state.y * state)
+
+
+@SIDES
+@pytest.mark.parametrize("gap", [1e-9, 1e-20])
+def test_a_begin_finds_the_touch_of_the_other_pair(gap: float, side: Body) -> None:
+    b = start(side, push=2.0, beside=(-gap, 0.5))
+    drive(b, 3.0 * gap)
+    assert b.events == [(other(side), Transition.TOUCH)]
+    assert b.times == pytest.approx([2.0 * gap], rel=1e-9, abs=0.0)
+
+
+@SIDES
+@pytest.mark.parametrize("depth", [1e-9, 1e-20])
+def test_a_begin_finds_where_the_other_pair_parts(depth: float, side: Body) -> None:
+    b = start(side, push=2.0, beside=(depth, -9.0))
+    assert b.mode(other(side)) is Pair.CLAMPED
+    drive(b, depth)
+    assert b.events == [(other(side), Transition.RELEASE)]
+    assert b.times == pytest.approx([depth / 9.0], rel=1e-6, abs=0.0)
+
+
+# Which pairs begin, and how long without their force.
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "mode", "beside", "beside_mode", "expected"), [
+    (0.0, 0.0, Pair.CONTACT, (-1.0, 0.0), Pair.OPEN, True),
+    (0.0, 0.3, Pair.CONTACT, (-1.0, 0.0), Pair.OPEN, False),
+    (0.0, 0.3, Pair.CONTACT, (0.0, 0.1), Pair.CONTACT, True),
+    (0.0, 0.3, Pair.CONTACT, (0.0, 0.0), Pair.BEGINNING, True),
+    (0.0, 0.3, Pair.CONTACT, (0.0, 0.1), Pair.OPEN, False),
+    (0.0, 0.3, Pair.CONTACT, (0.01, 0.1), Pair.CONTACT, False),
+    (0.0, 0.0, Pair.CONTACT, (0.01, 0.1), Pair.CONTACT, True),
+    (1e-9, 0.0, Pair.CONTACT, (0.0, 0.1), Pair.CONTACT, False),
+    (0.0, 0.0, Pair.RESTING, (0.0, 0.1), Pair.CONTACT, False),
+])
+def test_a_pair_begins_where_the_regularised_time_cannot(
+    side: Body, u: float, d: float, mode: Pair, beside: tuple[float, float], beside_mode: Pair, expected: bool
+) -> None:
+    b = bench(side, u, d, mode, beside=beside, beside_mode=beside_mode)
+    assert must_begin(b.state, side) is expected
+    begin_contacts(b.state)
+    assert b.mode(side) is (Pair.BEGINNING if expected else mode)
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "mode", "expected"), [
+    (1e-30, 0.1, Pair.BEGINNING, Pair.CONTACT), (1e-30, -0.1, Pair.BEGINNING, Pair.CONTACT),
+    (0.0, 0.1, Pair.BEGINNING, Pair.CONTACT), (0.0, 0.0, Pair.BEGINNING, Pair.BEGINNING),
+    (0.0, -0.1, Pair.BEGINNING, Pair.OPEN), (-1e-30, 0.1, Pair.BEGINNING, Pair.OPEN),
+    (1e-9, 0.1, Pair.LEAVING, Pair.LEAVING), (-1e-9, 0.1, Pair.OPEN, Pair.OPEN)])
+def test_a_pair_that_has_begun_is_in_contact_or_has_come_back(side: Body, u: float, d: float, mode: Pair, expected: Pair
+                                                              ) -> None:
+    b = bench(side, u, d, mode)
+    end_begin(b.state, side, b.out)
+    assert (b.mode(side), b.mode(other(side))) == (expected, Pair.OPEN)
+    released = mode is Pair.BEGINNING and expected is Pair.OPEN
+    assert b.events == ([(side, Transition.RELEASE)] if released else [])
+
+
+@SIDES
+@pytest.mark.parametrize(("options", "order"), [({"d": 0.3}, 1), ({"push": 2.0}, 2), ({"d": 1e-12, "push": 2.0}, 1)])
+@pytest.mark.parametrize("loss", [0.0, 0.5, 1e6])
+def test_what_a_pair_leaves_out_is_below_the_rounding_of_its_motion(
+    side: Body, options: dict[str, float], order: int, loss: float
+) -> None:
+    b = bench(side, 0.0, options.get("d", 0.0), Pair.BEGINNING, push=options.get("push", 0.0), p=loss)
+    t = force_free_time(b.plant, b.state, side)
+    d, a = options.get("d", 0.0), options.get("push", 0.0)
+    for time, expected in ((t, True), (2.0**40 * t, False)):
+        u, rate = d * time + 0.5 * a * time**2, d + a * time
+        y = b.state.y.copy()
+        y[:] = 0.0
+        y[V.L if side == LEFT else V.R] = rate if side == LEFT else -rate
+        assert leaves_force_out(b.plant, side, y, u) is expected
+    assert math.frexp(t)[0] == 0.5
+
+
+@SIDES
+def test_nothing_moves_a_pair_that_only_another_one_will_press(side: Body) -> None:
+    assert force_free_time(*bench(side, 0.0, 0.0, Pair.BEGINNING)[:2], side) == math.inf
+    assert force_free_time(*bench(side, 0.0, 0.3, Pair.CONTACT)[:2], side) == math.inf
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 3.5, 4, 6])
+@pytest.mark.parametrize("loss", [0.0, 1e-6, 0.3, 1e6])
+def test_the_time_of_the_impulse_is_a_power_of_two_that_follows_the_units(order: float, loss: float) -> None:
+    """H u^(5/2) (1 + p u') = 2^-56 mu u'^2 within some powers of two, and no rounding in other metres and seconds."""
+    hertzian, a = 1e4, 0.7
+    t = time_of_impulse(1.0 / hertzian, loss, order, a)
+    assert math.frexp(t)[0] == 0.5
+    u, rate = a * t**order, order * a * t ** (order - 1)
+    impulse = hertzian * u**2.5 * (1.0 + loss * rate)
+    assert 2.0**-60 < impulse / rate**2 * 2.0**HELD < 4.0
+    for a in np.geomspace(0.5, 2.0, 41):  # odd units of time make half powers of two of a
+        t = time_of_impulse(1.0 / hertzian, loss, order, float(a))
+        for metre, second in ((4.0**3, 2.0**10), (4.0, 2.0), (1.0, 2.0), (4.0, 0.5)):
+            other_units = time_of_impulse(second**2 * math.sqrt(metre) / hertzian, loss * second / metre, order,
+                                          float(a) * metre / second**order)
+            assert other_units == t * second
+
+
+# Whole runs.
+
+
+@pytest.mark.parametrize("hertzian", [1e2, 1e4, 1e12])
+@pytest.mark.parametrize("speed", [1e-6, 1.0, 1e3])
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize(
+    ("object_mass", "expected", "steps"),
+    [
+        (1.0, (-0.070952353651436871, 0.076403039071206993, 0.994549314580229878), 46),
+        (0.5, (-0.136122574012185708, 0.355827683353408662, 0.958208732335481377), 48),
+        (0.1, (-0.0475095756030004457, 0.907669860965354066, 0.956742589506465039), 58),
+    ],
+)
+def test_a_touching_chain(
+    object_mass: float, expected: tuple[float, float, float], steps: int, mirror: bool, speed: float, hertzian: float
+) -> None:
+    """O11: the same for every H and every speed."""
+    grasp = Grasp(FREE, FREE, Contact(hertzian, 0.0), Contact(hertzian, 0.0), object_mass)
+    state = [0.0, 0.0, 0.0, 0.0, 0.0, -speed] if mirror else [0.0, speed, 0.0, 0.0, 0.0, 0.0]
+    duration = 20.0 * (1.0 / (hertzian * math.sqrt(speed))) ** 0.4
+    result = run(grasp, state, duration)
+    found = done(result).state[1::2] / speed
+    assert (-found[::-1] if mirror else found).tolist() == pytest.approx(expected, rel=3e-15, abs=1e-14)
+    assert done(result).work[Work.CONTACT_STEPS] <= steps
+    assert [kind for kind, _ in kinds(result)] == ["TOUCH", "TOUCH", "RELEASE", "RELEASE"]
+
+
+@pytest.mark.parametrize("pieces", [2, 7, 100])
+def test_a_chain_in_pieces_is_the_same_chain(pieces: int) -> None:
+    grasp = Grasp(FREE, FREE, Contact(1e4, 0.3), Contact(1e4, 0.3), 1.0)
+    whole = run(grasp, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 0.1)
+    parts = run(grasp, [0.0, 1.0, 0.0, 0.0, 0.0, 0.0], 0.1 / pieces)
+    for _ in range(pieces - 1):
+        parts.integrator.advance(0.1 / pieces)
+    assert done(parts).state == pytest.approx(done(whole).state, rel=1e-13, abs=1e-14)
+    assert [kind for kind, _ in kinds(parts)] == [kind for kind, _ in kinds(whole)]
+
+
+def test_a_chain_records_its_second_touch_when_it_presses() -> None:
+    """A chain that comes from afar touches twice at one instant."""
+    grasp = Grasp(FREE, FREE, Contact(1e4, 0.3), Contact(1e4, 0.3), 1.0)
+    result = run(grasp, [-0.5, 1.0, 0.0, 0.0, 0.0, 0.0], 0.6)
+    first, second = done(result).events[:2]
+    assert (first.kind, first.side, second.kind, second.side) == (Transition.TOUCH, LEFT, Transition.TOUCH, RIGHT)
+    assert first.time == second.time == 0.5

@@ -1,0 +1,345 @@
+"""Pairs at rest at u = 0: which way they go and how long that is certain, against derivatives and motions in mpmath."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from exact.bench import bench
+from mpmath import mp, mpf
+from oracles import flight
+
+from grasp_ros.exact.automaton.modes import turn_back
+from grasp_ros.exact.automaton.resting_pair import (
+    HIGHEST,
+    NEVER,
+    UNDECIDED,
+    certain_time,
+    difference,
+    impact_beside,
+    leaning,
+    parting_time,
+    parts,
+)
+from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.records import Leaning, Plant, State
+from grasp_ros.exact.tolerances import DERIVATIVE
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U
+
+SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
+Row = tuple[float, float, float, float]  # m, k, c, f
+# An arm and an object whose derivatives below an order agree; their place and velocity.
+PARTING: dict[int, tuple[Row, Row, float, float]] = {
+    2: ((1.0, 4.0, 0.5, 1.0), (2.0, 0.0, 0.25, 0.0), 0.5, 0.25),
+    3: ((1.0, 4.0, 0.0, 2.0), (2.0, 0.0, 0.0, 0.0), 0.5, 0.25),
+    4: ((1.0, 2.0, 0.0, 2.0), (2.0, 0.0, 0.0, 2.0), 0.5, 0.0),
+}
+
+
+def pair_at_rest(side: Body, arm: Row, body: Row, x: float, v: float) -> tuple[Plant, State]:
+    """A pair at u = u' = 0 at x with the velocity v; its mirror image on the right."""
+    sign = 1.0 if side == LEFT else -1.0
+    b = bench(side, 0.0, 0.0)
+    for row, values in ((side, arm), (OBJECT, body)):
+        b.plant.given[row] = *values[:3], sign * values[3]
+    b.plant.bodies[:] = b.plant.given
+    b.state.y[:6] = sign * np.array([x, v, x, v, x, v])
+    b.state.y[U.L + other(side)] = -1.0
+    return b.plant, b.state
+
+
+def derivatives(row: Any, x: Any, v: Any) -> list[Any]:
+    """x, x', ... up to the order HIGHEST of a body in flight."""
+    m, k, c, f = (mpf(value) for value in row)
+    found = [mpf(x), mpf(v), (f - k * mpf(x) - c * mpf(v)) / m]
+    for _ in range(HIGHEST - 2):
+        found.append(-(c * found[-1] + k * found[-2]) / m)
+    return found
+
+
+def first_difference(plant: Plant, state: State, side: Body) -> tuple[int, Any]:
+    """The first derivative of u that is not zero, in 60 digits."""
+    sign = 1 if side == LEFT else -1
+    with mp.workdps(60):
+        arm = derivatives(plant.bodies[side], state.y[4 * side], state.y[4 * side + 1])
+        body = derivatives(plant.bodies[OBJECT], state.y[2], state.y[3])
+        for order, (a, b) in enumerate(zip(arm, body, strict=True)):
+            if a != b:
+                return order, sign * (a - b)
+    return 0, mpf(0)
+
+
+@SIDES
+@pytest.mark.parametrize("order", PARTING)
+@pytest.mark.parametrize("pressed", [False, True])
+def test_the_first_derivative_that_differs(side: Body, order: int, pressed: bool) -> None:
+    arm, body, x, v = PARTING[order]
+    plant, state = pair_at_rest(side, arm, body, x, v)
+    found = leaning(plant, state, side)
+    assert (found.order, found.value) == first_difference(plant, state, side)
+    if (found.value > 0.0) != pressed:  # the mirror image of the motion, not of the pair
+        plant, state = pair_at_rest(side, (*arm[:3], -arm[3]), (*body[:3], -body[3]), -x, -v)
+        assert leaning(plant, state, side) == (found.order, -found.value)
+
+
+def test_small_integers_part_at_the_orders_two_to_four_or_never() -> None:
+    """Two bodies whose derivatives 0 to 4 agree share the root of one exponential, and all others agree, too."""
+    rng = np.random.default_rng(3)
+    found = []
+    for _ in range(600):
+        arm, body = (tuple(map(float, (2.0 ** rng.integers(2), *rng.integers(3, size=2), rng.integers(-1, 2))))
+                     for _ in range(2))
+        x, v = map(float, rng.integers(-1, 2, size=2))
+        plant, state = pair_at_rest(LEFT, arm, body, x, v)  # type: ignore[arg-type]
+        order, value = first_difference(plant, state, LEFT)
+        assert leaning(plant, state, LEFT) == ((order, value) if order else (NEVER, 0.0))
+        found.append(order)
+    assert set(found) == {0, 2, 3, 4}
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_no_decision_within_rounding_and_none_against_the_truth(seed: int) -> None:
+    """Random bodies; a force on the arm that makes the accelerations equal within a few roundings, or nearly."""
+    rng = np.random.default_rng(seed)
+    m, m_o = 10.0 ** rng.uniform(-3, 3, 2)
+    k, c, c_o = 10.0 ** rng.uniform(-3, 3, 3) * (rng.random(3) < 0.7)
+    x, v = rng.normal(size=2) * (rng.random(2) < 0.7)
+    f_o = float(rng.normal())
+    balance = m * (f_o - c_o * v) / m_o + k * x + c * v
+    for off in (0.0, EPS, 40.0 * EPS, 1e-12, -1e-12, 1e-6):
+        arm, body = (m, k, c, balance * (1.0 + off)), (m_o, 0.0, c_o, f_o)
+        plant, state = pair_at_rest(LEFT, arm, body, float(x), float(v))
+        found = leaning(plant, state, LEFT)
+        order, value = first_difference(plant, state, LEFT)
+        if found.order == NEVER:
+            assert abs(off) <= 1e-12
+        elif found.order == order:
+            assert found.value == pytest.approx(float(value), rel=1.0 / 16.0)
+        else:  # what it skipped is rounding of the force that balances
+            assert order == 2 < found.order
+            assert abs(value) <= 80 * mpf(EPS) * (abs(balance) + k * abs(x) + c * abs(v) + m * abs(f_o / m_o)) / m
+
+
+def test_a_difference_that_is_rounding_is_none() -> None:
+    for off, decided in ((0.0, False), (16.0 * EPS, False), (300.0 * EPS, True)):
+        plant, state = pair_at_rest(LEFT, (1.0, 0.0, 0.0, 1.0 + off), (1.0, 0.0, 0.0, 1.0), 0.0, 0.0)
+        found = leaning(plant, state, LEFT)
+        assert found == (Leaning(2.0, off) if decided else Leaning(NEVER, 0.0))
+    assert 16.0 * EPS < 2.0 * DERIVATIVE < 300.0 * EPS
+
+
+@SIDES
+def test_bodies_that_are_alike_never_part(side: Body) -> None:
+    for row in ((1.0, 0.0, 0.0, 0.0), (3.0, 7.0, 0.3, 1.0), (1.0, 1e6, 1e-3, -2.0)):
+        for scale in (1.0, 2.0, 0.7):
+            alike = tuple(scale * value for value in row)
+            plant, state = pair_at_rest(side, row, alike, 0.37, -1.3)  # type: ignore[arg-type]
+            assert leaning(plant, state, side).order == NEVER
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "p"), [(0.01, 0.2, 0.5), (0.01, -0.2, 0.5), (0.01, 0.3, 0.0), (0.01, -0.3, 0.0)])
+def test_the_force_of_the_other_pair_and_its_rate(side: Body, u: float, d: float, p: float) -> None:
+    """(6) and its derivative along the motion, in which the force itself takes part."""
+    b = bench(side, 0.0, 0.0, beside=(u, d), beside_mode=Pair.CONTACT, p=p, push=0.4, beside_push=-3.0)
+    push, pace = impact_beside(b.plant, b.state, side)
+    with mp.workdps(40):
+        hertzian, rate = mpf(1e4), mpf(d)
+
+        def force(depth: Any, speed: Any) -> Any:
+            return hertzian * depth ** mpf(1.5) * (1 + mpf(p) * speed)
+
+        now = force(mpf(u), rate)
+        bend = 3 - 2 * now  # 3 N on the other arm towards the pair; both masses are 1
+        h = mpf(10) ** -15
+        ahead, behind = (force(mpf(u) + s * h * rate, rate + s * h * bend) for s in (1, -1))
+        assert abs(push - now) <= 1e-14 * now
+        assert abs(pace - (ahead - behind) / (2 * h)) <= 1e-11 * (abs(pace) + now)
+
+
+@SIDES
+def test_without_force_nothing_pushes_beside(side: Body) -> None:
+    for mode, far in ((Pair.OPEN, (0.01, 0.1)), (Pair.CLAMPED, (0.01, 0.1)), (Pair.CONTACT, (0.0, 0.1))):
+        b = bench(side, 0.0, 0.0, beside=far, beside_mode=mode)
+        assert impact_beside(b.plant, b.state, side) == (0.0, 0.0)
+
+
+@SIDES
+def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: Body) -> None:
+    def found(**options: Any) -> Leaning:
+        b = bench(side, 0.0, 0.0, beside=(0.01, options.pop("d")), beside_mode=Pair.CONTACT, p=0.0, **options)
+        return Leaning(*leaning(b.plant, b.state, side))
+
+    assert found(d=0.0) == pytest.approx((2.0, 10.0))
+    assert found(d=0.0, push=-12.0) == pytest.approx((2.0, -2.0))
+    assert found(d=0.2, push=-10.0) == pytest.approx((3.0, 1.5e4 * 0.1 * 0.2))
+    assert found(d=-0.2, push=-10.0) == pytest.approx((3.0, -1.5e4 * 0.1 * 0.2))
+    assert found(d=0.0, push=-10.0) == (UNDECIDED, 0.0)  # the second derivative of the force would decide
+
+
+@SIDES
+@pytest.mark.parametrize("push", [-3.0, 3.0])
+def test_a_force_that_only_begins_at_the_surface_decides_with_its_rate(side: Body, push: float) -> None:
+    """At u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way."""
+    b = bench(side, 0.0, 0.0, beside=(0.01, -2.0), beside_mode=Pair.CONTACT, p=0.5, beside_push=push)
+    value, pace = impact_beside(b.plant, b.state, side)
+    assert (value, pace) == (0.0, pytest.approx(-5.0 * push))
+    assert leaning(b.plant, b.state, side) == pytest.approx((3.0, pace))
+
+
+@SIDES
+def test_a_wall_hands_no_force_on(side: Body) -> None:
+    b = bench(side, 0.0, 0.0, beside=(0.01, 0.3), beside_mode=Pair.CONTACT, slide=Slide.STUCK)
+    b.plant.bodies[OBJECT, Of.MASS], b.plant.bodies[OBJECT, Of.FORCE] = math.inf, 0.0
+    assert leaning(b.plant, b.state, side).order == NEVER
+
+
+@SIDES
+@pytest.mark.parametrize(
+    ("own", "beside", "expected"),
+    [
+        ({}, {"d": 0.3}, (UNDECIDED, math.inf)),  # its force will press this pair
+        ({}, {"push": 1.0}, (UNDECIDED, math.inf)),
+        ({}, {"d": -0.3}, (UNDECIDED, math.inf)),
+        ({}, {}, (NEVER, 0.0)),
+        ({"push": 1.0}, {"d": 0.3}, (2.0, 1.0)),
+        ({"push": -1.0}, {"d": 0.3}, (2.0, -1.0)),
+        ({"push": 1.0}, {"push": 1.0}, (2.0, 1.0)),
+        ({"speed": 0.5, "stiffness": 2.0}, {"d": 0.3}, (3.0, -1.0)),
+        ({"speed": 0.5, "stiffness": 2.0}, {"push": 1.0}, (3.0, -1.0)),
+        ({"common": 1.0, "stiffness": 2.0}, {"d": 0.3}, (4.0, -2.0)),
+    ],
+)
+def test_beside_a_pair_that_begins_at_zero(
+    side: Body, own: dict[str, float], beside: dict[str, float], expected: tuple[float, float]
+) -> None:
+    common = own.get("common", 0.0)
+    b = bench(side, 0.0, 0.0, beside=(0.0, beside.get("d", 0.0)), beside_mode=Pair.CONTACT,
+              push=own.get("push", 0.0) + common, object_push=common, beside_push=common - beside.get("push", 0.0),
+              stiffness=own.get("stiffness", 0.0), object_speed=own.get("speed", 0.0))
+    assert leaning(b.plant, b.state, side) == expected
+
+
+# How long the sign is certain.
+
+
+def sign_holds(plant: Plant, state: State, side: Body, span: float, sign: float) -> bool:
+    """Whether u keeps a sign in (0, span] of a flight, at 30 places in 60 digits, near 0 closer together."""
+    to_left = 1 if side == LEFT else -1
+    with mp.workdps(60):
+        for j in range(1, 31):
+            t = mpf(span) * (mpf(j) / 30) ** 3
+            x, _ = flight(plant.bodies[side].tolist(), state.y[4 * side], state.y[4 * side + 1], t)
+            x_o, _ = flight(plant.bodies[OBJECT].tolist(), state.y[2], state.y[3], t)
+            if not to_left * (x - x_o) * sign > 0:
+                return False
+    return True
+
+
+@SIDES
+@pytest.mark.parametrize("order", PARTING)
+def test_a_certain_time_is_not_too_long_nor_nothing(side: Body, order: int) -> None:
+    arm, body, x, v = PARTING[order]
+    plant, state = pair_at_rest(side, arm, body, x, v)
+    found, value = leaning(plant, state, side)
+    span = certain_time(plant, state.y, side, int(found), value, 100.0)
+    assert sign_holds(plant, state, side, span, value)
+    assert span > 1e-2
+
+
+@SIDES
+def test_a_later_derivative_may_turn_a_pair_back(side: Body) -> None:
+    """1e-6 t^2 / 2 - t^3 / 6 turns back at 3e-6 s."""
+    plant, state = pair_at_rest(side, (1.0, 1.0, 0.0, 1e-6), (1.0, 0.0, 0.0, 0.0), 0.0, 1.0)
+    order, value = leaning(plant, state, side)
+    span = certain_time(plant, state.y, side, int(order), value, 100.0)
+    assert (order, value) == (2.0, 1e-6)
+    assert sign_holds(plant, state, side, span, value)
+
+
+@SIDES
+@pytest.mark.parametrize("v", [-0.7, -1.4, -2.3])
+def test_a_derivative_that_is_rounding_hides_no_later_one(side: Body, v: float) -> None:
+    """-1e-6 t^2 / 2 alone is certain for some 1e-5 s; the third derivative is rounding, the fourth has its sign."""
+    k, c = 0.7, 0.3
+    a = -k * v / c  # c a + k v = 0
+    plant, state = pair_at_rest(side, (1.0, k, c, a + c * v), (1.0, 0.0, 0.0, a + 1e-6), 0.0, v)
+    order, value = leaning(plant, state, side)
+    span = certain_time(plant, state.y, side, int(order), value, 100.0)
+    assert (order, value) == (2.0, pytest.approx(-1e-6))
+    assert 0.0 < difference(plant, state.y, side, 3)[0] < 1e-15  # rounding, and of the other sign
+    assert sign_holds(plant, state, side, span, value)
+    assert span > 1e-2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(30))
+def test_certain_times_of_random_pairs(seed: int) -> None:
+    """Between 1e-3 and 1e3 in every parameter, and accelerations that nearly cancel: u turns back early."""
+    rng = np.random.default_rng(seed)
+    m, k, c, m_o, k_o, c_o = 10.0 ** rng.uniform(-3, 3, 6) * np.array([1, *(rng.random(2) < 0.7), 1, 1, 1])
+    x, v, f_o = rng.normal(size=3)
+    if rng.random() < 0.5:
+        k_o = 0.0
+    balance = float(m * (f_o - k_o * x - c_o * v) / m_o + k * x + c * v)
+    off = float(rng.choice([0.0, 1e-9, -1e-9, 1e-3, -1e-3, 1.0]))
+    arm, body = (m, k, c, balance + off * abs(balance)), (m_o, k_o, c_o, float(f_o))
+    plant, state = pair_at_rest(LEFT, arm, body, float(x), float(v))
+    order, value = leaning(plant, state, LEFT)
+    if order == NEVER:
+        return
+    span = certain_time(plant, state.y, LEFT, int(order), value, 1e3)
+    assert span > 0.0
+    assert order > 2 or sign_holds(plant, state, LEFT, min(span, 1e3), value)
+
+
+@SIDES
+def test_where_a_pair_parts_the_search_begins_before_it_comes_back(side: Body) -> None:
+    """-t^2 / 2 + 10 t^3 comes back at 1/20 s; without anything that brings it back it never does."""
+    plant, state = pair_at_rest(side, (1.0, 0.0, 0.0, -1.0), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    assert parting_time(plant, state, side, 1e9) == math.inf
+    plant, state = pair_at_rest(side, (1.0, 100.0, 0.0, -1.0), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    first = parting_time(plant, state, side, 1e9)
+    assert 1e-3 < first < 2.0 * math.pi / 10.0
+    assert first * math.sqrt(plant.bodies[side, Of.STIFFNESS]) < 0.25  # u has its own digits there
+    plant, state = pair_at_rest(side, (1.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), 0.0, 0.0)
+    assert parting_time(plant, state, side, 1e9) == math.inf
+
+
+def test_a_feedback_that_drives_makes_no_time_longer() -> None:
+    for damping in (-1.0, -30.0):
+        arm, body = (1.0, 100.0, damping, -1.0), (1.0, 0.0, 0.0, 0.0)
+        plant, state = pair_at_rest(LEFT, arm, body, 0.0, 0.0)
+        assert plant.bodies[LEFT, Of.DAMPING] == damping
+        first = parting_time(plant, state, LEFT, 1.0)
+        assert 0.0 < first < 1.0
+        assert sign_holds(plant, state, LEFT, first, -1.0)
+
+
+@SIDES
+@pytest.mark.parametrize("mode", list(Pair))
+def test_only_a_pair_that_leaves_is_turned_back(side: Body, mode: Pair) -> None:
+    b = bench(side, 0.0, 0.3, Pair.LEAVING, beside=(0.01, -2.0), beside_mode=mode)
+    turn_back(b.state, side)
+    assert b.mode(side) is Pair.LEAVING
+    assert b.mode(other(side)) is (Pair.CONTACT if mode is Pair.LEAVING else mode)
+
+
+@SIDES
+@pytest.mark.parametrize(("u", "d", "options", "expected"), [
+    (0.01, -1.0, {}, True), (0.0, -1.0, {}, True), (0.01, 1.0, {"push": 9.0}, False), (0.01, 0.0, {}, False),
+    (0.01, -1.0, {"push": 4.9}, True), (0.01, -1.0, {"push": 5.1}, False),  # 20 u |u''| beside u'^2
+    (0.01, -1.0, {"stiffness": 9e2, "push": 9.0}, True),  # 10 (u / u')^2 k: of u''' alone
+    (0.01, -1.0, {"stiffness": 1.1e3, "push": 11.0}, False),
+    (0.01, -1.9, {"push": -4.0}, True), (0.01, -1.9, {"push": -5.0}, False),  # 4 u |u''| / u' up to u' = -2 = -1/p
+    (0.01, -1.9, {"push": -4.0, "p": 0.52}, False), (0.01, -1.9, {"p": 0.52}, True),
+    (0.01, -2.0, {"push": -4.0}, True), (0.01, -2.1, {"push": -4.0}, True),  # there, or beyond
+    (0.01, -1.9, {"push": -4.0, "p": 0.0}, True),
+])
+def test_a_pair_parts_where_nothing_but_its_force_can_turn_it_back(
+    side: Body, u: float, d: float, options: dict[str, float], expected: bool
+) -> None:
+    b = bench(side, u, d, Pair.CONTACT, **options)  # type: ignore[arg-type]
+    assert parts(b.plant, b.state.y, side) is expected
