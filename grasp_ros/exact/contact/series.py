@@ -59,29 +59,34 @@ def per_mass(body: Array) -> PerMass:
 
 
 @kernel
-def accelerations(left: PerMass, right: PerMass, middle: PerMass, one: float, x_o: float, u_l: float, u_r: float,
-                  v_l: float, v_o: float, v_r: float) -> tuple[float, float, float]:
-    """A coefficient of the bodies' accelerations without impact, (1) to (3); `one` is 1 in order 0, then 0."""
+def accelerations(bodies: tuple[PerMass, PerMass, PerMass], one: float, x_o: float, u: tuple[float, float],
+                  v: tuple[float, float, float]) -> tuple[float, float, float]:
+    """A coefficient of the accelerations of left arm, object and right arm without impact, (1) to (3).
+
+    `one` is 1 in order 0, then 0.
+    """
+    left, middle, right = bodies
     return (
-        fma(-left[2], v_l, fma(-left[1], x_o + u_l, one * left[3])),
-        fma(-right[2], v_r, fma(-right[1], x_o - u_r, one * right[3])),
-        fma(-middle[2], v_o, fma(-middle[1], x_o, one * middle[3])),
+        fma(-left[2], v[0], fma(-left[1], x_o + u[0], one * left[3])),
+        fma(-middle[2], v[1], fma(-middle[1], x_o, one * middle[3])),
+        fma(-right[2], v[2], fma(-right[1], x_o - u[1], one * right[3])),
     )
 
 
 @kernel
-def put(table: Array, i: int, x0: float, x1: float, x2: float, x3: float, x4: float, x5: float, x6: float,
-        x7: float) -> None:
+def put(table: Array, i: int, x: Lanes) -> None:
     """Store eight neighbouring numbers."""
-    table[i], table[i + 1], table[i + 2], table[i + 3] = x0, x1, x2, x3
-    table[i + 4], table[i + 5], table[i + 6], table[i + 7] = x4, x5, x6, x7
+    table[i], table[i + 1], table[i + 2], table[i + 3] = x[0], x[1], x[2], x[3]
+    table[i + 4], table[i + 5], table[i + 6], table[i + 7] = x[4], x[5], x[6], x[7]
 
 
 @kernel
-def with_ends(total: float, a: float, b: float, a_0: float, b_0: float, a_1: float, b_1: float, a_before: float,
-              b_before: float) -> float:
-    """A sum of `convolve` with its four outer terms; a, the newest coefficient, comes last."""
-    return fma(a, b_0, fma(a_0, b, total) + fma(a_before, b_1, a_1 * b_before))
+def with_ends(total: float, a: tuple[float, float, float, float], b: tuple[float, float, float, float]) -> float:
+    """A sum of `convolve` with its four outer terms, of coefficients 0, 1, n - 1 and n of both series.
+
+    That with coefficient n of the first series, the newest number, comes last.
+    """
+    return fma(a[3], b[0], fma(a[0], b[3], total) + fma(a[2], b[1], a[1] * b[2]))
 
 
 @inlined
@@ -100,7 +105,7 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
     coefficient is set after its own order.
     """
     hertzian, loss = pairs[side, Law.HERTZIAN], pairs[side, Law.DISSIPATION]
-    left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
+    left, middle, right = per_mass(bodies[LEFT]), per_mass(bodies[OBJECT]), per_mass(bodies[RIGHT])
     on_left = side == LEFT
     push_l, push_r, push_o = (left[0], 0.0, middle[0]) if on_left else (0.0, right[0], -middle[0])
     x_o, v_l, v_o, v_r = c[X.O], c[V.L], c[V.O], c[V.R]
@@ -115,19 +120,20 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
         g = hertzian * q  # H w^4: the elastic force H w^3, times the w of dt = 2 w ds
         u_l, u_r = (u, gap) if on_left else (gap, u)
         one = 1.0 if k == 0 else 0.0
-        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
+        a_l, a_o, a_r = accelerations((left, middle, right), one, x_o, (u_l, u_r), (v_l, v_o, v_r))
         d, d_open = (v_l - v_o, v_o - v_r) if on_left else (v_o - v_r, v_l - v_o)
         e = fma(loss, d, one)  # 1 + p u'
         now = (v_o, d_open, a_l, a_r, a_o, e)
         # The impact law (6) per 2 ds: H w^4 (1 + p u').
-        z = with_ends(z, e, g, first[5], g_0, second[5], g_1, before[5], g_before)
-        gv = with_ends(gv, v_o, w, first[0], w_0, second[0], w_1, before[0], w_before)
-        gd = with_ends(gd, d_open, w, first[1], w_0, second[1], w_1, before[1], w_before)
-        gl = with_ends(gl, a_l, w, first[2], w_0, second[2], w_1, before[2], w_before)
-        gr = with_ends(gr, a_r, w, first[3], w_0, second[3], w_1, before[3], w_before)
-        go = with_ends(go, a_o, w, first[4], w_0, second[4], w_1, before[4], w_before)
-        put(f, FACTORS * k, v_o, d_open, a_l, a_r, a_o, w, u, e)
-        put(f, FACTORS * k + SECOND, w, w, w, w, w, w, u, g)
+        z = with_ends(z, (first[5], second[5], before[5], e), (g_0, g_1, g_before, g))
+        ends = (w_0, w_1, w_before, w)
+        gv = with_ends(gv, (first[0], second[0], before[0], v_o), ends)
+        gd = with_ends(gd, (first[1], second[1], before[1], d_open), ends)
+        gl = with_ends(gl, (first[2], second[2], before[2], a_l), ends)
+        gr = with_ends(gr, (first[3], second[3], before[3], a_r), ends)
+        go = with_ends(go, (first[4], second[4], before[4], a_o), ends)
+        put(f, FACTORS * k, (v_o, d_open, a_l, a_r, a_o, w, u, e))
+        put(f, FACTORS * k + SECOND, (w, w, w, w, w, w, u, g))
         if k == 0:
             first, w_end, u_end = now, 2.0 * w, 2.0 * u
         elif k == 1:
@@ -142,7 +148,7 @@ def expand_one(c: Array, f: Array, bodies: Array, pairs: Array, side: int, unit:
         v_l, v_r = 2.0 * step * fma(-push_l, z, gl), 2.0 * step * fma(push_r, z, gr)
         v_o = 2.0 * step * fma(push_o, z, go)
         z_l, z_r = (w, gap) if on_left else (gap, w)
-        put(c, LANES * (k + 1), time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r)
+        put(c, LANES * (k + 1), (time, v_l, x_o, v_o, 0.0, v_r, z_l, z_r))
 
 
 @inlined
@@ -157,7 +163,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
     """
     hertz_l, loss_l = pairs[LEFT, Law.HERTZIAN], pairs[LEFT, Law.DISSIPATION]
     hertz_r, loss_r = pairs[RIGHT, Law.HERTZIAN], pairs[RIGHT, Law.DISSIPATION]
-    left, right, middle = per_mass(bodies[LEFT]), per_mass(bodies[RIGHT]), per_mass(bodies[OBJECT])
+    left, middle, right = per_mass(bodies[LEFT]), per_mass(bodies[OBJECT]), per_mass(bodies[RIGHT])
     x_o, v_l, v_o, v_r, w_l, w_r = c[X.O], c[V.L], c[V.O], c[V.R], c[Z.L], c[Z.R]
     scale = scale_of(unit)
     unit /= scale
@@ -174,7 +180,7 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         g_l, g_r = hertz_l * fma(q_l, b[2], fma(a[8], s_r, g_l)), hertz_r * fma(q_r, b[1], fma(a[9], s_l, g_r))
         g = 0.5 * (fma(w_l, b[2], fma(a[4], s_r, ww)) + fma(w_r, b[1], fma(a[5], s_l, ww_mirrored)))
         one = 1.0 if k == 0 else 0.0
-        a_l, a_r, a_o = accelerations(left, right, middle, one, x_o, u_l, u_r, v_l, v_o, v_r)
+        a_l, a_o, a_r = accelerations((left, middle, right), one, x_o, (u_l, u_r), (v_l, v_o, v_r))
         d_l, d_r = v_l - v_o, v_o - v_r
         e_l, e_r = fma(loss_l, d_l, one), fma(loss_r, d_r, one)
         # The impact law (6) per 2 ds, of each side: H w^4 (1 + p u') times the other side's w.
@@ -182,10 +188,10 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         wd_l, wd_r = fma(d_l, b[2], fma(a[6], s_r, wd_l)), fma(d_r, b[1], fma(a[7], s_l, wd_r))
         gv, gl = fma(v_o, b[0], fma(a[0], g, gv)), fma(a_l, b[0], fma(a[1], g, gl))
         gr, go = fma(a_r, b[0], fma(a[2], g, gr)), fma(a_o, b[0], fma(a[3], g, go))
-        put(f, FACTORS * k, v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r)
-        put(f, FACTORS * k + 8, w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r)
-        put(f, FACTORS * k + SECOND, g, g, g, g, s_r, s_l, s_r, s_l)
-        put(f, FACTORS * k + SECOND + 8, w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r)
+        put(f, FACTORS * k, (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r))
+        put(f, FACTORS * k + 8, (w_l, w_r, u_l, u_r, q_l, q_r, e_l, e_r))
+        put(f, FACTORS * k + SECOND, (g, g, g, g, s_r, s_l, s_r, s_l))
+        put(f, FACTORS * k + SECOND + 8, (w_l, w_r, u_l, u_r, s_r, s_l, g_l, g_r))
         if k == 0:
             a = (v_o, a_l, a_r, a_o, w_l, w_r, d_l, d_r, q_l, q_r, e_l, e_r)
             w_end_l, w_end_r, u_end_l, u_end_r = 2.0 * w_l, 2.0 * w_r, 2.0 * u_l, 2.0 * u_r
@@ -196,4 +202,4 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         s_l, s_r = scale * w_l, scale * w_r
         v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
         v_o = twice * fma(middle[0], z_l - z_r, go)
-        put(c, LANES * (k + 1), twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r)
+        put(c, LANES * (k + 1), (twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r))
