@@ -155,7 +155,7 @@ class Integrator:
 
     @property
     def at_rest(self) -> float | None:
-        """Time in s since when everything is at rest for good, see `driver.rest`; None if it is not."""
+        """Time in s since when everything is at rest, see `driver.rest`; None if it is not."""
         since = float(self.records.rest[SINCE])
         return since if math.isfinite(since) else None
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator
 from grasp_ros.exact.tolerances import REST
 from grasp_ros.physics.layout import Transition
 from grasp_ros.scene import Scene
@@ -69,6 +70,22 @@ def test_a_pulse_wakes_what_rests() -> None:
     run = simulate(of("pulse", 300.0))
     last = max(event.time for event in run.events if event.kind is Transition.TOUCH)
     assert run.at_rest is None or run.at_rest > last
+
+
+def test_another_input_wakes_what_rests() -> None:
+    """It was at rest from the first call on, whatever moved later."""
+    integrator = Integrator(scenes.load("preload").system, continuous=True)
+    integrator.advance(100.0)
+    rested = integrator.at_rest
+    assert rested is not None
+    integrator.advance(100.0, start=100.0)
+    assert integrator.at_rest == rested  # nothing has moved
+    integrator.set_input(np.array([1.0, 0.0, 0.0]))
+    integrator.advance(1.0, start=200.0)
+    assert integrator.at_rest is None
+    integrator.advance(100.0, start=201.0)
+    assert integrator.at_rest is not None
+    assert integrator.at_rest > 201.0
 
 
 def test_rest_is_kept_in_a_file(tmp_path: Path) -> None:

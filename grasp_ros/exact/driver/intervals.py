@@ -86,12 +86,11 @@ def enter_interval(plant: Plant, state: State, loop: Loop, out: Output, grid: Ar
 
 @inlined
 def rest(state: State, loop: Loop) -> None:
-    """Let the rest of an interval pass; in the last one, where no controller answers any more, it is rest for good."""
+    """Let what is left of an interval pass. It is rest until a segment moves; a controller may answer anew."""
     put(state, V.L, 0.0)
     put(state, V.O, 0.0)
     put(state, V.R, 0.0)
-    last = loop.place[Place.INTERVAL] + 1 == loop.lengths.shape[0] and loop.answers.shape[0] == 0
-    if last and state.rest[SINCE] == math.inf:
+    if loop.answers.shape[0] == 0 and state.rest[SINCE] == math.inf:
         state.rest[SINCE] = (state.clock[0] + state.clock[1]) + state.clock[2]
     state.clock[0], state.clock[1] = loop.lengths[loop.place[Place.INTERVAL]], 0.0
 
