@@ -120,8 +120,8 @@ FACTORS = 32  # numbers of one order in the table of factors
 class Tables(NamedTuple):
     """Workspace of one call, flat: LANES Taylor coefficients and FACTORS factors of each order, and scratch.
 
-    The lanes of c are the places of the state y, with `layout.Z_L` and Z_R for the depths, TIME for the time since
-    the begin of the step, and CHECK for w w or w_l w_r, as far as it is expanded.
+    The lanes of c are the places of the state y, with `layout.Z` for the depths, `layout.Lane` for the time since
+    the begin of the step and for w w or w_l w_r, as far as it is expanded.
     """
 
     c: Array  # (LANES (order + 1),), with the order of `Settings.both`
@@ -157,7 +157,7 @@ class Step(NamedTuple):
 
 
 class Regime(IntEnum):
-    """Form of the closed solution of a flight, see `flight.fly`."""
+    """Form of the closed solution of a flight, see `flight.closed_form.fly`."""
 
     DRIFT = 0  # no spring, no damper
     UNDER = 1  # under-damped
@@ -166,7 +166,7 @@ class Regime(IntEnum):
 
 
 class Flight(NamedTuple):
-    """One body in free flight from (x, v), see `flight.launch`."""
+    """One body in free flight from (x, v), see `flight.closed_form.launch`."""
 
     regime: Regime
     x: float  # m
@@ -201,7 +201,7 @@ class Segment(NamedTuple):
 
     kind: Kind
     t: float  # length, s; nan: it is not known
-    s: float  # the same of a Taylor step, in its variable
+    s: float  # the same in the variable of its events: of a Taylor step its own, of a flight t
     step: Step  # whose series stand in the tables
     flights: Flights  # of all bodies, or of the arms that touch nothing
 

@@ -14,8 +14,8 @@ import numpy as np
 from numba.core import types
 
 from grasp_ros.exact.compensated import write_penetrations
+from grasp_ros.exact.compilation.jit import address_of_code, kernel
 from grasp_ros.exact.compilation.jit import door as machine_door
-from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, call
 from grasp_ros.exact.driver.workspace import workspace
@@ -72,7 +72,7 @@ class Room(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """Arrays of a `watcher.Watcher`."""
+    """Arrays of a `observer.Watcher`."""
 
     loop: Array
     own: Array
@@ -107,8 +107,7 @@ class Door(types.WrapperAddressProtocol):
 
     def __wrapper_address__(self) -> int:
         """Its address."""
-        result = self._result
-        return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+        return address_of_code(self._result)
 
     def signature(self) -> Any:
         """Its types."""

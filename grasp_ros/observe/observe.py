@@ -38,7 +38,6 @@ PLACES, CLOCK = len(Context), 3
 BEGIN, FINISH = -2, -1  # in place of a kind of segment
 
 
-
 @kernel
 def level(loop: Array, pairs: Array, y: Array) -> float:
     """V_c of a state, J."""

@@ -11,11 +11,11 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import allocating, inlined, kernel
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import own_acceleration
-from grasp_ros.exact.numerics.roots import first_rise, shift
+from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.flight_extremes import first_zero
 from grasp_ros.observe.sight import COUNTS, LOWER, MODES, NONE, STATES, UPPER, Seen, Sight
-from grasp_ros.observe.step_extremes import FIRST, ROW, SQUARE, WORK, expand_quantity, extremes_of, value_of
+from grasp_ros.observe.step_extremes import FIRST, ROW, SQUARE, WORK, expand_quantity, extremes_of
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, U, X
 
 BISECTIONS = 60
@@ -132,4 +132,4 @@ def last_in_step(sight: Sight, q: int, bound: float) -> float:
     s = sight.s - first
     for k in range(n + 1):
         rows[SQUARE, k] = sight.c[LANES * k + Lane.TIME]
-    return value_of(rows[SQUARE], n, s)
+    return value_and_rate(rows[SQUARE], n, s)[0]

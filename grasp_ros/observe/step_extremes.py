@@ -11,7 +11,8 @@ import math
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import rate_lanes
-from grasp_ros.exact.numerics.roots import first_rise, shift
+from grasp_ros.exact.numerics.polynomial import product
+from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.observe.flight_extremes import in_flight, state_of, weights
 from grasp_ros.observe.sight import Quantity, Sight
@@ -61,16 +62,6 @@ def step_ranges(sight: Sight, low: Array, high: Array) -> None:
 
 
 @kernel
-def multiply(rows: Array, a: int, b: int, out: int, n: int) -> None:
-    """Cauchy product of two rows up to the order n."""
-    for k in range(n + 1):
-        total = 0.0
-        for j in range(k + 1):
-            total += rows[a, j] * rows[b, k - j]
-        rows[out, k] = total
-
-
-@kernel
 def copy_lane(sight: Sight, lane: int, row: int) -> None:
     """A lane as one polynomial."""
     for k in range(sight.degree + 1):
@@ -83,7 +74,7 @@ def expand_penetration(sight: Sight, side: Body, row: int) -> None:
     copy_lane(sight, int(Z.L + side), row)
     if sight.mode[side] == Pair.CONTACT:
         copy_lane(sight, int(Z.L + side), WORK)
-        multiply(sight.rows, WORK, WORK, row, sight.degree)
+        product(sight.rows[WORK], sight.rows[WORK], sight.rows[row], sight.degree)
 
 
 @kernel
@@ -92,11 +83,11 @@ def expand_force(sight: Sight, side: Body) -> None:
     rows, n, pair = sight.rows, sight.degree, sight.pairs[side]
     front, back = rate_lanes(side)
     expand_penetration(sight, side, RATE)
-    multiply(rows, RATE, WORK, SQUARE, n)
+    product(rows[RATE], rows[WORK], rows[SQUARE], n)
     for k in range(n + 1):
         rows[WORK, k] = pair[Law.DISSIPATION] * (sight.c[LANES * k + front] - sight.c[LANES * k + back])
     rows[WORK, FIRST] += 1.0
-    multiply(rows, SQUARE, WORK, ROW, n)
+    product(rows[SQUARE], rows[WORK], rows[ROW], n)
     for k in range(n + 1):
         rows[ROW, k] *= pair[Law.HERTZIAN]
 
@@ -123,15 +114,6 @@ def expand_quantity(sight: Sight, q: int) -> None:
 
 
 @kernel
-def value_of(row: Array, n: int, s: float) -> float:
-    """One polynomial at s."""
-    value = row[n]
-    for k in range(n - 1, -1, -1):
-        value = value * s + row[k]
-    return value
-
-
-@kernel
 def polynomial_extremes(rows: Array, n: int, s: float, counts: Integers) -> tuple[float, float]:
     """Least and largest value in [0, s] of the polynomial of the first row; the others are scratch."""
     row, rate, work = rows[ROW], rows[RATE], rows[WORK]
@@ -151,9 +133,9 @@ def polynomial_extremes(rows: Array, n: int, s: float, counts: Integers) -> tupl
         if not following < s:
             break
         begin, turn = following, -turn
-        value = value_of(row, n, begin)
+        value = value_and_rate(row, n, begin)[0]
         low, high = min(low, value), max(high, value)
-    value = value_of(row, n, s)
+    value = value_and_rate(row, n, s)[0]
     return min(low, value), max(high, value)
 
 

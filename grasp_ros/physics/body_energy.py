@@ -1,7 +1,7 @@
 """The energy of one body by itself and the size of its terms, which is what roundings are relative to.
 
-It works on floats and on NumPy arrays: `exact.energy_check` compiles the same source for every segment, `energy` uses
-it for every control period.
+It works on floats and on NumPy arrays: `exact.driver.energy_check` compiles the same source for every segment,
+`energy` uses it for every control period.
 """
 
 from typing import Any

@@ -56,8 +56,8 @@ RANGES = {
 }
 
 
-class Rows:
-    """Systems of n scenes over one duration, and what the rules make of them.
+class Systems:
+    """Arrays of n systems, one a row, over one duration, and what the rules measure of them.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Rows:
     def pressed(self) -> Array:
         """Constant force through the pairs if all that is in contact were one rigid body there, (n, 2) in N."""
         push = self._bodies[..., Of.FORCE] - self._bodies[..., Of.STIFFNESS] * self.x[:, OBJECT:]
-        push, mass = push.copy(), self.mass.copy()
+        mass = self.mass.copy()
         push[:, :OBJECT] *= self.touching
         mass[:, :OBJECT] *= self.touching
         common = push.sum(axis=1) / mass.sum(axis=1)  # acceleration
@@ -167,7 +167,7 @@ class Rule(NamedTuple):
     unit: str
     why: str
     keys: tuple[str, ...]  # of the scene, one for each column of the measure
-    measure: Callable[[Rows], Array]
+    measure: Callable[[Systems], Array]
 
     @property
     def allowed(self) -> str:
@@ -184,23 +184,23 @@ def _arms(key: str) -> tuple[str, ...]:
 RULES = (
     Rule("gap or depth of a pair, in roundings of the largest position", PART, np.inf, "",
          f"the positions do not tell a smaller one; nor is any below {SMALLEST:g} m told", _arms("arm.position_m"),
-         Rows.gaps),
+         Systems.gaps),
     Rule("relative speed of a pair without a gap, in roundings of the largest speed", PART, np.inf, "",
          f"the velocities do not tell a smaller one; nor is any below {SMALLEST:g} m/s told",
-         _arms("arm.velocity_m_per_s"), Rows.closing),
+         _arms("arm.velocity_m_per_s"), Systems.closing),
     Rule("mass of the arm / mass of the object", 1e-12, 1e12, "",
          "four digits of a velocity are left for what an impact moves the heavier one", _arms("arm.mass_kg"),
-         Rows.masses),
+         Systems.masses),
     Rule("sqrt(k/m) of a body x duration", 0.0, 1e12, "",
-         "one rounding of the rate turns the phase at the end by 1e-4", ("time.duration_s",) * 3, Rows.turns),
+         "one rounding of the rate turns the phase at the end by 1e-4", ("time.duration_s",) * 3, Systems.turns),
     Rule("speed that a body reaches by its spring and constant force", 0.0, 1e10, "m/s",
          "a hundredth of what a run may reach", ("left_arm.mass_kg", "right_arm.mass_kg", "object.mass_kg"),
-         Rows.speeds),
+         Systems.speeds),
     Rule("speed at which a pair that starts pressed in parts", 0.0, 1e10, "m/s",
-         "a hundredth of what a run may reach", _arms("arm.position_m"), Rows.thrown),
+         "a hundredth of what a run may reach", _arms("arm.position_m"), Systems.thrown),
     Rule("p J / mu of a pair, with J its impulse and mu its reduced mass", 0.0, 1e8, "",
          "it takes a fifteenth of that in Taylor steps, some ten seconds", _arms("contact.dissipation_s_per_m"),
-         Rows.impulses),
+         Systems.impulses),
 )
 
 
@@ -214,7 +214,7 @@ class Outside(NamedTuple):
 
 def outside(system: System, duration: float) -> Outside | None:
     """The first rule that a system breaks over a duration in s, or None."""
-    rows = Rows(system.closed_loop[None], system.pairs[None], system.state[None], duration)
+    rows = Systems(system.closed_loop[None], system.pairs[None], system.state[None], duration)
     for rule in RULES:
         measured = rule.measure(rows)
         wrong = _breaks(rule, measured)[0]
@@ -224,7 +224,7 @@ def outside(system: System, duration: float) -> Outside | None:
     return None
 
 
-def outside_rows(rows: Rows) -> NDArray[np.bool_]:
+def outside_rows(rows: Systems) -> NDArray[np.bool_]:
     """Which of n systems break a rule, (n,)."""
     broken = np.zeros(len(rows.x), dtype=bool)
     for rule in RULES:

@@ -1,7 +1,7 @@
 """Array layouts shared by everything: one place for every index, mode, transition and status.
 
 The state y (8,) is x_l, v_l, x_o, v_o, x_r, v_r, u_l, u_r. The penetrations follow from the positions, which have a low
-word each, see `exact.positions`. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
+word each, see `exact.compensated`. Bodies are rows LEFT, RIGHT, OBJECT of an array (3, 4),
 pairs are rows LEFT, RIGHT of an array (2, 2).
 """
 

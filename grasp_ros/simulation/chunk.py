@@ -1,7 +1,7 @@
 """A chunk of an ensemble: rows of variants, one after the other, and their outcomes.
 
-A plain row is integrated with its chunk in one call (`exact.rows`), without the interpreter. Any other, and a plain one
-that stops, is driven as `simulate` drives a scene. Both give the same bits.
+A plain row is integrated with its chunk in one call (`observe.ensemble`), without the interpreter. Any other, and a
+plain one that stops, is driven as `simulate` drives a scene. Both give the same bits.
 """
 
 from __future__ import annotations

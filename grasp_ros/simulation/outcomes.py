@@ -22,7 +22,7 @@ NOTHING = Wanted(0)
 class Runs(NamedTuple):
     """What is left of n runs when they are over."""
 
-    seen: Array  # (n, k), see `exact.sight.Seen`
+    seen: Array  # (n, k), see `observe.sight.Seen`
     state: Array  # (n, 6)
     touches: Array  # (n, 2)
     growth: Array  # (n,) largest Lyapunov exponent, 1/s

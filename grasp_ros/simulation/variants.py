@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from grasp_ros.physics.domain import Rows, outside_rows
+from grasp_ros.physics.domain import Systems, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, V, X
 from grasp_ros.physics.model import Array
@@ -139,7 +139,7 @@ class Variants:
         block = self.block()
         doubt |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
         with np.errstate(all="ignore"):  # a row in doubt may hold any number
-            doubt |= outside_rows(Rows(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
+            doubt |= outside_rows(Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
         return np.flatnonzero(doubt)
 
     def block(self) -> Block:

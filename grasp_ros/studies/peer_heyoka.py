@@ -1,4 +1,4 @@
-"""heyoka at its best on the grasp: flights in time, contacts in the regularised variables of `physics.series`.
+"""heyoka at its best on the grasp: flights in time, contacts in the regularised variables of `exact.contact.series`.
 
 heyoka is an adaptive Taylor integrator compiled by LLVM. Each contact mode has an integrator of its own, with the
 terminal events that end the mode. Where no output falls within a mode, heyoka's own loop runs through it; otherwise

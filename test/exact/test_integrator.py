@@ -215,6 +215,10 @@ from grasp_ros import scene as scenes
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.losses import losses
 scene = scenes.load("case_01", ["time.duration_s=0.02", "left_arm.position_m=-0.01", "left_arm.velocity_m_per_s=2"])
+nothing = ("stiffness_N_per_m", "damping_Ns_per_m", "position_gain_N_per_m", "velocity_gain_Ns_per_m", "position_m")
+free = {f"{section}.{key}": 0.0 for section, keys in scene.values.items() for key in keys if key in nothing}
+chain = simulate(scene.changed({**free, "right_arm.velocity_m_per_s": 0.0}), grid=np.linspace(0.0, 0.02, 5))
+print(*chain.state.ravel().tolist(), *(event.time for event in chain.events))
 own = {"controllers": {"left": lambda tick, time, x, v: -x}}
 for settings in ({}, {"sampled": True}, own, {"method": "paper"}, {"method": "discrete_gradient"}):
     run = simulate(scene, grid=np.linspace(0.0, 0.02, 5), **settings)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.physics.domain import RANGES, RULES, SMALLEST, Rows, outside
+from grasp_ros.physics.domain import RANGES, RULES, SMALLEST, Systems, outside
 from grasp_ros.physics.layout import EPS
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import EFFECTS
@@ -146,6 +146,6 @@ def test_the_page_has_the_tables_of_the_code() -> None:
     assert tables() in DOCUMENT.read_text(encoding="utf-8")
 
 
-def rows(scene: Scene, seconds: float | None = None) -> Rows:
+def rows(scene: Scene, seconds: float | None = None) -> Systems:
     system = scene.system
-    return Rows(system.closed_loop[None], system.pairs[None], system.state[None], seconds or scene.duration)
+    return Systems(system.closed_loop[None], system.pairs[None], system.state[None], seconds or scene.duration)

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.automaton.resting_pair import HIGHEST, difference
+from grasp_ros.exact.automaton.resting_pair import HIGHEST, difference, short_time
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.records import Array, Plant, State
-from grasp_ros.exact.tolerances import DERIVATIVE, HELD, OUTWEIGHS, SHORT_START
-from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U
+from grasp_ros.exact.tolerances import DERIVATIVE, HELD, OUTWEIGHS
+from grasp_ros.physics.layout import Body, Law, Pair, U
 
 
 @inlined
@@ -79,7 +79,7 @@ def force_free_time(plant: Plant, state: State, side: Body) -> float:
                              time_of_rounding(per_hertz, loss, order, a, speed)))
         if plant.coulomb > 0.0:
             time = min(time, time_of_force(plant, side, order, a))
-    return time if time == math.inf else min(time, float(SHORT_START / own_rate(plant, side)))
+    return time if time == math.inf else min(time, short_time(plant, side))
 
 
 @kernel
@@ -98,16 +98,6 @@ def speed_of_pair(y: Array, side: Body) -> float:
     """The larger speed of arm and object, m/s."""
     front, back = rate_lanes(side)
     return max(abs(y[front]), abs(y[back]))
-
-
-@kernel
-def own_rate(plant: Plant, side: Body) -> float:
-    """Bound on the rates at which arm and object move by themselves, 1/s."""
-    rate = 0.0
-    for body in (side, OBJECT):
-        row = plant.bodies[body]
-        rate = max(rate, abs(row[Of.DAMPING]) / row[Of.MASS] + math.sqrt(row[Of.STIFFNESS] / row[Of.MASS]))
-    return rate
 
 
 @kernel

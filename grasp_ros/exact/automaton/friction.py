@@ -18,7 +18,7 @@ from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate
 from grasp_ros.exact.tolerances import FRICTION
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, Slide, U, V, Z
 
-FIRST = whole(0)  # row of factors
+FIRST = whole(0)  # coefficient
 
 
 @kernel
@@ -107,8 +107,8 @@ def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
 
     The table of factors is free after the expansion and holds the series on the way.
     """
-    f, row = tables.f, tables.row
-    w, e, square, cube = FIRST, n + 1, 2 * (n + 1), 3 * (n + 1)
+    f, row, part = tables.f, tables.row, n + 1
+    w, e, square, cube = f[:part], f[part : 2 * part], f[2 * part : 3 * part], f[3 * part : 4 * part]
     for k in range(n + 1):
         row[k] = 0.0
     for side in (LEFT, RIGHT):
@@ -116,15 +116,15 @@ def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
             continue
         front, back = rate_lanes(side)
         for k in range(n + 1):
-            f[w + k] = tables.c[LANES * k + Z.L + side]
-            f[e + k] = plant.pairs[side, Law.DISSIPATION] * (tables.c[LANES * k + front] - tables.c[LANES * k + back])
-        f[e] += 1.0
-        product(f, w, w, square, n)
-        product(f, square, w, cube, n)
-        product(f, cube, e, square, n)
+            w[k] = tables.c[LANES * k + Z.L + side]
+            e[k] = plant.pairs[side, Law.DISSIPATION] * (tables.c[LANES * k + front] - tables.c[LANES * k + back])
+        e[FIRST] += 1.0
+        product(w, w, square, n)
+        product(square, w, cube, n)
+        product(cube, e, square, n)
         hertzian = plant.pairs[side, Law.HERTZIAN] if side == LEFT else -plant.pairs[side, Law.HERTZIAN]
         for k in range(n + 1):
-            row[k] += hertzian * f[square + k]
+            row[k] += hertzian * square[k]
 
 
 @kernel

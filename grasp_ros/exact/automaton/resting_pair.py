@@ -151,14 +151,19 @@ def parts(plant: Plant, y: Array, side: Body) -> bool:
 
 
 @kernel
+def short_time(plant: Plant, side: Body) -> float:
+    """How long, in s, a flight of arm and object from u = 0 is a short one; inf where nothing but forces moves them."""
+    rate = 0.0
+    for body in (side, OBJECT):
+        row = plant.bodies[body]
+        rate = max(rate, abs(row[Of.DAMPING]) / row[Of.MASS] + math.sqrt(row[Of.STIFFNESS] / row[Of.MASS]))
+    return SHORT_START / rate if rate > 0.0 else math.inf
+
+
+@kernel
 def parting_time(plant: Plant, state: State, side: Body, span: float) -> float:
     """How long, in s, a pair at rest keeps the sign of u in a flight, for certain; it is a short flight."""
     order, value = own_difference(plant, state.y, side, LOWEST)
     if order == NEVER:
         return math.inf
-    rate = 0.0
-    for body in (side, OBJECT):
-        row = plant.bodies[body]
-        rate = max(rate, abs(row[Of.DAMPING]) / row[Of.MASS] + math.sqrt(row[Of.STIFFNESS] / row[Of.MASS]))
-    certain = certain_time(plant, state.y, side, int(order), value, span)
-    return min(certain, SHORT_START / rate) if rate > 0.0 else certain
+    return min(certain_time(plant, state.y, side, int(order), value, span), short_time(plant, side))

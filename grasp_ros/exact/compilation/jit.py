@@ -99,6 +99,11 @@ def compiled_address(function: Any, signature: str) -> int:
         return id(function)
     function.compile(signature)
     (result,) = function.overloads.values()
+    return address_of_code(result)
+
+
+def address_of_code(result: Any) -> int:
+    """Where the machine code of one compilation of a door begins, for calls from C."""
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 
 COMPILING = "compiling the kernels; this happens once after an installation and takes some 20 s"
 
-
 PACKAGE = Path(__file__).parents[2]
 COMPILED_ROOMS = ("physics", "exact", "observe", "methods", "studies")
 

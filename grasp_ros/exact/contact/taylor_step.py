@@ -198,5 +198,3 @@ def accepted_length(tables: Tables, step: Step, h: float, settings: Settings, wo
         work[Work.REJECTED_STEPS] += 1
         h *= 0.7
     return math.nan
-
-

@@ -165,15 +165,14 @@ def invert_time(tables: Tables, step: Step, tau: float, high: float, total: floa
 
 
 @kernel
-def product(f: Array, a: int, b: int, out: int, n: int) -> None:
-    """Cauchy product up to the order n of two series that begin at a and b in f, and not at `out`.
+def product(first: Array, second: Array, out: Array, n: int) -> None:
+    """Cauchy product of two series up to the order n; `out` is neither of them.
 
     The terms of a coefficient are added in their order, but those of the others in between: no sum waits for the last.
     """
-    first, second, product = f[a : a + n + 1], f[b : b + n + 1], f[out : out + n + 1]
     for k in range(n + 1):
-        product[k] = 0.0
+        out[k] = 0.0
     for j in range(n + 1):
         factor = first[j]
         for k in range(n + 1 - j):
-            product[j + k] += factor * second[k]
+            out[j + k] += factor * second[k]

@@ -151,5 +151,3 @@ def search(f: Array, n: int, h: float, noise: float, last: float, work: Integers
         if value >= -near and rate > 0.0:
             return s, FOUND, last
     return s, near, last
-
-

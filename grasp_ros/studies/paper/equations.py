@@ -127,7 +127,7 @@ def condition_equations(samples: list[Sample]) -> list[Equation]:
             0.0,
         ),
         Equation(
-            "(10)", "touch and release at u = 0", "exact.modes.make_transition", "largest |u| at an event, m",
+            "(10)", "touch and release at u = 0", "exact.automaton.modes.make_transition", "largest |u| at an event, m",
             at_events, 1e-15,
         ),
     ]
