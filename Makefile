@@ -7,15 +7,21 @@ SLOWER ?= 30%
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-.PHONY: demo test lint install study benchmark mutants clean
+PAGES := accuracy paper hard effects certificate maps fuzz faults
+
+.PHONY: demo test quick lint install study benchmark mutants lowest clean
 
 demo: install
 	$(BIN)/grasp run case_01
 
-# All tests, some minutes, those that judge by wall time alone; `pytest -m "not slow"` runs those that take seconds.
+# All tests, some minutes; last those that judge by wall time, alone.
 test: lint
-	$(BIN)/pytest -n 2 --dist loadfile -m "not alone"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not alone" --durations 20
 	$(BIN)/pytest -m alone
+
+# What takes seconds.
+quick: lint
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not alone"
 
 lint: install
 	$(BIN)/ruff check .
@@ -24,18 +30,20 @@ lint: install
 install: $(VENV)/ready
 	$(BIN)/pip install --quiet --no-deps --no-build-isolation --force-reinstall .
 
-# The peers of the benchmarks are large and only wanted here.
+# Everything that the laboratory writes, some hours. Its peers are large and only wanted here.
 study: install
-	$(BIN)/pip install --quiet -c constraints.txt ".[study]"
-	$(BIN)/grasp study page
-	$(BIN)/grasp study paper --docs docs/paper.md
-	$(BIN)/grasp study speed case_01
-	$(BIN)/grasp study graph case_01
+	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
+	for name in $(PAGES); do $(BIN)/python -m lab $$name || exit 1; done
+
+# One of them, say `make study-paper`.
+study-%: install
+	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
+	$(BIN)/python -m lab $*
 
 # Saves a result in runs/benchmarks, and fails if the fastest run of a benchmark is slower than in the last one there.
 benchmark: install
-	$(BIN)/pip install --quiet -c constraints.txt ".[study]"
-	$(BIN)/pytest benchmarks -W default --benchmark-storage=runs/benchmarks --benchmark-autosave \
+	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
+	$(BIN)/pytest lab/benchmarks -W default --benchmark-storage=runs/benchmarks --benchmark-autosave \
 	    --benchmark-columns=min,median,rounds \
 	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))
 
@@ -43,11 +51,18 @@ benchmark: install
 mutants: install
 	$(BIN)/python test/exact/mutants.py
 
-$(VENV)/ready: setup.py constraints.txt
+# The quick tests with the lowest versions that the bounds of pyproject.toml admit.
+lowest:
+	$(PYTHON) -m venv $(VENV)-lowest
+	$(VENV)-lowest/bin/pip install --quiet uv
+	$(VENV)-lowest/bin/uv pip install --quiet --python $(VENV)-lowest/bin/python --resolution lowest-direct ".[test]"
+	$(VENV)-lowest/bin/pytest -n 2 --dist loadfile -m "not slow and not alone"
+
+$(VENV)/ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12) and 'Python 3.11 or 3.12 is needed')"
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet -c constraints.txt setuptools wheel ".[test]"
 	touch $@
 
 clean:
-	rm -rf build install log *.egg-info $(VENV)
+	rm -rf build install log *.egg-info $(VENV) $(VENV)-lowest

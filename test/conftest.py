@@ -6,7 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ from grasp_ros.cli.main import main
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))  # each has domains of its own
 os.environ["ROS_DOMAIN_ID"] = str(1 + 50 * (WORKER % 2) + os.getpid() % 50)
+ROOT = Path(__file__).parents[1]
+os.environ["PYTHONPATH"] = str(ROOT)  # processes, too, are those of the checkout
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
@@ -37,15 +40,28 @@ def command(
 ) -> Callable[..., subprocess.CompletedProcess[str]]:
     """The command line within this process, in a directory of its own: much cheaper than `grasp`."""
     monkeypatch.chdir(tmp_path)
+    return partial(_answer, main, capsys)
 
-    def call(*arguments: str) -> subprocess.CompletedProcess[str]:
-        try:
-            status = main(arguments)
-        except SystemExit as stop:  # of argparse
-            status = stop.code
-        return subprocess.CompletedProcess(arguments, status, *capsys.readouterr())
 
-    return call
+@pytest.fixture
+def lab_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """`python -m lab` likewise."""
+    from lab.__main__ import main as lab
+
+    monkeypatch.chdir(tmp_path)
+    return partial(_answer, lab, capsys)
+
+
+def _answer(
+    program: Callable[[Sequence[str]], int], capsys: pytest.CaptureFixture[str], *arguments: str
+) -> subprocess.CompletedProcess[str]:
+    try:
+        status = program(arguments)
+    except SystemExit as stop:  # of argparse
+        status = stop.code
+    return subprocess.CompletedProcess(arguments, status, *capsys.readouterr())
 
 
 @pytest.fixture(scope="session")

@@ -1,4 +1,4 @@
-"""Oracles of the tests alone; those that the study of hard cases shares are in `grasp_ros.verification.oracles`.
+"""Oracles of the tests alone; those that the study of hard cases shares are in `lab.oracles.closed_forms`.
 
 Nothing here but `run` and `balance_of` calls a kernel. Everything works in mpmath unless its name says otherwise.
 """
@@ -18,8 +18,8 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
-from grasp_ros.verification.oracles import Balance, Impact, balance, first_touch_from_rest, flight, impact, reduced_mass
-from grasp_ros.verification.reference import Reference, integrate
+from lab.oracles.closed_forms import Balance, Impact, balance, first_touch_from_rest, flight, impact, reduced_mass
+from lab.reference import Reference, integrate
 
 __all__ = ["Balance", "Impact", "first_touch_from_rest", "flight", "impact", "reduced_mass"]  # for the tests
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)

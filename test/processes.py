@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 DEADLINE = 60.0  # s
-START = [sys.executable, "-m", "grasp_ros.graph.nodes.start"]
+START = [sys.executable, "-m", "grasp_ros.graph"]
 
 
 def wait_for(condition: Callable[[], bool], what: str) -> None:

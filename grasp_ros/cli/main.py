@@ -11,7 +11,7 @@ import errno
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 
@@ -23,14 +23,19 @@ from grasp_ros.physics.errors import Refused
 SUBJECTS = {  # files of this room, and their commands: what is not asked for is not imported, which takes a while
     "simulate": ("scenes", "methods", "simulate"), "map": ("map",),
     "graph": ("run", "recover", "inspect", "replay", "watch", "ctl", "verify"), "plot": ("plot",),
-    "studies": ("study",),
 }
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `grasp`; returns the exit status."""
+    words = sys.argv[1:] if arguments is None else arguments
+    return run(lambda: _parser(words[0] if words else ""), words)
+
+
+def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> int:
+    """Run the command that the words name; returns the exit status."""
     try:
-        status = _status(arguments)
+        status = _status(parser, words)
         sys.stdout.flush()  # here, where it can still be said that it failed
         return status
     except OSError as error:
@@ -46,12 +51,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0 if enough else 1
 
 
-def _status(arguments: Sequence[str] | None) -> int:
+def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> int:
     """Run a command; in one line what it refuses."""
     try:
         raise_on_signals()
-        words = sys.argv[1:] if arguments is None else arguments
-        options = _parser(words[0] if words else "").parse_args(words)
+        options = parser().parse_args(words)
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")

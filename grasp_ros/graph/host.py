@@ -8,14 +8,13 @@ only interface is the loopback one. A participant on this host that has no such 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
-import grasp_ros
+from grasp_ros import CONFIG
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
 LOCALHOST, SUBNET = "LOCALHOST", "SUBNET"
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
-PROFILE = Path(grasp_ros.__file__).parent / "config" / "this_host.xml"
+PROFILE = CONFIG / "this_host.xml"
 OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
 OURS = "rmw_fastrtps_cpp"  # the middleware that the profile is for
 

@@ -50,7 +50,7 @@ def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str
     root = namespace.rstrip("/")
     names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
     # -P: a checkout in the working directory must not take the place of the package that is running.
-    return [sys.executable, "-P", "-m", "grasp_ros.graph.nodes.start", *nodes, "--ros-args", *words, *names]
+    return [sys.executable, "-P", "-m", "grasp_ros.graph", *nodes, "--ros-args", *words, *names]
 
 
 class GraphError(RuntimeError):

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from grasp_ros import CONFIG
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, Grasp
@@ -196,7 +196,7 @@ class Scene:
 
 def names() -> list[str]:
     """Names of the scenes that come with the package, the paper's cases first."""
-    found = [entry.name.removesuffix(".yaml") for entry in _library().iterdir() if entry.name.endswith(".yaml")]
+    found = [entry.name.removesuffix(".yaml") for entry in CONFIG.iterdir() if entry.name.endswith(".yaml")]
     return sorted(found, key=lambda name: (not name.startswith("case_"), name))
 
 
@@ -225,7 +225,7 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
     if reference not in names():
         known = ", ".join(names())
         raise SceneError(f"{reference}: no such scene; allowed: a path that ends in .yaml, or one of {known}")
-    return parse((_library() / f"{reference}.yaml").read_text(encoding="utf-8"), reference, reference, settings)
+    return parse((CONFIG / f"{reference}.yaml").read_text(encoding="utf-8"), reference, reference, settings)
 
 
 def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Scene:
@@ -288,7 +288,3 @@ def _read(document: Mapping[Any, Any], name: str, source: str) -> Scene:
     scene = Scene(name, title, tuple(readings), watch, values)
     check_domain(source, values, scene.system)
     return scene
-
-
-def _library() -> Any:
-    return resources.files("grasp_ros.config")

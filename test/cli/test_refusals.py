@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import subprocess
 import sys
 from pathlib import Path
@@ -11,8 +12,8 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli import studies
 from grasp_ros.cli.main import main
+from lab.__main__ import with_packages
 
 LONG = "a" * 5000
 SECONDS = 60.0
@@ -196,11 +197,11 @@ def test_a_title_that_the_terminal_cannot_show_is_printed_all_the_same(
 
 @pytest.mark.slow
 def test_a_study_without_its_packages_names_the_one_that_is_missing() -> None:
-    program = ("import sys; sys.modules['gmpy2'] = None; from grasp_ros.cli.main import main;"
-               " sys.exit(main(['study', 'hard', '--alone']))")
+    program = ("import sys; sys.modules['gmpy2'] = None; from lab.__main__ import main;"
+               " sys.exit(main(['hard', '--alone']))")
     result = ran([sys.executable, "-c", program])
     assert result.returncode == 2
-    assert result.stderr == "grasp: this study needs gmpy2; pip install 'grasp_ros[study]'\n"
+    assert result.stderr == "grasp: this needs gmpy2; pip install -e '.[lab]'\n"
 
 
 def test_a_module_of_ours_that_is_missing_is_a_fault() -> None:
@@ -208,4 +209,4 @@ def test_a_module_of_ours_that_is_missing_is_a_fault() -> None:
         raise ModuleNotFoundError("No module named 'grasp_ros.nothing'", name="grasp_ros.nothing")
 
     with pytest.raises(ModuleNotFoundError):
-        studies._with_packages(broken, studies.argparse.Namespace())
+        with_packages(broken, argparse.Namespace())

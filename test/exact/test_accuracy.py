@@ -11,8 +11,8 @@ from oracles import CASES, Run, done, make_grasp, reference_of, run
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm
-from grasp_ros.verification.cases.scenes import contacts
-from grasp_ros.verification.reference import integrate
+from lab.cases.scenes import contacts
+from lab.reference import integrate
 
 pytestmark = pytest.mark.slow  # references with 20 and 25 digits
 

@@ -11,8 +11,8 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.physics.model import Arm, Contact, Grasp
-from grasp_ros.verification.cases.scenes import BEGIN
-from grasp_ros.verification.oracles import elastic_period, graze, impact_numbers
+from lab.cases.scenes import BEGIN
+from lab.oracles.closed_forms import elastic_period, graze, impact_numbers
 
 IMPACTS = [
     (1.0, 1.0, 1e4, 0.0, 1.0),

@@ -19,7 +19,7 @@ from grasp_ros.graph.rosbag2 import list_message
 from grasp_ros.graph.template import Template
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LEFT_COMMAND, LYAPUNOV_NAMES, Topic, state_of
 from grasp_ros.simulation import simulate
-from grasp_ros.studies import recorder as study
+from lab.drills import recorder as study
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 

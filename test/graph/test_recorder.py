@@ -32,7 +32,7 @@ from grasp_ros.graph.recover import recover
 from grasp_ros.graph.rosbag2 import INFORMATION
 from grasp_ros.scene.topics import DIAGNOSTICS, JOINT_STATES
 from grasp_ros.simulation import Trajectory, simulate
-from grasp_ros.studies import recorder as study
+from lab.drills import recorder as study
 
 SECONDS = 60.0
 LIMIT = 9 * RESERVE_BYTES // 4
@@ -338,7 +338,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.recorder import Recorder
 from grasp_ros.simulation import simulate
-from grasp_ros.studies import recorder as study
+from lab.drills import recorder as study
 run = simulate(scenes.load("case_01"), sampled=True)
 disk = Path(sys.argv[1])
 recorder = Recorder(disk / "bag", run.scene, {})
@@ -377,7 +377,7 @@ def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_recordings_that_are_killed_are_there(run: Trajectory) -> None:
-    """`grasp study recorder --kills 100` does more of them."""
+    """`python -m lab recorder --kills 100` does more of them."""
     ticks, rng = list(study.ticks_of(run)), np.random.default_rng(0)
     for _ in range(4):
         end = study.kill(run.scene, ticks, rng.uniform(0.0, study.LONGEST_SECONDS))

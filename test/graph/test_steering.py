@@ -23,7 +23,7 @@ from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
 from grasp_ros.scene.topics import JOINT_STATES
-from grasp_ros.studies import steering
+from lab.drills import steering
 
 pytestmark = pytest.mark.slow  # real processes
 SEED, CALLS = 13, 40
@@ -52,7 +52,7 @@ def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
 
 
 def test_random_steering_leaves_a_bag_that_verifies(steered: tuple[Path, list[int]]) -> None:
-    """`grasp study steering --calls 1000` makes more calls."""
+    """`python -m lab steering --calls 1000` makes more calls."""
     directory, lengths = steered
     assert len(lengths) > 5
     assert steering.problems(directory / "bag", lengths) == []

@@ -19,7 +19,7 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.system import System
 from grasp_ros.simulation import Trajectory, load, simulate
-from grasp_ros.verification.oracles import elastic_period
+from lab.oracles.closed_forms import elastic_period
 
 STEPPING = [name for name in METHODS if name != EXACT]
 LOCATING = [name for name in STEPPING if METHODS[name].events]

@@ -16,8 +16,8 @@ from grasp_ros.physics.layout import EPS
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.simulation.variants import Variants
-from grasp_ros.studies.domain import tables
-from grasp_ros.verification.relations import scaled
+from lab.oracles.metamorphic import scaled
+from lab.studies.domain import tables
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "domain.md"
 

@@ -15,7 +15,7 @@ from grasp_ros.graph import bag
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.npz import signed
 from grasp_ros.simulation import simulate
-from grasp_ros.studies import recorder
+from lab.drills import recorder
 
 
 def recorded(path: Path) -> Path:

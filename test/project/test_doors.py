@@ -22,7 +22,7 @@ from grasp_ros.scene import npz
 from grasp_ros.scene.npz import signed
 from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
-from grasp_ros.studies.records import Journal, Record, digest
+from lab.studies.records import Journal, Record, digest
 
 SECONDS = 10.0  # no door takes longer
 CASE = scenes.load("case_01").to_yaml()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from grasp_ros.verification.cases.registry import cases
+from lab.cases.registry import cases
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "oracles.md"

@@ -45,7 +45,7 @@ def test_ros2_finds_the_package_and_its_executables(prefix: Path) -> None:
 def test_executables_run_from_where_ros2_looks(prefix: Path, tmp_path: Path) -> None:
     """As `ros2 run` starts them: by their path, here with the package of that prefix."""
     site = next(prefix.glob("lib/python*/site-packages"))
-    environment = {**os.environ, "PYTHONPATH": str(site)}
+    environment = {**os.environ, "PYTHONPATH": str(site), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
     result = subprocess.run(
         [prefix / "lib/grasp_ros/grasp", "scenes"], cwd=tmp_path, env=environment, capture_output=True, text=True,
         timeout=60, check=False,

@@ -20,13 +20,14 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import decoding, reading, writing
 from grasp_ros.simulation import plots, simulate
-from grasp_ros.studies import document
-from grasp_ros.studies.records import Journal
+from lab.studies import document
+from lab.studies.records import Journal
 
 ROOT = Path(grasp_ros.__file__).parent
+LAB = ROOT.with_name("lab")
 OUR_OWN = (  # bare ValueErrors that no input of a user reaches
-    "verification/reference/plant.py", "verification/reference/solve.py", "studies/certificate.py",
-    "exact/compilation/kernel_cache.py",
+    "lab/reference/plant.py", "lab/reference/solve.py", "lab/studies/certificate.py",
+    "grasp_ros/exact/compilation/kernel_cache.py",
 )
 
 
@@ -64,8 +65,8 @@ def test_every_room_refuses_with_the_same_exception(tmp_path: Path, name: str) -
 def test_nothing_else_is_raised_for_input() -> None:
     """A ValueError by its own name says that no input can cause it; nothing is caught that faults of ours raise."""
     raised, caught = set(), set()
-    for path in ROOT.rglob("*.py"):
-        name = path.relative_to(ROOT).as_posix()
+    for path in (*ROOT.rglob("*.py"), *LAB.rglob("*.py")):
+        name = path.relative_to(ROOT.parent).as_posix()
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Raise) and getattr(getattr(node.exc, "func", node.exc), "id", "") == "ValueError":
                 raised.add(name)
@@ -75,11 +76,11 @@ def test_nothing_else_is_raised_for_input() -> None:
                 caught.add(name)
     assert raised == set(OUR_OWN)
     assert caught == {
-        "studies/doors.py", "verification/fuzz.py",  # a fault is what they look for
-        "graph/nodes/law.py",  # what a user's law raises ends the run with its line
-        "graph/nodes/life.py",  # a fault of ours ends a node in one line
-        "exact/compilation/numba_internals.py",  # whatever a damaged file raises: it is compiled anew
-        "exact/driver/user_controller.py",  # what a user's controller raises goes around the kernel, and on behind it
+        "lab/drills/parser_fuzzing.py", "lab/drills/fuzz.py",  # a fault is what they look for
+        "grasp_ros/graph/nodes/law.py",  # what a user's law raises ends the run with its line
+        "grasp_ros/graph/nodes/life.py",  # a fault of ours ends a node in one line
+        "grasp_ros/exact/compilation/numba_internals.py",  # whatever a damaged file raises: it is compiled anew
+        "grasp_ros/exact/driver/user_controller.py",  # what a user's controller raises goes around the kernel
     }
 
 

@@ -27,8 +27,8 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.npz import signed
 from grasp_ros.scene.scene import Scene
 from grasp_ros.simulation import simulate
-from grasp_ros.studies import recorder
-from grasp_ros.studies.records import Journal
+from lab.drills import recorder
+from lab.studies.records import Journal
 
 TAGS = [
     "!!python/object/apply:os.mkdir [owned]", "!!python/object/new:os.mkdir [owned]",
@@ -200,7 +200,7 @@ def test_the_option_asks_for_the_network(tmp_path: Path, asked: bool) -> None:
     words = [sys.executable, "-m", "grasp_ros.cli", "ctl", "status", *["--network"] * asked]
     process = subprocess.Popen(words, cwd=tmp_path, env=plain_environment(129), stderr=subprocess.PIPE, text=True)
     became = Path(f"/proc/{process.pid}/cmdline")
-    wait_for(lambda: b"graph.nodes.start" in became.read_bytes(), "the node")
+    wait_for(lambda: b"grasp_ros.graph" in became.read_bytes(), "the node")
     assert (b"ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET" in (became.parent / "environ").read_bytes()) is asked
     _, err = process.communicate(timeout=DEADLINE)
     assert process.returncode == 1

@@ -103,7 +103,7 @@ def test_nobody_makes_a_scene_around_the_checks() -> None:
         "scene/scene.py"
     ]
     assert [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.rglob("*.py")) if "replace" in called(path)] == [
-        "simulation/lyapunov.py", "verification/restarts.py"  # of a system and of a run
+        "simulation/lyapunov.py"  # of a system
     ]
 
 

@@ -14,7 +14,7 @@ from grasp_ros.scene import PAPER
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
 from grasp_ros.simulation import simulate
-from grasp_ros.studies.effects import registry_table, variants
+from lab.studies.effects import registry_table, variants
 
 OTHERS = [name for name in scenes.names() if name not in CASES]
 

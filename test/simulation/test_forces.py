@@ -14,7 +14,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import closed_loop, simulate
 from grasp_ros.simulation.trajectory import tick_times
-from grasp_ros.verification.oracles import holding_force
+from lab.oracles.closed_forms import holding_force
 
 
 def squeeze(scene: Scene) -> tuple[float, float, float]:

@@ -16,6 +16,9 @@ from grasp_ros.graph.host import this_host
 from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
 
+NODES = ("plant", "left_controller", "right_controller", "monitor")
+TOOLS = ("together", "watch", "player", "remote")  # which commands of `grasp` become
+
 
 def main(name: str, child: bool = False) -> int:
     """Run the node of that name; returns the exit status of the process.
@@ -49,28 +52,21 @@ def _spare_the_plant() -> None:
         sys.modules.setdefault(module, None)  # type: ignore[arg-type]
 
 
-def plant() -> int:
-    """Entry point of `plant`."""
-    return main("plant")
-
-
-def left_controller() -> int:
-    """Entry point of `left_controller`."""
-    return main("left_controller")
-
-
-def right_controller() -> int:
-    """Entry point of `right_controller`."""
-    return main("right_controller")
-
-
-def monitor() -> int:
-    """Entry point of `monitor`."""
-    return main("monitor")
-
-
-if __name__ == "__main__":
-    is_child = sys.argv[1] == "child"
+def start() -> int:
+    """Start the node that the first word names; `child` before it marks a child of `grasp run`."""
+    is_child = sys.argv[1:2] == ["child"]
     if is_child:
         del sys.argv[1]
-    sys.exit(main(sys.argv[1], is_child))
+    name = [*sys.argv[1:], ""][0]
+    if name not in (*NODES, *TOOLS):
+        print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
+        return 2
+    try:
+        return main(name, is_child)
+    except ModuleNotFoundError as error:
+        package = str(error.name).split(".")[0]
+        if package == "grasp_ros":
+            raise
+        print(f"{name}: the Python package {package} is missing; `pip install grasp_ros` brings it, and so does"
+              " rosdep from package.xml", file=sys.stderr)
+        return 1

@@ -83,7 +83,7 @@ class Effect:
     oddities : callable
         Finds what a scene can hardly mean, in the sections and the system that they have built.
     example : mapping of str to numbers
-        Keys to add to a scene to see what it does; `grasp study effects` does. Empty for what the paper's grasp has.
+        Keys to add to a scene to see what it does; `python -m lab effects` does. Empty for what the paper's grasp has.
     """
 
     section: str

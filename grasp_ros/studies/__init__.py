@@ -1,1 +1,0 @@
-"""Studies: measurements that a reader can repeat."""

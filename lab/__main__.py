@@ -1,0 +1,51 @@
+"""`python -m lab`: what examines grasp_ros. Without a name it lists what there is, with a line each."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from functools import partial
+
+from grasp_ros.cli.arguments import Command
+from grasp_ros.cli.main import run
+from grasp_ros.physics.errors import Refused
+from lab.commands import accuracy, costs, graph, maps, proofs
+
+# names of modules of the extra `lab`
+PACKAGES = ("gmpy2", "heyoka", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
+COMMANDS = (
+    proofs.add_paper, proofs.add_certificate, proofs.add_hard,
+    accuracy.add_accuracy, accuracy.add_advise, accuracy.add_prediction, accuracy.add_page, accuracy.add_speed,
+    costs.add_loop, costs.add_effects, costs.add_recorder, maps.add_maps, maps.add_many,
+    graph.add_graph, graph.add_free_running, graph.add_steering,
+    proofs.add_faults, proofs.add_fuzz, proofs.add_doors,
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run what is named; returns the exit status."""
+    return run(_parser, (sys.argv[1:] if arguments is None else arguments) or ["--help"])
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m lab", description="Measure, and print what was measured.")
+    names = parser.add_subparsers(required=True, metavar="name")
+    for add in COMMANDS:
+        sub = add(names)
+        sub.set_defaults(command=partial(with_packages, sub.get_default("command")))
+    return parser
+
+
+def with_packages(command: Command, options: argparse.Namespace) -> int:
+    """Run a command; a package of the laboratory that is missing is refused by its name."""
+    try:
+        return command(options)
+    except ModuleNotFoundError as error:
+        if str(error.name).split(".")[0] not in PACKAGES:
+            raise
+        raise Refused(f"this needs {error.name}; pip install -e '.[lab]'") from None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

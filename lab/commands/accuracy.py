@@ -1,0 +1,148 @@
+"""The studies of error against time: `accuracy`, `advise`, `prediction`, `page` and `speed`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from grasp_ros.cli.arguments import (
+    STUDY_DIRECTORY,
+    add_command,
+    add_output,
+    add_scene,
+    add_settings,
+    add_study_directory,
+    load_scene,
+    prepare,
+)
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
+
+DRIFT_QUICK_S = 20.0
+Parser = argparse.ArgumentParser
+
+
+def add_accuracy(commands: Any) -> Parser:
+    """`python -m lab accuracy`."""
+    text = "error against time of every method: records, tables, figures; resumes"
+    sub = add_command(commands, "accuracy", _accuracy, text)
+    _add_scenes(sub)
+    sub.add_argument("--quick", action="store_true", help="few settings, our own compiled methods only")
+    return sub
+
+
+def _accuracy(options: argparse.Namespace) -> int:
+    from lab.studies import accuracy, drift, figures, measure
+    from lab.studies.contenders import all_contenders
+
+    subjects = _subjects(options)
+    prepare()
+    effort = measure.QUICK if options.quick else measure.FULL
+    contenders = accuracy.quick_contenders() if options.quick else all_contenders()
+    records = accuracy.run(subjects, options.output, effort, contenders)
+    print(accuracy.report(records))
+    figures.work_precision(records, accuracy.METRIC, options.output / "error_against_time.png")
+    figures.contacts_missed(records, options.output / "contacts_missed.png")
+    if not options.scenes:
+        drifts = drift.run(options.output, DRIFT_QUICK_S if options.quick else drift.SECONDS)
+        print("\n" + drift.report(drifts))
+        figures.energy_drift(drifts, options.output / "energy_drift.png")
+    print(f"written to {options.output}")
+    return 0
+
+
+def add_advise(commands: Any) -> Parser:
+    """`python -m lab advise`."""
+    sub = add_command(commands, "advise", _advise, "which method, with which setting, measured on this machine")
+    add_scene(sub)
+    sub.add_argument("--error", type=float, help="largest error that is acceptable, in all states (m, m/s)")
+    sub.add_argument("--budget", type=float, metavar="SECONDS", help="longest time that a simulation may take")
+    sub.add_argument("--quick", action="store_true", help="fewer settings: an answer in seconds")
+    add_study_directory(sub)
+    return sub
+
+
+def _advise(options: argparse.Namespace) -> int:
+    from lab.studies import adviser
+
+    scene = load_scene(options.scene, options.settings)
+    prepare()
+    advice, text = adviser.run(scene, options.output, options.error, options.budget, options.quick)
+    print(text)
+    return 0 if advice.choice is not None else 1
+
+
+def add_prediction(commands: Any) -> Parser:
+    """`python -m lab prediction`."""
+    text = "how far ahead each scene can be predicted in double precision"
+    sub = add_command(commands, "prediction", _prediction, text)
+    _add_scenes(sub)
+    return sub
+
+
+def _prediction(options: argparse.Namespace) -> int:
+    from lab.studies import figures, predictability
+
+    subjects = _subjects(options)
+    with writing(options.output):
+        options.output.mkdir(parents=True, exist_ok=True)
+    prepare()
+    predictions = predictability.run(subjects)
+    print(predictability.report(predictions))
+    figures.prediction(predictions, options.output / "prediction.png")
+    print(f"written to {options.output}")
+    return 0
+
+
+def add_page(commands: Any) -> Parser:
+    """`python -m lab page`."""
+    text = "run all studies and write docs/accuracy.md with its figures; resumes"
+    sub = add_command(commands, "page", _page, text)
+    sub.add_argument("--docs", type=Path, default=Path("docs"), metavar="DIRECTORY", help="default: docs")
+    sub.add_argument("--quick", action="store_true", help="few settings, short runs, no graph: to see that it works")
+    add_study_directory(sub)
+    return sub
+
+
+def _page(options: argparse.Namespace) -> int:
+    from lab.studies import page
+
+    prepare()
+    print(f"written to {page.write(options.docs, options.output, options.quick)}")
+    return 0
+
+
+def add_speed(commands: Any) -> Parser:
+    """`python -m lab speed`."""
+    text = "time to one given error, solvers in turn, beside the outside peers"
+    sub = add_command(commands, "speed", _speed, text)
+    add_scene(sub)
+    sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")
+    add_output(sub, "FILE.json", "write the records")
+    return sub
+
+
+def _speed(options: argparse.Namespace) -> int:
+    from lab.studies import speed
+
+    scene = load_scene(options.scene, options.settings)
+    prepare()
+    speed.run(scene, options.error, options.output, STUDY_DIRECTORY)
+    return 0
+
+
+def _add_scenes(sub: Parser) -> None:
+    sub.add_argument("scenes", nargs="*", metavar="SCENE", help="default: cases 1 to 4, and case 1 with H = 1e8")
+    add_settings(sub)
+    add_study_directory(sub)
+
+
+def _subjects(options: argparse.Namespace) -> Sequence[Scene]:
+    from lab.studies import accuracy
+
+    if options.settings and not options.scenes:
+        raise Refused("--set: allowed: with a SCENE")
+    return [load_scene(name, options.settings) for name in options.scenes] or accuracy.default_scenes()

@@ -1,0 +1,45 @@
+"""The studies of many runs: `maps` and `many`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from grasp_ros.cli.arguments import add_command, add_study_directory, prepare, whole
+
+
+def add_maps(commands: Any) -> argparse.ArgumentParser:
+    """`python -m lab maps`."""
+    text = "where a grasp settles, what sampling does to it, how robust it is; resumes"
+    sub = add_command(commands, "maps", _maps, text)
+    sub.add_argument("--docs", type=Path, default=Path("docs"), metavar="DIRECTORY", help="default: docs")
+    sub.add_argument("--quick", action="store_true", help="few pixels and rows: to see that it works")
+    sub.add_argument("--pixels", type=whole(32), default=1000, metavar="N", help="of a side of the map (default 1000)")
+    add_study_directory(sub)
+    return sub
+
+
+def _maps(options: argparse.Namespace) -> int:
+    from lab.studies import map_page
+
+    prepare()
+    print(f"written to {map_page.write(options.docs, options.output, options.quick, options.pixels)}")
+    return 0
+
+
+def add_many(commands: Any) -> argparse.ArgumentParser:
+    """`python -m lab many`."""
+    text = "runs a second of an ensemble, on one core and on all, beside heyoka and scipy in processes"
+    sub = add_command(commands, "many", _many, text)
+    sub.add_argument("scene", nargs="?", default="case_01", help="a case of the paper (default case_01)")
+    sub.add_argument("--quick", action="store_true", help="few rows: to see that it works")
+    return sub
+
+
+def _many(options: argparse.Namespace) -> int:
+    from lab.studies import many_runs
+
+    prepare()
+    print(many_runs.report(many_runs.run(options.scene, 0.01 if options.quick else 1.0)))
+    return 0

@@ -1,0 +1,166 @@
+"""The studies of what is promised: `certificate`, `paper`, `hard`, `fuzz` and `doors`."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from grasp_ros.cli.arguments import add_command, add_output, prepare, whole
+from grasp_ros.physics.errors import Refused
+
+Parser = argparse.ArgumentParser
+QUICK_STARTS = 4
+LONG_SCENE = "case_01"
+PAPER_PAGE = Path("runs") / "paper.html"
+
+
+def add_certificate(commands: Any) -> Parser:
+    """`python -m lab certificate`."""
+    text = "where the paper's V jumps, from which p on, and limits of the period"
+    sub = add_command(commands, "certificate", _certificate, text)
+    add_output(sub, "FILE.md", "put tables and figure into this text")
+    return sub
+
+
+def _certificate(options: argparse.Namespace) -> int:
+    from lab.studies import certificate
+
+    prepare()
+    certificate.run(options.output)
+    return 0
+
+
+def add_paper(commands: Any) -> Parser:
+    """`python -m lab paper`."""
+    text = "the paper reproduced and judged: equations, figures, quantities, verdicts, and what it lacks, on one page"
+    sub = add_command(commands, "paper", _paper, text)
+    sub.add_argument("--ros", action="store_true", help="run the eleven cases through the graph as well, some minutes")
+    sub.add_argument("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out")
+    sub.add_argument("--docs", type=Path, metavar="FILE.md", help="write it as Markdown too, with figures beside it")
+    add_output(sub, "FILE.html", f"the page, in one file (default {PAPER_PAGE})", PAPER_PAGE)
+    return sub
+
+
+def _paper(options: argparse.Namespace) -> int:
+    from grasp_ros.graph.processes import GraphError
+    from lab.paper import page, study
+    from lab.paper.definitions import RANDOM_STARTS
+
+    for path in filter(None, (options.output, options.docs)):
+        page.claim(path)
+    prepare()
+    try:
+        found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
+    except GraphError as error:
+        print(f"grasp: {error}", file=sys.stderr)
+        return 1
+    page.write_html(found, options.output)
+    print(found.summary)
+    for claim in found.claims:
+        print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
+    print(f"written to {options.output}")
+    if options.docs is not None:
+        page.write_markdown(found, options.docs)
+        print(f"written to {options.docs}")
+    return 0
+
+
+def add_hard(commands: Any) -> Parser:
+    """`python -m lab hard`."""
+    text = "hard cases, family by family: the error reached, and other solvers beside it"
+    sub = add_command(commands, "hard", _hard, text)
+    add_output(sub, "FILE.md", "put table and figure into this text")
+    sub.add_argument("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten")
+    return sub
+
+
+def _hard(options: argparse.Namespace) -> int:
+    from lab.studies import hard
+
+    prepare()
+    return hard.run(options.output, alone=options.alone)
+
+
+def add_fuzz(commands: Any) -> Parser:
+    """`python -m lab fuzz`."""
+    sub = add_command(commands, "fuzz", _fuzz, "random scenes against all properties")
+    sub.add_argument("--seconds", type=float, help="how long (default 60, or until --draws are done)")
+    sub.add_argument("--draws", type=int, help="how many scenes")
+    sub.add_argument("--first", type=int, default=0, help="number of the first draw (default 0)")
+    sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
+    sub.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    sub.add_argument("--page", type=Path, metavar="FILE.md", help="write the counts as a page, too; what is known from"
+                                                                  " an earlier run into DIRECTORY is not drawn again")
+    add_output(sub, "DIRECTORY", "where scenes that fail are written (default fuzz)", Path("fuzz"))
+    return sub
+
+
+def _fuzz(options: argparse.Namespace) -> int:
+    from lab.drills import fuzz, random_scenes
+
+    seconds = _seconds(options.seconds, options.draws)
+    for name, least in (("draws", 1), ("first", 0), ("seed", 0), ("jobs", 1)):
+        value = getattr(options, name)
+        if value is not None and value < least:
+            raise Refused(f"--{name} {value} is not allowed; allowed: a whole number >= {least}")
+    prepare()
+    memory = None if options.page is None else random_scenes.Kept(options.output, options.seed)
+    book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
+                    jobs=options.jobs, memory=memory)
+    if options.page is not None:
+        random_scenes.write_page(options.page, options.seed, options.first, book)
+    return 1 if book.broken else 0
+
+
+def _seconds(seconds: float | None, count: int | None) -> float | None:
+    """For how long random input is tried; None: until it has been enough."""
+    seconds = 60.0 if seconds is None and count is None else seconds
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0.0):
+        raise Refused(f"--seconds {seconds!r} is not allowed; allowed: a number > 0")
+    return seconds
+
+
+def add_doors(commands: Any) -> Parser:
+    """`python -m lab doors`."""
+    sub = add_command(commands, "doors", _doors, "damaged scenes, results, bags and journals against their readers")
+    sub.add_argument("--seconds", type=float, help="how long (default 60, or until --count files are tried)")
+    sub.add_argument("--count", type=whole(1), help="how many files")
+    sub.add_argument("--first", type=whole(0), default=0, help="number of the first file (default 0)")
+    sub.add_argument("--seed", type=whole(0), default=0, help="another seed makes other files (default 0)")
+    add_output(sub, "DIRECTORY", "where files that break a reader are written (default doors)", Path("doors"))
+    return sub
+
+
+def _doors(options: argparse.Namespace) -> int:
+    from lab.drills import parser_fuzzing as doors
+
+    seconds = _seconds(options.seconds, options.count)
+    prepare()
+    broken = doors.run(options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)
+    return 1 if broken else 0
+
+
+def add_faults(commands: Any) -> Parser:
+    """`python -m lab faults`."""
+    text = "accidents done to graphs of real processes, and what comes of them, some minutes"
+    sub = add_command(commands, "faults", _faults, text)
+    sub.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these drills alone")
+    sub.add_argument("--quick", action="store_true", help="a handful of drills")
+    sub.add_argument("--ticks", type=whole(1000), metavar="N",
+                     help=f"in place of drills, {LONG_SCENE} in lockstep for N ticks: losses, and memory of processes")
+    add_output(sub, "FILE.md", "write the table as a page too")
+    return sub
+
+
+def _faults(options: argparse.Namespace) -> int:
+    from lab.drills.faults import endurance, run
+
+    if options.ticks:
+        prepare()
+        return 0 if endurance.run(LONG_SCENE, options.ticks) else 1
+    drills = run.chosen(options.only, options.quick)
+    prepare()
+    return 0 if run.run(drills, options.output) else 1

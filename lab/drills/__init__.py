@@ -1,0 +1,1 @@
+"""Accidents on purpose: faults of a graph, damaged files, random scenes, random calls."""

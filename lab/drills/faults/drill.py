@@ -1,0 +1,220 @@
+"""One drill: a graph at work, an accident, and the wait for what comes of it."""
+
+from __future__ import annotations
+
+import math
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.verify import verify
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, WINDOW, Topic
+from lab.drills.faults.companion import Failed
+from lab.drills.faults.output import NO_NEWS, SENTENCE, plain
+from lab.drills.faults.stage import NODES, Stage
+from lab.drills.faults.verdict import LOST_SECONDS, Evidence
+
+TERMINALS = (*NODES, "run")  # last words of the names of what a user has in a terminal
+DEADLINE_SECONDS = 30.0
+STILL_SECONDS = 15.0  # without a tick and without a word: it hangs; `grasp run` itself waits 10 s for its nodes to end
+GO_ON_TICKS, GO_ON_SECONDS = WINDOW + 100, 4.0  # after the accident, when who was told to end has, and been missed
+LOOK_SECONDS = 0.1
+CLOSE_SECONDS = 15.0  # for the end after a Ctrl-C, or behind `grasp run`
+
+
+class Drill(NamedTuple):
+    """A fault and how it is caused.
+
+    Attributes
+    ----------
+    name : str
+        As `--only` takes it.
+    group, fault : str
+        For the reader.
+    start : callable
+        Starts the graph.
+    strike : callable
+        Causes the accident once the graph is at work; may take its time.
+    mute : bool
+        Whether nobody can read what is said from then on.
+    nothing_to_keep : bool
+        Whether the accident takes the bag away.
+    by_itself : bool
+        Whether the accident happens by itself, and so counts from when it is noticed.
+    settle : bool
+        Whether the graph is at work before the accident.
+    seen : Topic
+        By which ticks are counted, see `Stage`.
+    asked : bool
+        Whether it is no accident, but how a user ends a run.
+    quick : bool
+        Whether `--quick` plays it.
+    play : callable, optional
+        In place of the common course of a drill.
+    """
+
+    name: str
+    group: str
+    fault: str
+    start: Callable[[Stage], object]
+    strike: Callable[[Stage], object]
+    mute: bool = False
+    nothing_to_keep: bool = False
+    by_itself: bool = False
+    settle: bool = True
+    seen: Topic = JOINT_STATES
+    asked: bool = False
+    quick: bool = False
+    play: Callable[[Stage], Evidence] | None = None
+
+
+class Skipped(Exception):  # noqa: N818 - no error
+    """A drill that cannot be played here, and why."""
+
+
+def play(drill: Drill, stage: Stage) -> Evidence:
+    """Play a drill to its end; returns what is known then."""
+    if drill.play is not None:
+        return drill.play(stage)
+    drill.start(stage)
+    if drill.settle:
+        stage.settle()
+    shared, before = stage.shared_memory(), stage.published
+    called = time.monotonic()
+    drill.strike(stage)
+    stage.happens(called)
+    begin = stage.accident
+    struck, reached = time.monotonic(), max(stage.published, before)
+    stage.wait(lambda: _over(stage) or _goes_on(stage, struck, reached) or _stands(stage, struck), DEADLINE_SECONDS)
+    over = _over(stage)
+    went_on = not over and _goes_on(stage, struck, reached)
+    hung = not over and not went_on
+    asked = time.monotonic()
+    left = _close(stage, wait=not (went_on or hung))
+    evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, asked=drill.asked,
+                        nothing_to_keep=drill.nothing_to_keep)
+    _read_words(evidence, stage, called, asked if went_on or hung else math.inf)
+    evidence.noticed = max(evidence.noticed - (begin - called), 0.0)
+    evidence.exits = {name: process.returncode for name, process in stage.started.items()
+                      if name.split()[-1] in TERMINALS and process.returncode is not None}
+    evidence.shared = sum(Path(name).exists() for name in shared - stage.shared_memory())
+    if drill.by_itself:  # counts from when it was noticed, and what had been recorded by then
+        begin = -math.inf
+        if math.isfinite(evidence.noticed):
+            evidence.noticed = 0.0
+    _read_bag(evidence, stage, struck if went_on else begin)
+    return evidence
+
+
+def _over(stage: Stage) -> bool:
+    """Whether `grasp run` has ended, or in four terminals plant and monitor have."""
+    awaited = [name for name in ("grasp run", "plant", "monitor") if name in stage.started]
+    return all(stage.started[name].poll() is not None for name in awaited)
+
+
+def _goes_on(stage: Stage, struck: float, reached: int) -> bool:
+    return time.monotonic() > struck + GO_ON_SECONDS and stage.published > reached + GO_ON_TICKS
+
+
+def _stands(stage: Stage, struck: float) -> bool:
+    """Whether nothing has happened for a while."""
+    last = max(struck, float(stage.times[max(stage.published, 0)]),
+               *(line.when for line in stage.output.lines[-1:] if not NO_NEWS.match(line.text)))
+    return time.monotonic() > last + STILL_SECONDS
+
+
+def _close(stage: Stage, wait: bool) -> list[int]:
+    """End what is left as a user would; returns the processes that outlive it.
+
+    What was started by `grasp run` has to end by itself when that has ended; whoever sits in a terminal ends what is
+    in it with a Ctrl-C.
+    """
+    for name, process in stage.started.items():
+        if process.poll() is None and not (wait and name == "grasp run"):
+            process.send_signal(signal.SIGCONT)
+            process.send_signal(signal.SIGINT if name.split()[-1] in TERMINALS else signal.SIGTERM)
+    end = time.monotonic() + CLOSE_SECONDS
+    stage.wait(lambda: all(process.poll() is not None for process in stage.started.values()), CLOSE_SECONDS)
+    while (left := stage.living()) and time.monotonic() < end:
+        time.sleep(LOOK_SECONDS)
+    for pid in left:
+        os.kill(pid, signal.SIGKILL)
+    for process in stage.started.values():
+        try:
+            process.wait(CLOSE_SECONDS)
+        except subprocess.TimeoutExpired as error:
+            raise Failed(f"{error.cmd}: cannot be killed") from None
+    stage.output.finish(1.0)
+    return left
+
+
+def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> None:
+    """What the user sees, and when the first sentence or report came."""
+    news = stage.output.news(begin, end)
+    concerns = stage.companion.ask("concerns")["concerns"]
+    reports = [(when, words) for when, _, words in concerns.values() if begin <= when <= end]
+    times = [line.when for line in news] + [when for when, _ in reports]
+    evidence.noticed = min(times, default=math.nan) - begin
+    words = [line.text for line in news]
+    spoken = [text for text in words if SENTENCE.match(text)] or words
+    said = spoken[-1] if spoken else f"/diagnostics: {reports[-1][1]}" if reports else ""
+    evidence.said = plain(said, [stage.place])
+    evidence.traceback = plain(stage.output.traceback, [stage.place])
+
+
+def _read_bag(evidence: Evidence, stage: Stage, accident: float) -> None:
+    """What was kept: of all ticks that the plant had published before the accident."""
+    if evidence.nothing_to_keep:
+        return
+    try:
+        recording = bag.read(stage.bag)
+    except bag.BagError as error:
+        if "holds no tick" in str(error):  # killed before the first was on the disk
+            evidence.lost = _seconds_from(stage, 0, accident)
+        else:
+            evidence.wrong, evidence.lost = plain(str(error), [stage.place]), math.inf
+        return
+    gone = {name: number for name, number in recording.missing.items() if number}
+    found = verify(recording)
+    if found.difference is not None or (found.problem and not gone):
+        evidence.wrong = found.words
+    evidence.lost = _seconds_from(stage, _first_gap(recording) if gone else int(recording.tick[-1]) + 1, accident)
+
+
+def _seconds_from(stage: Stage, tick: int, accident: float) -> float:
+    """Wall time from a tick to the accident, or to the last tick that was published before it."""
+    seen = [when for when in stage.times[tick : stage.published + 1].tolist() if when]  # the onlooker may miss one
+    if not seen:
+        return 0.0
+    begin, end = seen[0], min(accident, seen[-1])
+    asleep = max(0.0, min(end, stage.asleep[1]) - max(begin, stage.asleep[0]))
+    return float(max(0.0, end - begin - asleep))
+
+
+def _first_gap(recording: bag.Recording) -> int:
+    """The first tick that is not in the bag as a whole."""
+    commands = recording.command if recording.running.lockstep else np.zeros_like(recording.command)
+    judged = recording.lyapunov[:, [LYAPUNOV_NAMES.index("mode")]]
+    outputs = [values[:, None] for values in recording.outputs.values()]
+    whole = np.isfinite(np.hstack([recording.state, commands, judged, *outputs])).all(axis=1)
+    there = np.zeros(int(recording.tick[-1]) + 2, dtype=bool)
+    there[recording.tick[whole]] = True
+    return int(np.argmin(there))
+
+
+def lost_words(evidence: Evidence) -> str:
+    """What is kept, for a reader."""
+    if evidence.nothing_to_keep:
+        return "nothing is there to keep"
+    if math.isinf(evidence.lost):
+        return evidence.wrong
+    if evidence.lost > LOST_SECONDS:
+        return f"all but {evidence.lost:.1f} s"
+    return "all" if not evidence.lost else f"all but at most {LOST_SECONDS} s"

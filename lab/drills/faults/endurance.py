@@ -1,0 +1,77 @@
+"""A long run in lockstep: what it loses, and what its processes hold in memory at a tenth of it and at its end."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from pathlib import Path
+
+from tqdm import tqdm
+
+from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
+from grasp_ros.scene.effects.base import NANOSECONDS
+from lab.drills.faults.companion import Companion, free_domains
+from lab.drills.faults.stage import NODES, Stage
+
+LOOK_SECONDS = 0.5
+MOST_GROWTH = 0.05  # of the memory of a process, between a tenth of the run and its end
+MEGABYTE = 2**20
+
+
+def run(name: str, ticks: int) -> bool:
+    """Print what a run of many ticks took; returns whether nothing was lost and memory was flat.
+
+    Parameters
+    ----------
+    name : str
+        Of a scene.
+    ticks : int
+    """
+    scene = scenes.load(name, [f"time.duration_s={ticks * scenes.load(name).period_ns / NANOSECONDS!r}"])
+    companion = Companion()
+    with tempfile.TemporaryDirectory() as directory:
+        stage = Stage(Path(directory) / "long", scene, companion, free_domains()[0])
+        try:
+            stage.run()
+            early, late, seconds = _watch(stage, ticks)
+            status = stage.started["grasp run"].wait()
+            found = bag.read(stage.bag)
+            missing = sum(found.missing.values()) + ticks + 1 - len(found.tick)
+        finally:
+            stage.clear()
+            companion.close()
+    print(f"{scene.title}: {ticks} ticks in lockstep, {ticks / seconds:.0f} ticks/s, exit status {status}")
+    print(f"lost                {missing} messages and ticks")
+    for node in NODES:
+        words = f"{early[node] / MEGABYTE:.1f} MB at 10 %, {late[node] / MEGABYTE:.1f} MB at 100 %"
+        print(f"{node:<19} {words}, {100.0 * (late[node] / early[node] - 1.0):+.1f} %")
+    flat = all(late[node] <= (1.0 + MOST_GROWTH) * early[node] for node in NODES)
+    return status == 0 and not missing and flat
+
+
+def _watch(stage: Stage, ticks: int) -> tuple[dict[str, int], dict[str, int], float]:
+    """Memory of the nodes in bytes, early and late, and the seconds from the first tick to the last."""
+    stage.settle()
+    pids = {node: stage.pid(node) for node in NODES}
+    begin, first = time.monotonic(), stage.published
+    early: dict[str, int] = {}
+    late = {node: resident(pid) for node, pid in pids.items()}
+    with tqdm(total=ticks, unit="tick") as progress:
+        while not stage.ended("grasp run") and (now := stage.published) < ticks:
+            progress.update(now - progress.n)
+            late = {node: resident(pid) or late[node] for node, pid in pids.items()}
+            if not early and 10 * now >= ticks:
+                early = dict(late)
+            time.sleep(LOOK_SECONDS)
+        progress.update(ticks - progress.n)
+    return early or late, late, (time.monotonic() - begin) * ticks / max(ticks - first, 1)
+
+
+def resident(pid: int) -> int:
+    """Bytes of memory that a process holds; 0 if it has ended."""
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except OSError:
+        return 0

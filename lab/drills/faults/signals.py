@@ -1,0 +1,153 @@
+"""Drills: a process is killed, frozen, or asked to end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from functools import partial
+from signal import Signals
+
+from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
+from lab.drills.faults.drill import Drill
+from lab.drills.faults.stage import NODES, Stage
+
+FROZEN_SECONDS = 5.0
+MISSED_SECONDS = 3.0
+MOMENT_SECONDS = 1.0  # a freeze that nobody may take for an end
+SIGNALS = ("SIGKILL", "SIGSTOP", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")
+ALONE_SIGNALS = ("SIGKILL", "SIGTERM")
+ASKING = ("SIGHUP", "SIGQUIT", "SIGTERM", "SIGINT")  # the graph to end
+UNDER, ALONE, PATIENT = "under `grasp run`", "in four terminals, with `on_silence:=end`", "in four terminals"
+QUICK = ("SIGKILL-monitor", "SIGKILL-grasp")
+
+
+def drills() -> list[Drill]:
+    """Every signal to every process, and some at other moments."""
+    found = []
+    for number in SIGNALS:
+        found += [_one(UNDER, Stage.run, number, name) for name in (*NODES, "grasp run")]
+    for number in ALONE_SIGNALS:
+        found += [_one(ALONE, partial(Stage.terminals, on_silence="end"), number, name) for name in NODES]
+    found += [_one(PATIENT, Stage.terminals, "SIGSTOP", name) for name in NODES]
+    back = [
+        Drill(f"SIGKILL-{name}-back", PATIENT, f"SIGKILL of the {name.replace('_', ' ')}, and another one is started",
+              Stage.terminals, partial(replace, name=name))
+        for name in ("left_controller", "right_controller")
+    ]
+    return [*found, *back, *_at_other_moments()]
+
+
+def _one(group: str, start: object, number: str, name: str) -> Drill:
+    words = f"{number} of {'`grasp run`' if name == 'grasp run' else 'the ' + name.replace('_', ' ')}"
+    key = f"{number}-{name.split()[0]}" + ("" if group == UNDER else "-alone")
+    if number == "SIGSTOP":
+        words += f", SIGCONT after {FROZEN_SECONDS:g} s"
+    strike = partial(freeze, name=name) if number == "SIGSTOP" else partial(send, name=name, number=Signals[number])
+    asked = name == "grasp run" and number in ASKING
+    seen = LYAPUNOV if name == "monitor" else JOINT_STATES
+    return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK)  # type: ignore[arg-type]
+
+
+def replace(stage: Stage, name: str) -> None:
+    """Kill a node, and start it again once the others have missed it."""
+    stage.signal(name, signal.SIGKILL)
+    stage.started.pop(name).wait()
+    time.sleep(MISSED_SECONDS)
+    stage.node(name)
+    reached = stage.published
+    stage.wait(lambda: stage.published > reached, 20.0)
+
+
+def send(stage: Stage, name: str, number: Signals) -> None:
+    """Send a signal."""
+    stage.signal(name, number)
+
+
+def freeze(stage: Stage, name: str, seconds: float = FROZEN_SECONDS) -> None:
+    """Stop a process and let it go on later, if it is still there."""
+    pid = stage.pid(name)
+    stage.signal(name, signal.SIGSTOP)
+    stage.wait(lambda: pid not in stage.living(), seconds)
+    if pid in stage.living():
+        stage.signal(name, signal.SIGCONT)
+
+
+def freeze_all(stage: Stage) -> None:
+    """Stop one node after the other for a moment."""
+    for name in NODES:
+        freeze(stage, name, MOMENT_SECONDS)
+
+
+def suspend(stage: Stage) -> None:
+    """Stop all processes, as a machine does that goes to sleep; before it wakes up nobody can notice anything."""
+    there = stage.living()
+    for pid in there:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(FROZEN_SECONDS)
+    stage.happens()
+    stage.asleep = stage.accident - FROZEN_SECONDS, stage.accident
+    for pid in there:
+        os.kill(pid, signal.SIGCONT)
+
+
+def _at_other_moments() -> list[Drill]:
+    group = "at other moments"
+    return [
+        Drill("freeze-a-moment", group, f"SIGSTOP of each node in turn, SIGCONT after {MOMENT_SECONDS:g} s", Stage.run,
+              freeze_all),
+        Drill("suspend", group, f"SIGSTOP of all processes at once, SIGCONT after {FROZEN_SECONDS:g} s", Stage.run,
+              suspend),
+        Drill("kill-while-paused", group, "SIGKILL of the left controller of a paused graph", _paused, _while_paused,
+              settle=False),
+        Drill("kill-while-starting", group, "SIGKILL of the left controller while it starts", Stage.run,
+              partial(_while_starting, name="left_controller"), settle=False, nothing_to_keep=True),
+        Drill("kill-monitor-while-starting", group, "SIGKILL of the monitor while it starts", Stage.run,
+              partial(_while_starting, name="monitor"), settle=False, nothing_to_keep=True),
+        Drill("kill-run-while-starting", group, "SIGKILL of `grasp run` while its nodes start", Stage.run,
+              _run_while_starting, settle=False, nothing_to_keep=True),
+        Drill("kill-free-controller", group, "SIGKILL of the left controller of a free-running graph",
+              _free_running, partial(send, name="left_controller", number=signal.SIGKILL)),
+        Drill("kill-one-process", group, "SIGKILL of the one process of `--one-process`", _one_process,
+              partial(send, name="together", number=signal.SIGKILL), seen=LYAPUNOV),
+        Drill("freeze-one-process", group, f"SIGSTOP of the one process of `--one-process`, SIGCONT after"
+              f" {FROZEN_SECONDS:g} s", _one_process, partial(freeze, name="together"), seen=LYAPUNOV),
+        Drill("kill-run-of-one-process", group, "SIGKILL of `grasp run --one-process`", _one_process,
+              partial(send, name="grasp run", number=signal.SIGKILL)),
+        Drill("ctrl-c-twice", group, "Ctrl-C, and another one while it ends", Stage.run, _twice,
+              asked=True),
+    ]
+
+
+def _while_starting(stage: Stage, name: str) -> None:
+    stage.wait(lambda: stage.has(name), 60.0)
+    stage.signal(name, signal.SIGKILL)
+
+
+def _run_while_starting(stage: Stage) -> None:
+    stage.wait(lambda: stage.has("monitor"), 60.0)
+    stage.signal("grasp run", signal.SIGKILL)
+
+
+def _paused(stage: Stage) -> None:
+    stage.run("--paused")
+
+
+def _while_paused(stage: Stage) -> None:
+    stage.wait(lambda: stage.published >= 0, 60.0)
+    time.sleep(MOMENT_SECONDS)
+    stage.signal("left_controller", signal.SIGKILL)
+
+
+def _one_process(stage: Stage) -> None:
+    stage.run("--one-process")
+
+
+def _free_running(stage: Stage) -> None:
+    stage.run("--free-running")
+
+
+def _twice(stage: Stage) -> None:
+    stage.signal("grasp run", signal.SIGINT)
+    time.sleep(0.05)
+    stage.signal("grasp run", signal.SIGINT)

@@ -1,0 +1,144 @@
+"""Drills: messages that cannot be true, senders that should not be there, and wrong names."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from functools import partial
+from typing import Any
+
+from grasp_ros.scene.topics import FORCE, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, NAMED_LIST, RUN, SCENE, Topic
+from lab.drills.faults.drill import Drill
+from lab.drills.faults.stage import NODE, Stage
+
+STRAY, ROGUE, OTHERS = "a stray message", "a controller that answers wrongly", "others in the same domain"
+CODE = "!!python/object/apply:os.mkdir ['owned']"
+MALFORMED: dict[str, Any] = {"name": ["left", "object"], "position": [0.1], "velocity": [], "effort": [1.0, 2.0, 3.0]}
+
+
+def drills() -> list[Drill]:
+    """All of them."""
+    return [*_strays(), *_rogues(), *_others()]
+
+
+def _strays() -> list[Drill]:
+    """Somebody sends a message, once or for a while, and is gone again."""
+    command = partial(_stray, topic=LEFT_COMMAND)
+    return [
+        Drill("wall-clock", STRAY, "one command stamped with the wall clock", Stage.run,
+              partial(command, fields={"stamp": "wall", "wrench.force.x": 1.0}), quick=True),
+        Drill("command", STRAY, "one command stamped with the latest state, 1e6 N", Stage.run,
+              partial(command, fields={"wrench.force.x": 1e6})),
+        Drill("frame-number", STRAY, "one command whose frame_id is 7", Stage.run,
+              partial(command, fields={"header.frame_id": "7", "wrench.force.x": 1.0})),
+        Drill("frame-world", STRAY, "one command whose frame_id is world", Stage.run,
+              partial(command, fields={"header.frame_id": "world", "wrench.force.x": 1.0})),
+        Drill("flood", STRAY, "commands at full speed for 2 s", Stage.run,
+              partial(command, fields={"wrench.force.x": 1.0}, seconds=2.0)),
+        Drill("malformed-state", STRAY, "one malformed joint_states", Stage.run,
+              partial(_stray, topic=JOINT_STATES, fields=MALFORMED)),
+        Drill("malformed-lyapunov", STRAY, "one malformed lyapunov", Stage.run,
+              partial(_stray, topic=LYAPUNOV, fields=MALFORMED)),
+        Drill("malformed-parameters", STRAY, "one malformed left/parameters", Stage.run,
+              partial(_stray, topic=Topic("left/parameters", NAMED_LIST, latched=True), fields=MALFORMED)),
+        Drill("stray-scene", STRAY, "a scene with a tag of Python", Stage.run,
+              partial(_stray, topic=SCENE, fields={"data": CODE})),
+        Drill("stray-run", STRAY, "a text of another kind on run", Stage.run,
+              partial(_stray, topic=RUN, fields={"data": CODE})),
+        Drill("stray-scene-alone", STRAY, "a scene with a tag of Python, before the plant is there", _without_plant,
+              _scene_before, settle=False, nothing_to_keep=True),
+        Drill("stray-contact", STRAY, "contact forces stamped with the wall clock, at full speed for 2 s", Stage.run,
+              partial(_stray, topic=Topic("contact/left", FORCE), fields={"stamp": "wall"}, seconds=2.0)),
+    ]
+
+
+def _stray(stage: Stage, topic: Topic, fields: dict[str, Any], seconds: float = 0.0) -> None:
+    answer = stage.companion.ask("publish", topic=topic.name, type=topic.type, fields=fields, seconds=seconds)
+    stage.happens(answer["begin"])
+
+
+def _without_plant(stage: Stage) -> None:
+    for name in ("monitor", "left_controller", "right_controller"):
+        stage.node(name)
+
+
+def _scene_before(stage: Stage) -> None:
+    _stray(stage, SCENE, {"data": CODE})
+    stage.node("plant")
+    stage.wait(lambda: stage.published > 0, 30.0)
+
+
+def _rogues() -> list[Drill]:
+    """The only controller of an arm, which answers well until then."""
+    def rogue(name: str, fault: str, **fields: Any) -> Drill:
+        return Drill(f"rogue-{name}", ROGUE, fault, _with_rogue, partial(_go_wrong, **fields))
+
+    return [
+        rogue("large", "answers with 1e6 N", force=1e6),
+        rogue("nan", "answers with NaN", **{"wrench.force.x": "nan"}),
+        rogue("repeated", "answers each state twenty times", times=20),
+        rogue("wall-clock", "stamps its answers with the wall clock", stamp="wall"),
+        rogue("old", "stamps its answers with tick 5", stamp=5_000_000),
+        rogue("frame", "gives its answers a frame_id of 12, then of world", **{"header.frame_id": "12"}),
+        rogue("silent", "answers no more, but stays", times=0),
+    ]
+
+
+def _with_rogue(stage: Stage) -> None:
+    stage.run("--without", "left_controller")
+    stage.companion.ask("control", side="left")
+
+
+def _go_wrong(stage: Stage, **fields: Any) -> None:
+    stage.companion.ask("control", side="left", **fields)
+
+
+def _others() -> list[Drill]:
+    return [
+        Drill("second-controller", OTHERS, "a second left controller, with another gain", Stage.run,
+              partial(_second, words=["-r", "__node:=other"],
+                      numbers={"left_feedback.position_gain_N_per_m": "9.0"})),
+        Drill("second-plant", OTHERS, "a second plant", Stage.run, partial(_second, name="plant"), by_itself=True),
+        Drill("second-run", OTHERS, "a second `grasp run`", Stage.run, _second_run, by_itself=True),
+        Drill("frozen-reader", OTHERS, "a subscriber that is frozen", _with_reader, _freeze_reader),
+        Drill("other-scene", OTHERS, "the plant is killed, and one with another scene is started", Stage.terminals,
+              _other_scene),
+    ]
+
+
+def _second(stage: Stage, name: str = "left_controller", words: Any = (), numbers: Any = None) -> None:
+    numbers = numbers or {}
+    options = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
+    stage.start(f"second {name}", [*NODE, name, "--ros-args", *options, *words])
+    _when_there(stage, LEFT_COMMAND if name == "left_controller" else JOINT_STATES)
+
+
+def _second_run(stage: Stage) -> None:
+    words = stage.run_words()
+    words[words.index("-o") + 1] = str(stage.place / "second")
+    stage.start("second run", words)
+    _when_there(stage, JOINT_STATES)
+
+
+def _when_there(stage: Stage, topic: Topic) -> None:
+    """The accident happens when a topic has two sources."""
+    stage.happens(stage.companion.ask("wait_for_sources", topic=topic.name, number=2)["when"])
+
+
+def _with_reader(stage: Stage) -> None:
+    stage.run()
+    stage.start("reader", [*NODE, "watch", "--ros-args"])
+
+
+def _freeze_reader(stage: Stage) -> None:
+    os.kill(stage.pid("reader"), signal.SIGSTOP)
+    time.sleep(3.0)
+
+
+def _other_scene(stage: Stage) -> None:
+    stage.signal("plant", signal.SIGKILL)
+    stage.started["plant"].wait()
+    stage.started.pop("plant")
+    stage.node("plant", scene="arm_alone")
+    stage.wait(lambda: stage.ended("plant"), 20.0)

@@ -1,0 +1,226 @@
+"""Random scenes against all properties, for as long as wanted; each is drawn again from a seed and its number."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+import sys
+import time
+import traceback
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from itertools import count
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
+from lab.cases.degenerate import draw_scene
+from lab.cases.draw import inside
+from lab.oracles.properties import Check, Examination, examine
+
+CHUNK = 50  # draws that a process does at once
+COMPARED = 5000  # every how many scenes one is compared with the reference
+
+
+class Drawn(NamedTuple):
+    """What became of one draw."""
+
+    number: int
+    habits: str
+    found: Examination
+    yaml: str  # empty if all properties hold
+
+
+@dataclass
+class Tally:
+    """How often a property was checked, and how often it failed."""
+
+    checked: int = 0
+    skipped: int = 0  # pieces that the quadrature does not resolve
+    failures: int = 0
+    worst: float = 0.0
+    where: int = 0  # number of the worst draw
+
+    def add(self, check: Check, number: int) -> None:
+        """Count a check."""
+        self.merge(Tally(1, check.skipped, int(not check.holds), check.error, number))
+
+    def merge(self, other: Tally) -> None:
+        """Count those of later draws, too."""
+        self.checked += other.checked
+        self.skipped += other.skipped
+        self.failures += other.failures
+        if not other.worst <= self.worst:
+            self.worst, self.where = other.worst, other.where
+
+
+@dataclass
+class Book:
+    """What became of all draws."""
+
+    ends: Counter[str] = field(default_factory=Counter)
+    tallies: dict[str, Tally] = field(default_factory=dict)
+    habits: Counter[str] = field(default_factory=Counter)
+    broken_habits: Counter[str] = field(default_factory=Counter)
+    scenes: dict[int, str] = field(default_factory=dict)  # those that fail, YAML by number
+
+    @property
+    def broken(self) -> int:
+        """Number of scenes that fail."""
+        return len(self.scenes)
+
+    def add(self, drawn: Drawn) -> None:
+        """Count a draw."""
+        self.ends[drawn.found.end] += 1
+        names = drawn.habits.split(", ")
+        self.habits.update(names)
+        for check in drawn.found.checks:
+            self.tallies.setdefault(check.name, Tally()).add(check, drawn.number)
+        if drawn.found.broken:
+            self.scenes[drawn.number] = drawn.yaml
+            self.broken_habits.update(names)
+
+    def merge(self, other: Book) -> None:
+        """Count later draws, too."""
+        self.ends.update(other.ends)
+        self.habits.update(other.habits)
+        self.broken_habits.update(other.broken_habits)
+        self.scenes.update(other.scenes)
+        for name, tally in other.tallies.items():
+            self.tallies.setdefault(name, Tally()).merge(tally)
+
+    def by_failures(self) -> list[tuple[str, Tally]]:
+        """All properties, those that fail most often first."""
+        return sorted(self.tallies.items(), key=lambda item: (-item[1].failures, item[0]))
+
+    def show(self) -> None:
+        """Print all tables."""
+        for text, number in self.ends.most_common():
+            print(f"  {number:8}  {text}")
+        print(f"  {'checked':>8}  {'skipped':>8}  {'failures':>8}  {'worst':>8}  {'draw':>8}  property")
+        for name, tally in self.by_failures():
+            counts = f"{tally.checked:8}  {tally.skipped:8}  {tally.failures:8}"
+            print(f"  {counts}  {tally.worst:8.2g}  {tally.where:8}  {name}")
+        print(f"  {'drawn':>8}  {'failures':>8}  habit")
+        for name, number in self.habits.most_common():
+            print(f"  {number:8}  {self.broken_habits[name]:8}  {name}")
+        print(f"failures: {self.broken}")
+
+
+def draw(seed: int, number: int) -> Scene:
+    """The scene of a seed and a number."""
+    return inside(draw_scene, np.random.default_rng((seed, number)))
+
+
+class Memory(Protocol):
+    """What keeps the books of chunks of draws, so that a search goes on where it ended."""
+
+    def get(self, numbers: range) -> Book | None:
+        """What became of these draws, if that is known."""
+
+    def put(self, numbers: range, book: Book) -> None:
+        """Keep what became of these draws."""
+
+
+def check_draws(seed: int, numbers: Iterable[int]) -> Book:
+    """Draw scenes and check them; an exception is a failure."""
+    book = Book()
+    for number in numbers:
+        book.add(_check(number, draw(seed, number)))
+    return book
+
+
+def _check(number: int, scene: Scene) -> Drawn:
+    try:
+        found = examine(scene, every=False, compare=number % COMPARED == 0)
+    except Exception:
+        reason = traceback.format_exc().strip().splitlines()
+        found = Examination("traceback", [Check(f"traceback: {reason[-1][:60]}", 1.0, 0.0)])
+    names = "; ".join(f"{check.name} {check.error:.2g}" for check in sorted(found.broken, key=lambda one: -one.error))
+    yaml = f"# {number}: {names}\n{scene.to_yaml()}" if found.broken else ""
+    return Drawn(number, scene.title, found, yaml)
+
+
+def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
+        jobs: int = 1, memory: Memory | None = None) -> Book:
+    """Draw scenes until the time is over or enough are drawn; print what became of them, write those that fail.
+
+    Parameters
+    ----------
+    seed : int
+    directory : Path
+        Where scenes that fail are written as YAML.
+    seconds, draws : float in s, and int, optional
+        What ends the search; None: does not.
+    first : int
+        Number of the first draw.
+    jobs : int
+        Processes.
+    memory : Memory, optional
+        What it knows is not drawn again.
+
+    Returns
+    -------
+    Book
+
+    Raises
+    ------
+    Refused
+        If a scene that fails cannot be written.
+    """
+    begin, book = time.monotonic(), Book()
+    with tqdm(total=draws, unit=" draws", desc="fuzz", file=sys.stderr) as bar:
+        for chunk in _chunks(seed, draws, first, jobs, memory):
+            book.merge(chunk)
+            for number, yaml in chunk.scenes.items():
+                _write(directory, seed, number, yaml, bar)
+            bar.update(chunk.ends.total())
+            if seconds is not None and time.monotonic() - begin > seconds:
+                break
+    print(f"{book.ends.total()} scenes in {time.monotonic() - begin:.0f} s, seed {seed}")
+    book.show()
+    return book
+
+
+def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Memory | None) -> Iterator[Book]:
+    """The books of all chunks in their order; what is new is kept in `memory`."""
+    starts = count(first, CHUNK) if draws is None else range(first, first + draws, CHUNK)
+    end = None if draws is None else first + draws
+    waiting: list[tuple[range, Any]] = []  # not more than the processes need
+
+    def take() -> Book:
+        asked, answer = waiting.pop(0)
+        if isinstance(answer, Book):
+            return answer
+        book: Book = check_draws(seed, asked) if answer is None else answer.get()
+        if memory is not None:
+            memory.put(asked, book)
+        return book
+
+    with multiprocessing.get_context("spawn").Pool(jobs) if jobs > 1 else nullcontext() as pool:
+        for start in starts:
+            numbers = range(start, start + CHUNK if end is None else min(start + CHUNK, end))
+            found: Any = None if memory is None else memory.get(numbers)
+            if found is None and pool is not None:
+                found = pool.apply_async(check_draws, (seed, numbers))
+            waiting.append((numbers, found))
+            if pool is None or len(waiting) > 2 * jobs:
+                yield take()
+        while waiting:
+            yield take()
+
+
+def _write(directory: Path, seed: int, number: int, yaml: str, bar: Any) -> None:
+    worst = yaml.splitlines()[0].split(": ", 1)[1].split("; ")[0].rsplit(" ", 1)[0]
+    name = re.sub(r"[^0-9A-Za-z]+", "_", worst).strip("_")
+    path = directory / f"{name}_{seed}_{number}.yaml"
+    with writing(path):
+        directory.mkdir(parents=True, exist_ok=True)
+        path.write_text(yaml, encoding="utf-8")
+    bar.write(f"{yaml.splitlines()[0]}; scene in {path}", file=sys.stderr)

@@ -1,0 +1,11 @@
+"""Nodes that only the laboratory starts: the baseline without physics, a caller of services, an injector of faults."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+
+def command(name: str) -> list[str]:
+    """What starts a node of this room, from any directory."""
+    return [sys.executable, "-P", str(Path(__file__).with_name(f"{name}.py"))]

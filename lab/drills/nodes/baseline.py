@@ -1,0 +1,116 @@
+"""The graph without the project: the same processes, messages and QoS on plain rclpy, and nothing else.
+
+It is the yardstick of `python -m lab graph`: how much of what rclpy can do is left when there is physics.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import rclpy
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.physics.system import BODIES
+from grasp_ros.scene.topics import (
+    CLOCK,
+    JOINT_STATES,
+    LEFT_COMMAND,
+    LEFT_CONTACT,
+    LYAPUNOV,
+    LYAPUNOV_NAMES,
+    RIGHT_COMMAND,
+    RIGHT_CONTACT,
+    Topic,
+)
+
+SETTLE_SECONDS = 4.0  # longer than discovery was ever seen to take
+PERIOD_NS = 1_000_000
+INPUTS = (JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, LEFT_CONTACT, RIGHT_CONTACT)
+COMMANDS = {"left_controller": LEFT_COMMAND, "right_controller": RIGHT_COMMAND}
+
+
+class Bare(Node):
+    """One of the four nodes, by its name."""
+
+    def __init__(self, name: str, ticks: int) -> None:
+        super().__init__(name)
+        self._last_ns = ticks * PERIOD_NS
+        self._now_ns = 0
+        self._heard: set[str] = set()
+        self.finished = False
+        if name == "plant":
+            self._outputs = [self._publisher(topic) for topic in (CLOCK, LEFT_CONTACT, RIGHT_CONTACT, JOINT_STATES)]
+            for topic in COMMANDS.values():
+                self._subscribe(topic, partial(self._on_command, topic.name))
+            self._subscribe(LYAPUNOV, lambda _: None, raw=True)
+        elif name == "monitor":
+            self._outputs = [self._publisher(LYAPUNOV)]
+            for topic in INPUTS:
+                self._subscribe(topic, self._on_anything, raw=True)
+        else:
+            self._outputs = [self._publisher(COMMANDS[name])]
+            self._subscribe(JOINT_STATES, self._on_state)
+
+    def _publisher(self, topic: Topic) -> Any:
+        return self.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
+
+    def _subscribe(self, topic: Topic, callback: Any, raw: bool = False) -> None:
+        self.create_subscription(messages.TYPES[topic.type], topic.name, callback, messages.qos(topic), raw=raw)
+
+    def publish_state(self) -> None:
+        """What the plant sends per tick."""
+        clock, left, right, states = self._outputs
+        clock.publish(messages.clock(self._now_ns))
+        left.publish(messages.wrench(self._now_ns, 0.0))
+        right.publish(messages.wrench(self._now_ns, 0.0))
+        states.publish(messages.joint_state(self._now_ns, BODIES, np.zeros(6), np.zeros(3)))
+
+    def _on_command(self, name: str, _: Any) -> None:
+        self._heard.add(name)
+        if len(self._heard) == len(COMMANDS):
+            self._heard.clear()
+            self._now_ns += PERIOD_NS
+            self.finished = self._now_ns > self._last_ns
+            if not self.finished:
+                self.publish_state()
+
+    def _on_state(self, message: Any) -> None:
+        self._outputs[0].publish(messages.wrench(messages.to_ns(message.header.stamp), 0.0))
+
+    def _on_anything(self, cdr: bytes) -> None:
+        self._now_ns += 1
+        if self._now_ns % len(INPUTS) == 0:
+            self._outputs[0].publish(messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
+
+
+def main(names: Sequence[str], ticks: int) -> None:
+    """Run one node, or several in one thread; the plant prints its ticks per second and ends the process.
+
+    The others run until they are stopped.
+    """
+    rclpy.init()
+    nodes = [Bare(name, ticks) for name in names]
+    executor = EventsExecutor()
+    for node in nodes:
+        executor.add_node(node)
+    settled = time.monotonic() + SETTLE_SECONDS
+    while time.monotonic() < settled:
+        executor.spin_once(timeout_sec=0.1)
+    begin = time.monotonic()
+    plant = next((node for node in nodes if node.get_name() == "plant"), nodes[0])
+    if plant.get_name() == "plant":
+        plant.publish_state()
+    while not plant.finished:
+        executor.spin_once(timeout_sec=0.2)
+    print(f"{ticks / (time.monotonic() - begin):.1f} ticks/s", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    main(sys.argv[2:], int(sys.argv[1]))

@@ -1,0 +1,195 @@
+"""A participant that belongs to no graph, for `python -m lab faults`: it looks on, and it sends what no node should.
+
+It is told what to do by lines of JSON on its standard input, and answers each with a line on its standard output. It
+outlives a graph: each `open` takes it to another domain.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rclpy
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.experimental import EventsExecutor
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.scene.topics import COMMANDS, DEPTH, DIAGNOSTICS, JOINT_STATES, Topic
+
+SPIN_SECONDS = 0.01
+MATCH_SECONDS = 40.0  # for the readers of what it sends to be found
+POSITION_GAIN, VELOCITY_GAIN = 5.0, 0.5  # as long as it answers well
+WALL = "wall"  # in place of a stamp in ns: the wall clock, as a header that fills itself has it
+
+
+class Stranger:
+    """What happens in one domain.
+
+    Parameters
+    ----------
+    domain : int
+    times : path
+        Array of the file format of NumPy; entry k becomes the time, on the monotonic clock, at which tick k was seen.
+    period_ns : int
+    topic : str
+        Where it is looked for.
+    """
+
+    def __init__(self, domain: int, times: str, period_ns: int, topic: str) -> None:
+        self._context = rclpy.Context()
+        rclpy.init(args=[], context=self._context, domain_id=domain)
+        self._node = rclpy.create_node("stranger", context=self._context, enable_rosout=False)
+        self._executor = EventsExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._times = np.load(Path(times), mmap_mode="r+")
+        self._period_ns, self._latest_ns = period_ns, 0
+        self._concerns: dict[str, tuple[float, int, str]] = {}
+        self._answer: dict[str, Any] = {}
+        self._commands: Any = None  # where it answers
+        best_effort = QoSProfile(depth=DEPTH, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self._node.create_subscription(JointState, topic, self._on_tick, best_effort, raw=True)
+        self._node.create_subscription(messages.TYPES[DIAGNOSTICS.type], DIAGNOSTICS.name, self._on_health, 100)
+
+    def spin(self) -> None:
+        """Take what has come."""
+        self._executor.spin_once(timeout_sec=SPIN_SECONDS)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._executor.shutdown()
+        self._node.destroy_node()
+        self._context.shutdown()
+
+    def _on_tick(self, cdr: bytes) -> None:
+        self._latest_ns = messages.raw_stamp_ns(cdr)
+        tick = self._latest_ns // self._period_ns
+        if 0 <= tick < len(self._times) and not self._times[tick]:
+            self._times[tick] = time.monotonic()
+
+    def _on_health(self, message: Any) -> None:
+        for status in message.status:
+            if status.level != DiagnosticStatus.OK:
+                level = int.from_bytes(status.level, "little")
+                self._concerns.setdefault(status.name, (time.monotonic(), level, status.message))
+
+    def concerns(self) -> dict[str, Any]:
+        """The first report of each node that was not OK: time, level and words."""
+        return {"concerns": self._concerns}
+
+    def clear(self) -> dict[str, Any]:
+        """Forget the concerns so far."""
+        self._concerns.clear()
+        return {}
+
+    def wait_for_sources(self, topic: str, number: int, seconds: float = MATCH_SECONDS) -> dict[str, Any]:
+        """Wait until a topic has that many publishers; says when it had, and how many there are."""
+        deadline = time.monotonic() + seconds
+        while (there := self._node.count_publishers(topic)) < number and time.monotonic() < deadline:
+            self.spin()
+        return {"when": time.monotonic(), "there": there}
+
+    def publish(self, topic: str, type: str, fields: dict[str, Any], seconds: float = 0.0) -> dict[str, Any]:
+        """Send a message once its readers are there, once or at full speed for some seconds; then stop to be a source.
+
+        Fields are named by their paths; `stamp` is in ns, or WALL.
+        """
+        publisher = self._node.create_publisher(messages.TYPES[type], topic, messages.qos(Topic(topic, type)))
+        self._wait(publisher, 1)
+        message = filled(messages.TYPES[type](), {"stamp": self._latest_ns, **fields})
+        begin, sent = time.monotonic(), 0
+        while not sent or time.monotonic() < begin + seconds:
+            publisher.publish(message)
+            sent += 1
+            self.spin() if sent % 100 == 0 else None
+        self._node.destroy_publisher(publisher)
+        return {"begin": begin, "sent": sent}
+
+    def _wait(self, publisher: Any, readers: int) -> None:
+        deadline = time.monotonic() + MATCH_SECONDS
+        while publisher.get_subscription_count() < readers and time.monotonic() < deadline:
+            self.spin()
+
+    def control(self, side: str, force: float | None = None, **fields: Any) -> dict[str, Any]:
+        """Answer all states on behalf of an arm from now on: with a spring and a damper, or with this force.
+
+        Further fields are those of the message, as in `publish`; `times`: how often each is sent.
+        """
+        self._answer = {"side": side, "force": force, "times": 1, **fields}
+        if self._commands is None:  # listen first: a plant begins as soon as there is a source that does
+            topic = COMMANDS[side]
+            self._node.create_subscription(JointState, JOINT_STATES.name, self._control, messages.qos(JOINT_STATES))
+            self._commands = self._node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic))
+            self._wait(self._commands, 2)  # plant and monitor
+        return {}
+
+    def _control(self, state: JointState) -> None:
+        side, force, times, *_ = self._answer.values()
+        row = state.name.index(side)
+        if force is None:
+            force = -POSITION_GAIN * state.position[row] - VELOCITY_GAIN * state.velocity[row]
+        message = messages.wrench(messages.to_ns(state.header.stamp), force)
+        filled(message, {key: value for key, value in self._answer.items() if key not in ("side", "force", "times")})
+        for _ in range(times):
+            self._commands.publish(message)
+
+
+def filled(message: Any, fields: dict[str, Any]) -> Any:
+    """A message with some of its fields set."""
+    for path, value in fields.items():
+        if path == "stamp":
+            if hasattr(message, "header"):
+                message.header.stamp = messages.to_time(time.time_ns() if value == WALL else value)
+            continue
+        *parents, last = path.split(".")
+        place = message
+        for parent in parents:
+            place = getattr(place, parent)
+        setattr(place, last, math.nan if value == "nan" else value)
+    return message
+
+
+def main() -> None:
+    """Do what the lines say until there are no more."""
+    lines: queue.Queue[str] = queue.Queue()
+    threading.Thread(target=_read, args=(lines,), daemon=True).start()
+    stranger: Stranger | None = None
+    while True:
+        try:
+            line = lines.get(timeout=0.0 if stranger else None)
+        except queue.Empty:
+            assert stranger is not None
+            stranger.spin()
+            continue
+        if not line:
+            break
+        words = json.loads(line)
+        action, answer = words.pop("do"), {}
+        if action == "open":
+            stranger = Stranger(**words)
+        elif stranger is not None and action == "close":
+            stranger.close()
+            stranger = None
+        else:
+            answer = getattr(stranger, action)(**words)
+        print(json.dumps(answer), flush=True)
+    if stranger is not None:
+        stranger.close()
+
+
+def _read(lines: queue.Queue[str]) -> None:
+    for line in sys.stdin:
+        lines.put(line)
+    lines.put("")
+
+
+if __name__ == "__main__":
+    main()

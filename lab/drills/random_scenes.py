@@ -1,0 +1,111 @@
+"""The page of random scenes: what a search by `python -m lab fuzz` has counted, and a journal from which it goes on."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import NamedTuple
+
+from grasp_ros.exact.compilation.kernel_cache import sources_digest
+from grasp_ros.scene.versions import versions
+from lab.drills.fuzz import Book, Tally
+from lab.studies.document import prose, table, write
+from lab.studies.records import Journal, digest
+
+# what a draw depends on beside the kernels and the physics
+ROOMS = "grasp_ros/scene", "grasp_ros/simulation", "lab/reference", "lab/cases", "lab/oracles"
+
+
+class Line(NamedTuple):
+    """The book of a chunk of draws in the journal."""
+
+    ends: str  # JSON, as all of them
+    tallies: str
+    habits: str
+    broken_habits: str
+    scenes: str
+
+
+class Kept:
+    """The books of all chunks that were drawn with these sources, in the journal of a directory.
+
+    Raises
+    ------
+    Refused
+        If the journal cannot be read or written, or is damaged.
+    """
+
+    def __init__(self, directory: Path, seed: int) -> None:
+        home = Path(__file__).parents[2]
+        sources = (path.read_text("utf-8") for room in ROOMS for path in sorted((home / room).rglob("*.py")))
+        self._journal = Journal(directory)
+        self._name = digest(seed, sources_digest(), *sources, *versions().items())
+
+    def _key(self, numbers: range) -> str:
+        return f"{self._name} {numbers.start} {numbers.stop}"
+
+    def get(self, numbers: range) -> Book | None:
+        """What became of these draws, if that is known."""
+        line = self._journal.get(self._key(numbers), Line)
+        if line is None:
+            return None
+        ends, tallies, habits, broken, scenes = map(json.loads, line)
+        return Book(Counter(ends), {name: Tally(*tally) for name, tally in tallies.items()}, Counter(habits),
+                    Counter(broken), {int(number): yaml for number, yaml in scenes.items()})
+
+    def put(self, numbers: range, book: Book) -> None:
+        """Keep what became of these draws."""
+        tallies = {name: list(vars(tally).values()) for name, tally in book.tallies.items()}
+        parts = (book.ends, tallies, book.habits, book.broken_habits, book.scenes)
+        self._journal.put(self._key(numbers), Line(*map(json.dumps, parts)))
+
+
+def write_page(path: Path, seed: int, first: int, book: Book) -> None:
+    """Write what was counted.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written.
+    """
+    draws = book.ends.total()
+    command = f"python -m lab fuzz --seed {seed} --first {first} --draws {draws} --page {path.as_posix()}"
+    machine = ", ".join(f"{name} {version}" for name, version in versions().items())
+    blocks = [
+        "# Random scenes",
+        prose(f"""Written by `{command}`, with {machine}. A draw depends on its seed and number alone; [the hard
+        cases](hard.md#random-scenes) say how scenes are drawn and what is checked."""),
+        f"{book.broken} of {draws} scenes fail." if book.broken else f"All {draws} scenes hold.",
+        _failures(seed, book), "## How the runs ended", _ends(book), "## Properties",
+        prose("""`checked` counts scenes, or pairs of arm and object; `skipped`, pieces of runs that the quadrature does
+        not resolve. `worst` is the largest error, in roundings where the property is not one of bits or counts, and
+        `draw` where it was."""),
+        _properties(book), "## Habits", _habits(book),
+    ]
+    write(path, "\n\n".join(block for block in blocks if block) + "\n")
+
+
+def _failures(seed: int, book: Book) -> str:
+    rows = []
+    for number, yaml in sorted(book.scenes.items()):
+        found = yaml.splitlines()[0].split(": ", 1)[1]
+        rows.append([f"`--seed {seed} --first {number} --draws 1`", found])
+    return table(("draw", "what does not hold, and by how much"), rows) if rows else ""
+
+
+def _ends(book: Book) -> str:
+    rows = sorted(book.ends.items(), key=lambda item: (-item[1], item[0]))
+    return table(("scenes", "end"), [[str(number), text] for text, number in rows])
+
+
+def _properties(book: Book) -> str:
+    rows = [[name, *map(str, (tally.checked, tally.skipped, tally.failures)), f"{tally.worst:.2g}", str(tally.where)]
+            for name, tally in book.by_failures()]
+    return table(("property", "checked", "skipped", "failures", "worst", "draw"), rows)
+
+
+def _habits(book: Book) -> str:
+    rows = sorted(book.habits.items(), key=lambda item: (-item[1], item[0]))
+    return table(("habit", "drawn", "failures"), [[name, str(number), str(book.broken_habits[name])]
+                                                  for name, number in rows])

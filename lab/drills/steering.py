@@ -1,0 +1,272 @@
+"""Random calls to the services of a plant, right ones and wrong ones: each has exactly the effect that it promises.
+
+What each call must do is known before from a model of the plant; afterwards its status is asked for. At the end the bag
+must hold exactly the ticks that were promised, and prove itself.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import subprocess
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.verify import laws_of, verify
+from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import simulate
+from lab.drills import nodes
+
+ACTIONS = ("pause", "resume", "step", "step", "step", "step too far", "step none", "reset", "step and at once")
+MOST_STEPS = 40  # of a call, and ticks that a running plant is let go on
+SETTLE_SECONDS = 30.0
+SECONDS = 1e5  # simulated, so that a running plant does not come to its end
+
+
+class Wrong(Exception):  # noqa: N818 - a finding
+    """A call had another effect than it promises."""
+
+
+class Plant:
+    """A plant that is steered, and what is known of it: where it stands, and the ticks that its bag must have.
+
+    Parameters
+    ----------
+    graph : Graph
+        Begins paused.
+
+    Attributes
+    ----------
+    lengths : list of int
+        States of the runs that a reset has ended.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        self._process = subprocess.Popen(
+            nodes.command("service_caller"),
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}, start_new_session=True,
+        )
+        self._graph = graph
+        self._read()
+        self.ticks = graph.scene.ticks
+        self.lengths: list[int] = []
+        self.paused, self.tick, self.resets = True, 0, 0
+        self.settle()
+
+    def close(self) -> None:
+        """End the process that calls."""
+        self._process.kill()
+        self._process.communicate()
+
+    def _read(self) -> tuple[bool, str]:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            if line.startswith("["):  # Fast DDS writes there, too
+                success, words = json.loads(line)
+                return success, words
+        raise Wrong("no service answers")
+
+    def call(self, service: str, **words: Any) -> tuple[bool, str]:
+        """Call a service; returns whether it did something, and its words."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(json.dumps({"service": service, **words}) + "\n")
+        self._process.stdin.flush()
+        return self._read()
+
+    def status(self) -> dict[str, Any]:
+        """What the plant says of itself."""
+        found: dict[str, Any] = json.loads(self.call("status")[1])
+        return found
+
+    def expect(self, service: str, success: bool, part: str, **words: Any) -> str:
+        """Call a service that must succeed, or must not, with this in its words; returns them."""
+        found, said = self.call(service, **words)
+        if found is not success or part not in said:
+            raise Wrong(f"{service} {words or ''}: {'done' if found else 'refused'}, {said!r}; expected: "
+                        f"{'done' if success else 'refused'}, {part!r}")
+        return said
+
+    def settle(self) -> None:
+        """Wait until it stands where it should, or runs; it must stay there."""
+        deadline = time.monotonic() + SETTLE_SECONDS
+        goal = {"state": "paused" if self.paused else "running", "resets": self.resets, "resetting": False}
+        goal |= {"tick": self.tick, "steps": 0} if self.paused else {}
+        while not goal.items() <= (now := self.status()).items():
+            over = self.paused and now["resets"] == self.resets and now["tick"] > self.tick
+            if over or time.monotonic() > deadline:
+                raise Wrong(f"status {now}; expected: {goal}")
+        if self.paused and (again := self.status()) != now:
+            raise Wrong(f"status {again} although paused; before: {now}")
+
+    def let_go_on(self, ticks: int) -> None:
+        """Wait until a running plant has done some ticks."""
+        begin, deadline = self.status()["tick"], time.monotonic() + SETTLE_SECONDS
+        while (now := self.status())["tick"] < begin + ticks:
+            if time.monotonic() > deadline:
+                raise Wrong(f"status {now}; expected: it goes on")
+
+
+def steer(plant: Plant, calls: int, seed: int, quiet: bool = True) -> Counter[str]:
+    """Call services at random, and leave the plant paused; returns how often each was called, and refused.
+
+    Raises
+    ------
+    Wrong
+        At the first call that has another effect than it promises.
+    """
+    draw, done = random.Random(seed), Counter[str]()
+    for _ in tqdm(range(calls), unit="call", disable=quiet):
+        action = draw.choice(ACTIONS)
+        done[f"{action.split()[0]} {'refused' if _act(plant, action, draw) else 'done'}"] += 1
+        plant.settle()
+    if not plant.paused:
+        _act(plant, "pause", draw)
+        plant.settle()
+    return done
+
+
+def _act(plant: Plant, action: str, draw: random.Random) -> bool:
+    """One call, with what it must do; returns whether it must be refused."""
+    if action in ("pause", "resume"):
+        refused = plant.paused is (action == "pause")
+        word = "paused" if action == "pause" else "running"
+        said = plant.expect(action, not refused, f"already {word}" if refused else f"{word} at tick")
+        plant.paused = action == "pause"
+        if plant.paused:
+            plant.tick = _number_in(said)
+        elif not refused:
+            plant.let_go_on(draw.randint(1, MOST_STEPS))
+    elif action == "reset":
+        _reset(plant)
+        refused = False
+    else:
+        refused = _step(plant, action, draw)
+    return refused
+
+
+def _reset(plant: Plant) -> None:
+    """A reset ends a run with the tick that it names."""
+    plant.resets += 1
+    said = plant.expect("reset", True, f"reset number {plant.resets}, as soon as tick")
+    last = _number_in(said.removesuffix(" is answered"))
+    if plant.paused and last != plant.tick:
+        raise Wrong(f"{said!r}; expected: tick {plant.tick}")
+    plant.lengths.append(last + 1)
+    plant.tick = 0
+
+
+def _step(plant: Plant, action: str, draw: random.Random) -> bool:
+    number = draw.randint(1, MOST_STEPS)
+    if action == "step none":
+        plant.expect("step", False, "steps", steps=draw.randint(-3, 0))
+        return True
+    if not plant.paused:
+        plant.expect("step", False, "not paused; allowed: step of a paused plant", steps=number)
+        return True
+    left = plant.ticks - plant.tick
+    if action == "step too far":
+        plant.expect("step", False, f"allowed: at most {left}", steps=left + number)
+        return True
+    plant.tick += number
+    plant.expect("step", True, f"steps to tick {plant.tick}", steps=number)
+    if action == "step and at once":  # what may come before the steps are done, or after them
+        success, said = plant.call("step")
+        if success:
+            plant.tick += number
+        elif "allowed: one at a time" not in said:
+            raise Wrong(f"step while stepping: refused, {said!r}")
+        plant.expect("pause", False, "already paused")
+    return False
+
+
+def _number_in(words: str) -> int:
+    """The tick that ends an answer."""
+    return int(words.split()[-1])
+
+
+@contextmanager
+def steered(scene: Scene, directory: Path) -> Iterator[Plant]:
+    """A graph of real processes, paused at its first state; ends it.
+
+    Parameters
+    ----------
+    scene : Scene
+        Goes on long enough.
+    directory : Path
+        New directory.
+    """
+    graph = Graph(scene, directory, ACCURACY, errors=subprocess.DEVNULL, plant={"paused": "true"})
+    graph.start()
+    try:
+        plant = Plant(graph)
+        try:
+            yield plant
+        finally:
+            plant.close()
+    finally:
+        graph.stop()
+
+
+def problems(path: Path, lengths: Sequence[int]) -> list[str]:
+    """What is wrong with the bag of a run that was steered; nothing, if all is right.
+
+    Parameters
+    ----------
+    path : Path
+    lengths : sequence of int
+        Ticks that it must have from each beginning of the scene on.
+    """
+    recording = bag.read(path)
+    verification, found = verify(recording), []
+    if not verification.holds:
+        found.append(verification.words)
+    begins = recording.starts.tolist()
+    recorded = np.diff([*begins, len(recording.tick)]).tolist()
+    if recorded != list(lengths):
+        row = next((row for row, pair in enumerate(zip(recorded, lengths, strict=False)) if pair[0] != pair[1]), -1)
+        found.append(f"{len(recorded)} runs with {sum(recorded)} states; expected: {len(lengths)} with {sum(lengths)};"
+                     f" first difference: run {row}")
+    if missing := {name: number for name, number in recording.missing.items() if number}:
+        found.append(f"missing: {missing}")
+    found += [f"{side} controller: {law}" for side, law in laws_of(recording).items() if law != "the scene's law"]
+    longest = max(recorded)
+    seconds = (longest - 1) * recording.scene.period_ns / 1e9
+    alone = simulate(recording.scene.changed({"time.duration_s": seconds}), sampled=True).state if longest > 1 else None
+    for begin, length in zip(begins, recorded, strict=True):
+        if alone is not None and recording.state[begin : begin + length].tobytes() != alone[:length].tobytes():
+            found.append(f"the run that begins at tick {begin} of the bag differs from the same one without ROS")
+    return found
+
+
+def run(scene: Scene, calls: int, seed: int) -> bool:
+    """Steer a graph at random, and print what came of it; returns whether all was as promised."""
+    scene = scene.changed({"time.duration_s": SECONDS})
+    with tempfile.TemporaryDirectory() as directory:
+        place = Path(directory) / "run"
+        begin = time.monotonic()
+        try:
+            with steered(scene, place) as plant:
+                done = steer(plant, calls, seed, quiet=False)
+        except Wrong as error:
+            print(f"{scene.title}, seed {seed}: {error}")
+            return False
+        seconds, lengths = time.monotonic() - begin, [*plant.lengths, plant.tick + 1]
+        found = problems(place / "bag", lengths)
+    print(f"{scene.title}: {calls} random calls, seed {seed}, {seconds:.0f} s: every status as promised")
+    print(", ".join(f"{name} {number}" for name, number in sorted(done.items())))
+    print(f"bag: {len(lengths)} runs, {sum(lengths)} states: " + (
+        "; ".join(found) or "exactly those that were promised, bit for bit those of the same runs without ROS"))
+    return not found

@@ -1,0 +1,148 @@
+"""Metamorphic relations: two scenes whose results must be related, whatever they are."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Arm, Array, Contact
+from grasp_ros.scene import Scene
+from lab.cases.case import Case, Product, Solver, recorded
+from lab.cases.families import RELATION
+from lab.cases.scenes import ELASTIC, distance, grasp, library, part
+
+SWAPPED = [4, 5, 2, 3, 0, 1]
+FLIP = np.array([1.0, -1.0] * 3)  # backwards in time
+DIRECTED = ("position_m", "velocity_m_per_s", "set_point_m", "feed_forward_N", "force_N", "angle_rad")
+PAIRED = {"left": "right", "right": "left"}
+OTHER_SIDE = {LEFT: RIGHT, RIGHT: LEFT, OBJECT: OBJECT}
+
+
+def mirrored(scene: Scene) -> Scene:
+    """The scene seen from the other side."""
+    values: dict[str, dict[str, Any]] = {}
+    for section, numbers in scene.values.items():
+        side, _, rest = section.partition("_")
+        values[f"{PAIRED[side]}_{rest}" if side in PAIRED else section] = {
+            key: _times(value, -1.0) if key in DIRECTED else value for key, value in numbers.items()
+        }
+    return scenes.compose(scene.name, values)
+
+
+def _times(value: Any, factor: float) -> Any:
+    """A number or a table of them, times a factor."""
+    return [factor * number for number in value] if isinstance(value, tuple) else factor * value
+
+
+def scaled(scene: Scene, length: float, time: float, mass: float) -> Scene:
+    """The scene in other units, O7; exact for powers of 4, 2 and 2."""
+    force = mass * length / time**2
+    factors = {
+        "mass_kg": mass, "stiffness_N_per_m": mass / time**2, "damping_Ns_per_m": mass / time,
+        "position_gain_N_per_m": mass / time**2, "velocity_gain_Ns_per_m": mass / time, "position_m": length,
+        "velocity_m_per_s": length / time, "hertz_N_per_m1_5": mass / (time**2 * math.sqrt(length)),
+        "dissipation_s_per_m": time / length, "duration_s": time, "control_period_s": time,
+        "set_point_m": length, "feed_forward_N": force, "force_N": force, "coulomb_N": force,
+        "viscous_Ns_per_m": mass / time, "start_s": time, "length_s": time, "angle_rad": 1.0,
+        "gravity_m_per_s2": length / time**2, "time_s": time, "amplitude_N": force, "frequency_Hz": 1.0 / time,
+        "phase_rad": 1.0, "limit_N": force, "position_noise_m": length, "velocity_noise_m_per_s": length / time,
+        "position_step_m": length, "velocity_step_m_per_s": length / time,
+    }
+    return scenes.compose(scene.name, {
+        section: {key: _times(value, factors[key]) if key in factors else value for key, value in numbers.items()}
+        for section, numbers in scene.values.items()
+    })
+
+
+def started(scene: Scene, state: Array) -> Scene:
+    """The scene from another state."""
+    names = ("left_arm", "object", "right_arm")
+    numbers = {f"{name}.{key}": float(state[2 * body + column]) for body, name in enumerate(names)
+               for column, key in enumerate(("position_m", "velocity_m_per_s"))}
+    return scene.changed(numbers)
+
+
+def mirror(scene: Scene, solver: Solver) -> float:
+    """Largest difference between a scene and its mirror image; the recorded events must be equal, too."""
+    times = part(scene, 201)
+    here, own = solver.states(scene, times), recorded(solver)
+    there, image = solver.states(mirrored(scene), times), recorded(solver)
+    if own is not None and sorted(own) != sorted(event._replace(side=OTHER_SIDE[event.side]) for event in image or ()):
+        return np.inf
+    return float(np.abs(here + there[:, SWAPPED]).max())
+
+
+def scaling(length: float, time: float, mass: float, scene: Scene, solver: Solver) -> float:
+    """Largest difference between a scene and itself in other units; the recorded events must be equal, too."""
+    times = part(scene, 201)
+    here, own = solver.states(scene, times), recorded(solver)
+    there, image = solver.states(scaled(scene, length, time, mass), time * times), recorded(solver)
+    expected = [(time * event.time, event.side, event.kind) for event in own or ()]
+    if expected != [(event.time, event.side, event.kind) for event in image or ()]:
+        return np.inf
+    return float(np.abs(here * np.array([length, length / time] * 3) - there).max())
+
+
+def reversal(scene: Scene, solver: Solver) -> float:
+    """Distance from the start after the motion and its way back; for p = 0 and no damping."""
+    forth = solver.states(scene, [scene.duration])[0]
+    back = solver.states(started(scene, forth * FLIP), [scene.duration])[0]
+    return float(np.abs(back * FLIP - scene.initial_state).max())
+
+
+def splitting(scene: Scene, parts: int, solver: Solver) -> float:
+    """Difference between one horizon and many, each started from the state before."""
+    whole = solver.states(scene, [scene.duration])[0]
+    short = scene.changed({"time.duration_s": round(scene.duration / parts, 9)})
+    state = scene.initial_state
+    for _ in range(parts):
+        state = solver.states(started(short, state), [short.duration])[0]
+    return distance(state[None], whole[None])
+
+
+def _grid(scene: Scene, product: Product) -> float:
+    """Output times must not change the motion."""
+    few, many = (product.run(scene, part(scene, points)) for points in (2, 20001))
+    return float(np.abs(few.state[-1] - many.state[-1]).max()) if few.events == many.events else np.inf
+
+
+def _absent(product: Product) -> float:
+    """An arm and a contact that meet nobody, and not being there at all."""
+    full = grasp([-0.3, 0.0, 0.0, 0.0, 1e6, 0.0], 5.0, right=Arm(1.0, 0.0, 0.0, 0.0, 0.0))
+    bare = scenes.compose("bare", {key: numbers for key, numbers in full.values.items() if not key.startswith("right")})
+    times = part(full, 201)
+    return float(np.abs(product.run(full, times).state[:, :4] - product.run(bare, times).state[:, :4]).max())
+
+
+def _order(product: Product) -> float:
+    """The order of the sections of a file."""
+    scene = library("case_04", 5.0)
+    other = scenes.compose("case_04", dict(reversed(list(scene.values.items()))))
+    times = part(scene, 201)
+    return float(np.abs(product.run(scene, times).state - product.run(other, times).state).max())
+
+
+def cases() -> Iterator[Case]:
+    """All relations."""
+    clamped = grasp([-0.3, 0, 0, 0, 0.2, 0], 5.0, contact=Contact(1e3, 15.0), mass=1.0)
+    uneven = grasp([-0.3, 0.1, 0.02, 0.3, 0.5, 0], 5.0, right=Arm(2.0, 3.0, 0.1, 20.0, 1.0), contact=Contact(1e6, 0.5))
+    for text, scene in (("case 3", library("case_03", 5.0)), ("clamped", clamped), ("uneven", uneven)):
+        yield Case(RELATION, f"mirror, {text}", partial(mirror, scene), 0.0, "O6")
+    for units in ((4.0, 1.0, 1.0), (1.0, 2.0, 1.0), (1.0, 1.0, 8.0), (4.0**-3, 2.0**4, 0.25)):
+        yield Case(RELATION, f"units times {', '.join(f'{unit:g}' for unit in units)}",
+                   partial(scaling, *units, uneven), 0.0, "O7: tolerances scale too")
+    backwards = grasp([-0.3, 0.0, 0.05, 0.3, 0.2, -0.1], 5.0, left=ELASTIC, contact=Contact(1e4, 0.0))
+    yield Case(RELATION, "backwards in time", partial(reversal, backwards), 1e-10,
+               "O8: back at the start, m and m/s; errors of both ways add up")
+    for parts in (10, 1000):
+        yield Case(RELATION, f"5 s in {parts} intervals", partial(splitting, uneven, parts), 1e-10,
+                   "the same end, relative; an interval may begin in any mode")
+    yield Case(RELATION, "2 or 20001 output times", partial(_grid, uneven), 0.0, product_only=True)
+    yield Case(RELATION, "an arm absent or out of reach", _absent, 0.0, product_only=True)
+    yield Case(RELATION, "order of the sections", _order, 0.0, product_only=True)

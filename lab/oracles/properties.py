@@ -1,0 +1,206 @@
+"""What must hold for every scene there is."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Transition, Work
+from grasp_ros.physics.model import penetration
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory
+from lab.cases.case import Product, Unfinished
+from lab.oracles.companions import FALLS, mirror, short_periods, units
+from lab.oracles.motion import ledgers
+from lab.oracles.replay import findings
+from lab.oracles.restart_check import digits, reversal, splitting
+from lab.oracles.rounding_bounds import DIED_OUT
+from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
+
+MOST_EVENTS = 2000
+MOST_WORK = 100_000  # of a run
+CHEAP = 3_000  # work beyond which the relations that need more runs are left out
+OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
+LIMIT = 100.0  # units of rounding
+SPLIT, SHORT = 4, 50  # every how many scenes a run is started anew, and compared with short control periods
+
+
+class Check(NamedTuple):
+    """What became of a property."""
+
+    name: str
+    error: float
+    bound: float
+    skipped: int = 0  # pieces that the quadrature does not resolve
+
+    @property
+    def holds(self) -> bool:
+        """Whether the error is within its bound; False for NaN."""
+        return self.error <= self.bound
+
+
+class Examination(NamedTuple):
+    """What became of a scene."""
+
+    end: str  # the status of its run
+    checks: list[Check]
+
+    @property
+    def broken(self) -> list[Check]:
+        """Properties that do not hold."""
+        return [check for check in self.checks if not check.holds]
+
+
+def examine(scene: Scene, every: bool = True, max_work: int = MOST_WORK, compare: bool = False
+            ) -> Examination:
+    """Run a scene and check all properties that can be checked for it.
+
+    Parameters
+    ----------
+    scene : Scene
+    every : bool
+        Also those that take more runs and are not worth it for each of many scenes.
+    max_work : int
+        Budget of each run.
+    compare : bool
+        Also with the reference, if that takes no longer than some seconds.
+    """
+    product = Product(MOST_EVENTS, max_work)
+    with np.errstate(over="ignore", invalid="ignore", under="ignore", divide="ignore"):
+        try:
+            first = product.run(scene, None if scene.sampled else [0.0, scene.duration])
+        except Unfinished:
+            run = product.runs[-1]
+            return Examination(run.status.value, [_end(run, product)])
+        return Examination(first.status.value, list(_checks(first, product, every, compare)))
+
+
+def _end(run: Trajectory, product: Product) -> Check:
+    """Whether a run may end like this: out of budget, or stalled where a motion has died out."""
+    error = float(run.status in (Status.STALLED, Status.ENERGY_RISES, Status.ENERGY_FALLS, Status.PENETRATES))
+    if run.status is Status.STALLED:
+        error = float(_smallest_at_stall(run, product) > DIED_OUT)
+    if run.status is Status.NOT_FINITE or (run.status is Status.OUTSIDE and not run.sampled):
+        error = 1.0
+    return Check(f"ends {run.status.name}", error, 0.0)
+
+
+def _smallest_at_stall(run: Trajectory, product: Product) -> float:
+    """The smallest number before a run stalls, which outputs come closer to from round to round."""
+    begin, end = 0.0, run.scene.duration
+    for _ in range(ROUNDS):
+        grid = np.linspace(begin, end, OUTPUTS)
+        with suppress(Unfinished):
+            product.run(run.scene, grid, run.sampled)
+        reached = max(len(product.runs[-1].t), 1)
+        begin, end = grid[reached - 1], grid[min(reached, OUTPUTS - 1)]
+    return _smallest(product.runs[-1])
+
+
+def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
+    close = look(first, pieces_of(first), product)
+    run = close.run
+    same = np.array_equal(first.event_table, run.event_table)
+    same &= np.array_equal(np.nan_to_num(first.state[-1]), np.nan_to_num(run.state[-1]))
+    yield Check("grid independence", float(not same), 0.0)
+    yield from states(run)
+    if first.sampled:
+        yield Check("held inputs", _held(first), 0.0)
+    yield from _balances(close, product)
+    for finding in findings(close):
+        yield Check(finding.name, finding.error, LIMIT)
+    spent = int(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] + run.work[Work.ROOT_ITERATIONS])
+    if spent <= CHEAP:
+        yield from _companions(close, first, product, every, compare)
+
+
+def _companions(close: Detail, first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
+    """What takes more runs; one that ends as no run may is a failure, too."""
+    part = zlib.crc32(close.run.state[-1].tobytes()) / 2**32
+    relations: list[tuple[int, Callable[[], Iterator[tuple[str, float]]], float]] = [
+        (1, partial(mirror, first, product), 0.0),
+        (1, partial(units, first, product, _smallest(close.run)), 0.0),
+        (SPLIT, partial(splitting, close, part * SPLIT % 1.0, product), LIMIT),
+        (SPLIT, partial(reversal, first, product), LIMIT),
+        (SHORT, partial(short_periods, first, product), FALLS),
+    ]
+    if compare:
+        relations.append((1, partial(digits, first, product), LIMIT))
+    for rarely, relation, bound in relations:
+        if not every and part * rarely >= 1.0:
+            continue
+        try:
+            for name, error in relation():
+                yield Check(name, error, bound)
+        except Unfinished:
+            yield _end(product.runs[-1], product)
+
+
+def _smallest(run: Trajectory) -> float:
+    """The smallest number that is not 0 in states and differences, in m or m/s."""
+    numbers = np.abs(np.nan_to_num(np.concatenate([run.state.ravel(), *penetration(run.state)])))
+    return float(numbers[numbers > 0.0].min(initial=np.inf))
+
+
+def look(run: Trajectory, pieces: Pieces, product: Product) -> Detail:
+    """The same run with outputs at the nodes of its pieces."""
+    table = rule()
+    grid = grid_of(pieces, table)
+    again = product.run(run.scene, np.append(grid.ravel(), run.scene.duration))
+    return detail(again, pieces, table, grid)
+
+
+def _held(run: Trajectory) -> float:
+    """Number of ticks at which other inputs acted than the laws answer to the states, late by the delay."""
+    system, states = run.scene.system, np.nan_to_num(run.state)
+    answers = [np.zeros(3)] * system.delay + [system.commands(tick, state) for tick, state in enumerate(states[:-1])]
+    wanted = [answers[tick] + system.external_at(tick) for tick in range(len(states) - 1)]
+    return float(np.count_nonzero((np.array(wanted) != run.inputs[:-1]).any(axis=1)))
+
+
+def _balances(close: Detail, product: Product) -> Iterator[Check]:
+    """Equations of motion and energy; where they fail, those of shorter pieces count."""
+    books = list(ledgers(close))
+    found = {ledger.name: ledger.error for ledger in books}
+    skipped = {ledger.name: int(np.count_nonzero(~ledger.resolved)) for ledger in books}
+    fails = np.logical_or.reduce([~(error <= LIMIT) for error in found.values()])
+    if fails.any():
+        shorter, first = cut(close.pieces, fails)
+        for ledger in ledgers(look(close.run, shorter, product)):
+            found[ledger.name] = np.where(fails, np.maximum.reduceat(ledger.error, first), found[ledger.name])
+    for name, error in found.items():
+        yield Check(name, float(error.max(initial=0.0)), LIMIT, skipped[name])
+
+
+def states(run: Trajectory) -> list[Check]:
+    """Finite, all there, events in order and alternating."""
+    system = run.scene.system
+    there = [COLUMN[body] + k for body in system.present for k in (0, 1)]
+    broken = 0
+    for side in (LEFT, RIGHT, OBJECT):
+        kinds = [event.kind for event in run.events if event.side == side]
+        broken += sum(not _may_follow(before, after) for before, after in pairwise(kinds))
+    times = run.event_table[:, 0]
+    return [
+        Check("finite", float(np.count_nonzero(~np.isfinite(run.state[:, there]))), 0.0),
+        Check("order of events", float(np.count_nonzero(np.diff(times) < -EPS * times[1:]) + broken), 0.0),
+    ]
+
+
+def _may_follow(before: Transition, after: Transition) -> bool:
+    """Whether one pair can change like this."""
+    allowed = {
+        Transition.TOUCH: (Transition.RELEASE, Transition.CLAMP),
+        Transition.REENTRY: (Transition.RELEASE, Transition.CLAMP),
+        Transition.CLAMP: (Transition.REENTRY, Transition.RELEASE), Transition.RELEASE: (Transition.TOUCH,),
+        Transition.STICK: (Transition.SLIP,), Transition.SLIP: (Transition.STICK,),
+    }
+    return after in allowed[before]

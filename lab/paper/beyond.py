@@ -1,0 +1,183 @@
+"""What the paper could not show: the gap in its proof, the tail of the motion, and case 2 as chaos."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.layout import Transition
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import System
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory, simulate
+from lab.oracles.closed_forms import tail_rate
+from lab.paper.cases import Cases
+from lab.paper.motion import distance_of_states, nearest_return, state_weights
+from lab.studies.certificate import Jump, jumps, safe_p
+
+GAP_SCENES = ("v_jump_symmetric", "v_jump_one_sided")
+TAIL_SECONDS = 1e5
+TAIL_POINTS = 400
+SMALL = 1e-9  # relative size of the perturbation behind a Lyapunov exponent
+EVERY = 0.5  # s between two renormalisations
+CHAOS_SECONDS = 1000.0
+RETURN_SECONDS = 2000.0
+WITHIN = 200.0  # s, how long an offset across the symmetry is followed
+BLOCKS = 10  # of the time, for the standard error of the exponent
+
+
+class Gap(NamedTuple):
+    """Where the printed V jumps up, and what V_c does there."""
+
+    runs: list[Trajectory]
+    jumps: list[tuple[str, Jump]]
+    V_c_rise: float  # largest rise of V_c between output times, in V_c(0)
+    safe: list[tuple[int, float, float]]  # case, its p, and the p below which no jump is possible (theorem 2)
+
+
+def gap(cases: Cases) -> Gap:
+    """The gap in the proof, and its repair."""
+    runs = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 4001)) for name in GAP_SCENES]
+    found = [(name, jump) for name in GAP_SCENES for jump in jumps(scenes.load(name).system, 0.8)]
+    rise = max(float(np.diff(run.energy.V_c).max() / run.energy.V_c[0]) for run in runs)
+    safe = [
+        (number, scene.grasp.left_contact.dissipation, safe_p(scene.grasp, scene.initial_state))
+        for number, scene in cases.items()
+    ]
+    return Gap(runs, found, rise, safe)
+
+
+class Tail(NamedTuple):
+    """The end of the motion of case 1: V_c beside its law (4/5) H (kappa t)^(-5/2)."""
+
+    t: Array  # (n,), s
+    V_c: Array  # (n,), J
+    law: Array  # (n,), J
+    contacts: Array  # (n,): touches of both sides so far
+    kappa: float  # 1/(m s)
+    slope: float  # d log V_c / d log t over the last decade
+    constant: float  # V_c over its law at the end
+    touches_slope: float  # d log contacts / d log t over the last decade
+
+
+def tail(scene: Scene, seconds: float = TAIL_SECONDS) -> Tail:
+    """Follow a case with damped arms to the law of its tail; O9 of docs/oracles.md."""
+    grasp = scene.grasp
+    arm, hertzian = grasp.left, grasp.left_contact.hertzian
+    kappa = float(
+        tail_rate(arm.damping + arm.velocity_gain, arm.stiffness + arm.position_gain, hertzian, grasp.object_mass)
+    )
+    t = np.geomspace(1.0, seconds, TAIL_POINTS)
+    run = simulate(scene.changed({"time.duration_s": seconds}), grid=np.minimum(t, seconds))
+    touches = np.sort(run.event_table[run.event_table[:, 2] == Transition.TOUCH, 0])
+    contacts = np.searchsorted(touches, t).astype(float)
+    V_c = run.energy.V_c
+    last = t >= seconds / 10.0
+
+    def slope(values: Array) -> float:
+        return float(np.polyfit(np.log(t[last]), np.log(values[last]), 1)[0])
+
+    law = 0.8 * hertzian * (kappa * t) ** -2.5
+    return Tail(t, V_c, law, contacts, kappa, slope(V_c), float(V_c[-1] / law[-1]), slope(contacts))
+
+
+class Chaos(NamedTuple):
+    """Case 2 as a motion that depends on its start."""
+
+    t: Array  # (n,), s
+    growth: Array  # (n,): sum of the logarithms of the stretching so far
+    exponent: float  # 1/s
+    error: float  # standard error from blocks of time
+    symmetric: float  # exponent within the motion from a symmetric start, where the object rests
+    apart: tuple[Array, Array]  # t, distance of two motions that begin 1e-9 apart, in sqrt(V(0))
+    near: float  # nearest return to the start, in sqrt(V(0))
+    near_time: float  # s
+    seconds: float  # how long it was looked for
+    periodic: float  # the same for a symmetric start
+    periodic_time: float  # s
+    across: float  # 1/s, growth of an offset that breaks the symmetry of that motion
+    far: float  # distance at the end of `apart`
+
+
+def stretching(scene: Scene, seconds: float, push: Array) -> Array:
+    """Logarithms of how much a small perturbation grows in each interval of EVERY s (Benettin's method).
+
+    Two motions run side by side; after each interval their difference is scaled back to SMALL.
+
+    Parameters
+    ----------
+    scene : Scene
+    seconds : float, s
+    push : array (6,)
+        Direction of the perturbation.
+
+    References
+    ----------
+    G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynamical
+    systems, Meccanica 15 (1980).
+    """
+    system, weights = scene.system, state_weights(scene.system)
+    size = SMALL * float(np.sqrt(energy(system, system.state).V_c))
+    state = system.state.copy()
+    offset = push / weights
+    offset *= size / float(np.linalg.norm(offset * weights))
+    found = np.empty(round(seconds / EVERY))
+    for row in range(len(found)):
+        ends = []
+        for start in (state, state + offset):
+            integrator = Integrator(System.of(scene.grasp, start), continuous=True)
+            integrator.advance(EVERY)
+            ends.append(integrator.state)
+        state, offset = ends[0], ends[1] - ends[0]
+        grown = float(np.linalg.norm(offset * weights)) / size
+        found[row] = np.log(grown)
+        offset /= grown
+    return found
+
+
+def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Chaos:
+    """Lyapunov exponent and nearest return of case 2."""
+    scene = cases[2]
+    push = np.random.default_rng(1990).normal(size=6)
+    logs = stretching(scene, seconds, push)
+    blocks = logs.reshape(BLOCKS, -1).sum(axis=1) / (seconds / BLOCKS)
+    within = np.array([1.0, 1.0, 0.0, 0.0, -1.0, -1.0])  # keeps the symmetry
+    even = stretching(symmetric, seconds / 5.0, within)
+    near_time, near = nearest_return(scene, RETURN_SECONDS)
+    periodic_time, periodic = nearest_return(symmetric, 20.0)
+    breaking = np.array([1.0, 1.0, 0.5, 0.5, 1.0, 1.0])
+    apart = _apart(scene, push)
+    t: Array = EVERY * np.arange(1, len(logs) + 1, dtype=float)
+    return Chaos(
+        t,
+        np.cumsum(logs),
+        float(logs.sum() / seconds),
+        float(blocks.std(ddof=1) / np.sqrt(BLOCKS)),
+        float(even.sum() / (seconds / 5.0)),
+        apart,
+        near,
+        near_time,
+        RETURN_SECONDS,
+        periodic,
+        periodic_time,
+        float(stretching(symmetric, WITHIN, breaking).sum() / WITHIN),
+        float(apart[1][-1]),
+    )
+
+
+def _apart(scene: Scene, push: Array) -> tuple[Array, Array]:
+    """Distance of two motions that begin SMALL apart, over 60 s."""
+    seconds = 60.0
+    grid = np.linspace(0.0, seconds, 6001)
+    level = float(np.sqrt(energy(scene.system, scene.initial_state).V_c))
+    offset = push / state_weights(scene.system)
+    offset *= SMALL * level / float(np.linalg.norm(push))
+    states = [
+        Integrator(System.of(scene.grasp, start), continuous=True).advance(seconds, grid)
+        for start in (scene.initial_state, scene.initial_state + offset)
+    ]
+    return grid, distance_of_states(scene, *states) / level

@@ -1,0 +1,244 @@
+"""Statements that compare two scenes: the ratio of a measure, wherever a reading leaves room."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.scene import Scene
+from lab.paper.cases import (
+    ALIKE,
+    OFFSETS,
+    STANDARD,
+    Cases,
+    Start,
+    moved,
+    read_starts,
+    start_of,
+    started,
+    value_of,
+    with_values,
+)
+from lab.paper.claims import HALF, Check, Kind, Part, almost_all
+from lab.paper.measures import MARGIN, NAMES, UNITS, measure, ratio, seconds
+from lab.paper.symmetry import where_false
+
+SWEPT = 15  # random starts of each value of a sweep; their median counts
+
+
+class Variant(NamedTuple):
+    """A case of the paper, or one with other numbers."""
+
+    case: int
+    values: tuple[tuple[str, float], ...] = ()  # by the paper's letters
+    name: str = ""
+
+    def scene(self, cases: Cases) -> Scene:
+        """What is simulated."""
+        return with_values(cases[self.case], dict(self.values)) if self.values else cases[self.case]
+
+    def __str__(self) -> str:
+        changes = ", ".join(f"{letter} = {value:g}" for letter, value in self.values)
+        return self.name or (f"No. {self.case} with {changes}" if changes else f"No. {self.case}")
+
+
+FIRST = Variant(STANDARD)
+
+
+class Comparison(NamedTuple):
+    """A measure of one scene is higher, or lower, than that of others."""
+
+    statement: str
+    measure: str
+    changed: Variant
+    higher: bool
+    why: str
+    letter: str = ""  # of the parameter behind it, and its values, beside that of the first of the others
+    values: tuple[float, ...] = ()
+    words: tuple[str, ...] = ()  # other measures that the sentence may mean
+    others: tuple[Variant, ...] = (FIRST,)  # each decides
+    pairs: tuple[tuple[Variant, Variant], ...] = ()  # more comparisons that decide
+    beside: tuple[Variant, ...] = ()  # others that the sentence may mean, too
+    reading: bool = False
+
+    @property
+    def decisive(self) -> list[tuple[Variant, Variant]]:
+        """All that is compared."""
+        return [*((self.changed, other) for other in self.others), *self.pairs]
+
+    @property
+    def other(self) -> Variant:
+        """What the sweep begins from."""
+        return self.others[0]
+
+    @property
+    def threshold(self) -> str:
+        """In words."""
+        side = f"above {MARGIN:g}" if self.higher else f"below {1.0 / MARGIN:.3g}"
+        return f"{NAMES[self.measure]}, {', '.join(f'{a} over {b}' for a, b in self.decisive)}: {side}"
+
+    def true_of(self, found: float) -> bool:
+        """Whether a ratio is what the statement says."""
+        return found > MARGIN if self.higher else found < 1.0 / MARGIN
+
+    def strict(self, found: float) -> bool:
+        """Whether a ratio is so by whatever amount."""
+        return found > 1.0 if self.higher else found < 1.0
+
+    @property
+    def settle(self) -> bool:
+        """Whether it needs settling times, which take longer runs than the paper's 20 s."""
+        return any(name.startswith("settling") for name in (self.measure, *self.words))
+
+    def _value(self, scene: Scene, name: str) -> float:
+        """A measure of a scene."""
+        return float(getattr(measure(scene, self.settle), name))
+
+    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
+        """All scenes that `judge` measures, and whether until they settle, for several processes."""
+        return ((scene, self.settle) for scene in self._scenes(cases, starts))
+
+    def _scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[Scene]:
+        for pair in self.decisive:
+            a, b = (each.scene(cases) for each in pair)
+            for scene in (a, b):
+                yield from self._moved(scene)
+                for start in (*ALIKE, *read_starts(a, b).values()):
+                    yield from self._moved(started(scene, start))
+                yield from (started(scene, start) for start in starts)
+        for scene in (each.scene(cases) for each in self.beside):
+            yield from (started(scene, start) for start in starts)
+        swept = self.other.scene(cases)
+        for start in starts[:SWEPT]:
+            yield from (started(with_values(swept, {self.letter: value}), start) for value in self.values)
+
+    def _moved(self, scene: Scene) -> list[Scene]:
+        """A scene, and where times are compared the same from starts that differ beyond what can be read."""
+        return [moved(scene, offset) for offset in (OFFSETS if self.measure.startswith("settling") else OFFSETS[:1])]
+
+    def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
+        """Measure and check."""
+        checks = []
+        for pair in self.decisive:
+            checks += [self._printed(cases, *pair), *self._alike(cases, *pair)]
+            checks.append(self._random(cases, starts, self.measure, *pair))
+        checks += self._sweep(cases, starts)
+        for pair in self.decisive:
+            checks += [*self._readings(cases, *pair), self._at_all(cases, starts, *pair)]
+        checks += [self._random(cases, starts, word, self.changed, self.other) for word in self.words]
+        checks += [
+            self._random(cases, starts, self.measure, self.changed, other)._replace(kind=Kind.READING)
+            for other in self.beside
+        ]
+        return Part(self.statement, self.threshold, self.why, checks, self.reading)
+
+    def _check(self, kind: Kind, text: str, changed: Scene, other: Scene) -> Check:
+        pairs = [
+            (self._value(a, self.measure), self._value(b, self.measure))
+            for a, b in zip(self._moved(changed), self._moved(other), strict=True)
+        ]
+        found = [ratio(a, b) for a, b in pairs]
+        share = sum(map(self.true_of, found)) / len(found)
+        unit = UNITS[self.measure]
+        a, b = (
+            seconds(several) if self.measure.startswith("settling") else f"{several[0]:.4g}{unit}"
+            for several in zip(*pairs, strict=True)
+        )
+        return Check(kind, text, f"{a} against {b}: {_range(found)}", share, share == 1.0)
+
+    def _printed(self, cases: Cases, changed: Variant, other: Variant) -> Check:
+        scenes = changed.scene(cases), other.scene(cases)
+        text = f"{changed} and {other} as they are printed"
+        if start_of(scenes[0]) != start_of(scenes[1]):
+            text += ", from different starts"
+        return self._check(Kind.PRINTED, text, *scenes)
+
+    def _alike(self, cases: Cases, changed: Variant, other: Variant) -> list[Check]:
+        return [
+            self._check(
+                Kind.ALIKE,
+                f"{changed} and {other}, both from {start.x_l:g}, {start.x_r:g} m",
+                started(changed.scene(cases), start),
+                started(other.scene(cases), start),
+            )
+            for start in ALIKE
+        ]
+
+    def _readings(self, cases: Cases, changed: Variant, other: Variant) -> list[Check]:
+        a, b = changed.scene(cases), other.scene(cases)
+        return [
+            self._check(Kind.READING, f"{changed} and {other}, both from {text}", started(a, start), started(b, start))
+            for text, start in read_starts(a, b).items()
+            if start not in ALIKE
+        ]
+
+    def _ratios(
+        self, cases: Cases, starts: Sequence[Start], word: str, changed: Variant, other: Variant
+    ) -> list[float]:
+        a, b = changed.scene(cases), other.scene(cases)
+        return [
+            ratio(self._value(started(a, start), word), self._value(started(b, start), word)) for start in starts
+        ]
+
+    def _random(
+        self, cases: Cases, starts: Sequence[Start], word: str, changed: Variant, other: Variant
+    ) -> Check:
+        found = self._ratios(cases, starts, word, changed, other)
+        kind = Kind.RANDOM if word == self.measure else Kind.WORD
+        true = [self.true_of(each) for each in found]
+        share = sum(true) / len(true)
+        low, middle, high = np.quantile(found, (0.0, 0.5, 1.0), method="nearest")
+        value = f"{_percent(share)} of {len(found)}; ratio {middle:.3g}, from {low:.3g} to {high:.3g}"
+        if kind is Kind.RANDOM:
+            value += where_false(starts, true)
+        return Check(kind, f"{NAMES[word]}, {changed} and {other}", value, share, almost_all(share), len(found))
+
+    def _at_all(self, cases: Cases, starts: Sequence[Start], changed: Variant, other: Variant) -> Check:
+        """The same without the margin."""
+        found = self._ratios(cases, starts, self.measure, changed, other)
+        share = sum(map(self.strict, found)) / len(found)
+        text = f"by whatever amount, {changed} and {other}, random starts"
+        return Check(Kind.WORD, text, f"{_percent(share)} of {len(found)}", share, almost_all(share))
+
+    def _sweep(self, cases: Cases, starts: Sequence[Start]) -> list[Check]:
+        """The parameter alone, changed from the other case, at several values: the median over some random starts."""
+        if not self.values:
+            return []
+        curve = self.curve(cases, starts)
+        share = sum(self.true_of(middle) for _, middle in curve) / len(curve)
+        standard = value_of(self.other.scene(cases), self.letter)
+        text = f"{self.letter} beside {standard:g}, median ratio of {len(starts[:SWEPT])} random starts"
+        opposite = [value for value, middle in curve if self.true_of(1.0 / middle if middle else np.inf)]
+        pairs = ", ".join(f"{value:g}: {middle:.3g}" for value, middle in curve)
+        lowest = min(curve, key=lambda point: point[1])
+        if lowest not in (curve[0], curve[-1]):
+            pairs += f"; lowest at {lowest[0]:g}"
+        if opposite:
+            pairs += f"; the other way round at {', '.join(f'{value:g}' for value in opposite)}"
+        return [Check(Kind.SWEEP, text, pairs, share, share > HALF and not opposite)]
+
+    def curve(self, cases: Cases, starts: Sequence[Start]) -> list[tuple[float, float]]:
+        """Value of the parameter and median ratio, over the sweep."""
+        other, few = self.other.scene(cases), starts[:SWEPT]
+        before = [self._value(started(other, start), self.measure) for start in few]
+        found = []
+        for value in self.values:
+            scene = with_values(other, {self.letter: value})
+            ratios = [
+                ratio(self._value(started(scene, start), self.measure), reference)
+                for start, reference in zip(few, before, strict=True)
+            ]
+            found.append((value, float(np.quantile(ratios, 0.5, method="nearest"))))
+        return found
+
+
+def _range(found: Sequence[float]) -> str:
+    """Ratios from starts that cannot be told apart."""
+    low, high = (f"{each:.3g}" for each in (min(found), max(found)))
+    return low if low == high else f"{low} to {high}"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.3g} %"

@@ -1,0 +1,112 @@
+"""Words of the study, each defined once; the page prints them."""
+
+from __future__ import annotations
+
+from grasp_ros.simulation.quantities import SETTLED
+from lab.paper.cases import FARTHEST, NEAREST, OFFSETS, READ_P, SEED
+from lab.paper.claims import ALMOST_ALL, HALF
+from lab.paper.compare import SWEPT
+from lab.paper.measures import BOUNDS, LATER, LIMIT, MARGIN, SAMPLE, STRETCH
+from lab.paper.universal import FEW, FEWER
+
+TITLE = "The paper, reproduced and judged"
+SUBTITLE = (
+    "T. Fukuda, Y. Shoji, M. Inaba: Stable Position/Force Control of Robotic Manipulator with Consideration of"
+    " Collision Phenomena. IFAC 11th World Congress, Tallinn 1990. Its statements are restated in our words, with page"
+    " and number; T1 on stand in its running text."
+)
+SWEEPS = (
+    "Ratio of the measure to that of No. 1 (O1: of No. 2), median over random starts. Green: where the statement says"
+    " it should be; red: the other side; dotted: the value of the paper's case."
+)
+RANDOM_STARTS = 200
+
+
+def definitions(starts: int) -> list[tuple[str, str]]:
+    """Name and text of each."""
+    bounds = " and ".join(f"{bound:.0%}" for bound in BOUNDS if bound != SETTLED)
+    return [
+        (
+            "settled",
+            (
+                f"no mass leaves {SETTLED:.0%} of the larger initial displacement any more. The settling time is the"
+                f" last time at which one does, from the dense output every {1e3 * SAMPLE:g} ms, after"
+                f" {STRETCH:g} s every {1e3 * LATER:g} ms. A run goes on until"
+                f" V_c, which never rises, proves that nothing leaves any more, at most {LIMIT:g} s; later counts as"
+                f" never. {bounds} are looked at, too."
+            ),
+        ),
+        (
+            "random starts",
+            (
+                f"at rest, x_l in [-{FARTHEST:g}, -{NEAREST:g}], x_o = 0, x_r in [{NEAREST:g}, {FARTHEST:g}] m,"
+                f" uniform, {starts} of them from seed {SEED}; the same for both cases of a comparison. Sweeps use the"
+                f" first {min(SWEPT, starts)}; statements about every motion the first {min(FEW, starts)} for each"
+                f" case, and the first {min(FEWER, starts)} for each value of a sweep."
+            ),
+        ),
+        (
+            "digits of a settling time",
+            (
+                "every settling time of one start is computed four times, with x_l(0) moved by"
+                f" {', '.join(f'{offset:g}' for offset in OFFSETS)} m. Where the four differ by more than half a"
+                " percent their range stands in place of a number: collisions magnify differences, and no measurement"
+                " and no other arithmetic can show more digits. A comparison holds from a start if it does in all four."
+            ),
+        ),
+        (
+            "higher, lower, sooner, later",
+            f"by more than a factor of {MARGIN:g}, case over case; by whatever amount stands beside it.",
+        ),
+        (
+            "controllability",
+            (
+                "the paper does not define it: a grasp is less controllable if it settles later (other measures: 1 %"
+                " and 5 %, V_c left at 20 s, root mean square displacement)."
+            ),
+        ),
+        ("frequency", "half the changes of the sign of x_l' and x_r' within 20 s, per second and arm."),
+        ("asymmetry of a start", "|x_l(0) + x_r(0)| in the larger of both displacements."),
+        ("decay rate of V_c", "minus the slope of a straight line fitted to log V_c over the 20 s, by least squares."),
+        (
+            "losses",
+            (
+                "energy taken from the motion within 20 s: by the dampers c, by the velocity feedback Kv, by impacts;"
+                " in the table of quantities in % of V_c(0), which leaves out what has not been lost yet, and in the"
+                " bars of the figures in % of what was lost."
+            ),
+        ),
+        (
+            "holds",
+            (
+                f"in the paper's cases as printed, from the same start for both cases, in at least {ALMOST_ALL:.0%} of"
+                " the random starts (statements about every motion: in all), and, along the sweep of the parameter,"
+                " nowhere the other way round and mostly as stated."
+            ),
+        ),
+        (
+            "does not hold",
+            (
+                f"true in less than {HALF:.0%} of the random starts, in every case that the statement is about and"
+                " against everything that it is compared with."
+            ),
+        ),
+        ("holds within stated limits", "all else; the checks that fail are the limits."),
+        (
+            "readings",
+            (
+                "the sign of x_l(0), x_o(0), the starts of the symmetric cases (the mirror image of the printed start"
+                " only where the arms differ: it is no other motion elsewhere), p of No. 4"
+                f" ({', '.join(f'{p:g}' for p in READ_P)} s/m), and other measures for the same word do not enter the"
+                " verdict; those by which it would come out the other way are named beside it. A part that begins with"
+                ' "Read as" restates the whole sentence in another way, and does not enter either.'
+            ),
+        ),
+        (
+            "V, V_c",
+            (
+                "V is the paper's function (16), twice the energy; V_c keeps its Hertz term whenever u > 0. Energies"
+                " are in J of V."
+            ),
+        ),
+    ]

@@ -1,0 +1,86 @@
+"""What is doubtful in the source, in sentences whose numbers are computed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.model import hertzian_force
+from lab.paper.cases import (
+    LITERAL,
+    NEARLY,
+    PRINTED,
+    READ_P,
+    STANDARD,
+    SYMMETRIC,
+    Cases,
+    started,
+    with_values,
+)
+from lab.paper.measures import measure, seconds, settlings
+
+
+def doubts(cases: Cases) -> list[tuple[str, str]]:
+    """What is doubtful in the source: what, and what follows, with numbers."""
+    standard = cases[STANDARD]
+    inputs = measure(cases[9]).input
+    literal = started(standard, LITERAL)
+    force = float(hertzian_force(standard.grasp.left_contact, np.array([LITERAL[0]]))[0])
+    levels = [float(energy(scene.system, scene.initial_state).V_c) for scene in (standard, literal)]
+    ps = sorted({*READ_P, 1.0})
+    times = [seconds(settlings(with_values(standard, {"p": p}))) for p in ps]
+    even, near, odd = (
+        [measure(started(cases[number], start)).settling for number in (STANDARD, 11)]
+        for start in (SYMMETRIC, NEARLY, PRINTED)
+    )
+    return [
+        (
+            "Number of figures",
+            (
+                'The text announces results "from Fig. 2 to Fig. 15"; the last figure is Fig. 12. Its list of cases'
+                " ends there, too, so that nothing seems to be missing but three figures that nobody describes."
+            ),
+        ),
+        (
+            "Axis of Fig. 10",
+            (
+                f"It ends at -10 N. From rest the first input of No. 9 is -Kp x_r(0) = {-inputs:g} N on the right."
+                " Either the curve leaves the figure or the start was another."
+            ),
+        ),
+        (
+            "Sign of x_l(0)",
+            (
+                f"Table 1 prints +{LITERAL.x_l:g}. The left arm would start {LITERAL.x_l:g} m inside the object,"
+                f" pressed"
+                f" with {force:.0f} N, and with V_c(0) = {levels[1]:.0f} J in place of {levels[0]:.2g} J. Read as"
+                f" {PRINTED.x_l:g}."
+            ),
+        ),
+        (
+            "p of No. 4",
+            'Only "larger" is said. Read as 1 s/m; settling times for '
+            + ", ".join(f"p = {p:g}: {time}" for p, time in zip(ps, times, strict=True))
+            + f" (p = 0.1: {seconds(settlings(standard))}).",
+        ),
+        (
+            "Symmetric starts",
+            (
+                f"Nos. 5 to 8 start symmetrically, without numbers; read as {SYMMETRIC.x_l:g} and {SYMMETRIC.x_r:g}"
+                f" m. Where the arms are equal,"
+                " and the start is symmetric to the last bit, the object never moves and its mass does not matter: No."
+                f" 1 and No. 11 settle after {even[0]:.2f} and {even[1]:.2f} s. It is a knife-edge (above): from"
+                f" {NEARLY.x_l:g} and {NEARLY.x_r:g} m they need {near[0]:.1f} and {near[1]:.1f} s, from the printed"
+                f" start {odd[0]:.1f} and {odd[1]:.0f} s. Comparing Fig. 2 with Figs. 6 to 9 compares starts as well."
+            ),
+        ),
+        ("x_o(0)", "Not printed. Read as 0, in the middle of the axes of Figs. 2 to 12."),
+        (
+            "Step of the integration",
+            "Not printed; what it does to the figures stands above, under the paper's own method.",
+        ),
+        (
+            '"In Fig. 1"',
+            "The sentence on where x_l is larger than x_o (p. 246) can only mean Fig. 2: Fig. 1 is the model.",
+        ),
+    ]

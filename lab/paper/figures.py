@@ -1,0 +1,218 @@
+"""The figures of the study: the paper's eleven, large and on one sheet, and those of what it lacks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
+
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory, plots, simulate
+from grasp_ros.simulation.losses import losses, running_losses
+from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
+from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of
+from lab.paper.cases import STANDARD, Figure, Start, start_of, started
+
+CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
+PALE = 0.35  # of the standard case behind a changed one
+CONTACT_POINTS = 400
+IN_CONTACT = 60  # output times in each contact, so that no peak is cut
+PAGE = 170.0 / 25.4  # in, the width of a page in print
+
+
+class Pictured(NamedTuple):
+    """A case with what its figure needs."""
+
+    figure: Figure
+    run: Trajectory
+    beside: Trajectory | None  # the standard case from the same start; None for the standard case itself
+
+
+def pictured(figure: Figure, cases: Mapping[int, Scene]) -> Pictured:
+    """Simulate a case, and the standard one from the same start."""
+    scene = cases[figure.case]
+    start: Start = start_of(scene)
+    beside = None if figure.case == STANDARD else simulate(started(cases[STANDARD], start))
+    return Pictured(figure, _fine(scene), beside)
+
+
+def _fine(scene: Scene) -> Trajectory:
+    """A motion at the scene's output times and at many in every contact."""
+    run = simulate(scene)
+    spans = np.concatenate([contact_intervals(run, side) for side in (LEFT, RIGHT)]).tolist()
+    inside = [np.linspace(begin, end, IN_CONTACT) for begin, end in spans]
+    return simulate(scene, grid=np.unique(np.concatenate([run.t, *inside])))
+
+
+def style() -> dict[str, object]:
+    """Letters, lines, and text as paths: the same picture everywhere."""
+    return {
+        "font.size": 7.0, "axes.titlepad": 3.0, "axes.labelpad": 2.0, "axes.linewidth": 0.6, "lines.linewidth": 0.9,
+        "svg.fonttype": "path", "svg.hashsalt": "grasp",
+    }
+
+
+def sheet(several: Sequence[Pictured]) -> Drawing:
+    """All eleven in the layout of the paper: displacements above, inputs below."""
+    with plt.rc_context(style()):
+        figure: Drawing = plt.figure(figsize=(PAGE, 8.9), layout="constrained")
+        cells: Any = figure.subfigures(4, 3, wspace=0.02, hspace=0.02)
+        cells = cells.ravel()
+        for cell, each in zip(cells, several, strict=False):
+            top, bottom = cell.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+            plots.displacements(top, each.run)
+            plots.inputs(bottom, each.run)
+            for axes in (top, bottom):
+                shade_contacts(axes, each.run)
+                axes.grid(alpha=0.25)
+                axes.set_xlim(0.0, each.run.scene.duration)
+            top.set_title(
+                _math(f"Fig. {each.figure.number}  {each.figure.change or 'standard'}"), fontsize="small", loc="left"
+            )
+            top.set_ylabel("displacement, m")
+            bottom.set_ylabel("input, N")
+            bottom.set_xlabel("time, s")
+        for cell in cells[len(several) :]:
+            _key(cell.subplots())
+        return figure
+
+
+def _key(axes: Axes) -> None:
+    """The legend of the sheet, in the cell that is left."""
+    for label, color in (
+        ("$x_l$, $f_l$, left contact", LEFT_COLOR),
+        ("$x_o$", OBJECT_COLOR),
+        ("$x_r$, $f_r$, right contact", RIGHT_COLOR),
+    ):
+        axes.plot([], [], color=color, label=label)
+    axes.legend(loc="center", frameon=False)
+    axes.set_axis_off()
+
+
+def large(each: Pictured) -> Drawing:
+    """One case: the paper's two panels, and below them what it does not draw; one contact and the losses beside."""
+    with plt.rc_context(style()):
+        figure: Drawing = plt.figure(figsize=(PAGE, 6.9), layout="constrained")
+        halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
+        wide, narrow = halves
+        left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
+        for axes, (draw, label) in zip(left, plots.PANELS, strict=False):
+            if each.beside is not None:
+                _behind(axes, draw, each.beside)
+            draw(axes, each.run)
+            axes.set_ylabel(label)
+        _losses(left[4], each.run)
+        for axes in left:
+            shade_contacts(axes, each.run)
+            axes.grid(alpha=0.25)
+            axes.set_xlim(0.0, each.run.scene.duration)
+            legend_beside(axes)
+        left[-1].set_xlabel("time, s")
+        if each.beside is not None:
+            left[0].set_title("pale: No. 1 from the same start", fontsize="small", loc="right")
+        left[0].set_title(_math(each.figure.title), fontsize="medium", loc="left")
+        force, depth, bars = narrow.subplots(3, 1)
+        _one_contact((force, depth), each.run)
+        _bars(bars, each.run)
+        wide.align_ylabels(left)
+        return figure
+
+
+def _math(text: str) -> str:
+    """Letters with an index as formulas."""
+    return re.sub(r"\b([A-Za-z]+)_([lro])\b", r"$\1_\2$", text)
+
+
+def _behind(axes: Axes, draw: object, run: Trajectory) -> None:
+    """Draw another run pale and without labels."""
+    assert callable(draw)
+    before = len(axes.lines)
+    draw(axes, run)
+    for line in axes.lines[before:]:
+        line.set(alpha=PALE, linewidth=0.8, label="_")
+
+
+def _losses(axes: Axes, run: Trajectory) -> None:
+    """Energy lost so far by each cause, one above the other, in percent of V_c(0)."""
+    t, lost = running_losses(run)
+    whole = float(run.energy.V_c[0])
+    shown = [
+        (name, color, getattr(lost, name) / whole * 100.0) for name, color in CAUSES if getattr(lost, name)[-1] > 0.0
+    ]
+    if shown:
+        names, colors, values = zip(*shown, strict=True)
+        axes.stackplot(t, *values, labels=names, colors=colors, alpha=0.85, linewidth=0)
+    else:
+        axes.text(0.5, 0.5, "nothing is lost", ha="center", va="center", transform=axes.transAxes)
+    axes.set_ylim(0.0, 105.0)
+    axes.set_ylabel("lost, % of $V_c(0)$")
+
+
+def _one_contact(panels: Sequence[Axes], run: Trajectory) -> None:
+    """The contact with the fastest approach, from the dense output: force over time, and over the deformation."""
+    span = _hardest(run)
+    if span is None:
+        for axes in panels:
+            axes.set_axis_off()
+        return
+    margin = 0.15 * (span[1] - span[0])
+    grid = np.linspace(max(span[0] - margin, 0.0), min(span[1] + margin, run.scene.duration), CONTACT_POINTS)
+    fine = simulate(run.scene, grid=grid)
+    force, depth = impact_forces_of(fine), fine.state[:, [0, 2]] - fine.state[:, [2, 4]]
+    for side, _, color in plots.SIDES:
+        style = "-" if side == 0 else "--"  # of a symmetric case both are seen
+        panels[0].plot((fine.t - span[0]) * 1e3, force[:, side], color=color, linestyle=style)
+        pressed = depth[:, side] > 0.0
+        panels[1].plot(depth[pressed, side] * 1e3, force[pressed, side], color=color, linestyle=style)
+    panels[0].set_xlabel(f"ms after {span[0]:.3f} s")
+    panels[0].set_ylabel("impact force, N")
+    panels[0].set_title("one contact", fontsize="small")
+    panels[1].set_xlabel("deformation u, mm")
+    panels[1].set_ylabel("impact force, N")
+    for axes in panels:
+        axes.grid(alpha=0.25)
+
+
+def _hardest(run: Trajectory) -> tuple[float, float] | None:
+    """Begin and end of the contact, of either side, with the fastest approach."""
+    table = run.event_table[run.event_table[:, 2] == 0]
+    if not len(table):
+        return None
+    time, side = table[int(np.argmax(table[:, 4])), :2]
+    spans = contact_intervals(run, int(side))
+    begin, end = spans[int(np.argmin(np.abs(spans[:, 0] - time)))].tolist()
+    return begin, end
+
+
+def _bars(axes: Axes, run: Trajectory) -> None:
+    """What the energy was lost to, in percent of what was lost."""
+    lost = losses(run)
+    whole = float(lost.total) or 1.0
+    shown = [(name, color, 100.0 * float(getattr(lost, name)) / whole) for name, color in CAUSES]
+    shown = [each for each in shown if each[2] > 1e-6]
+    axes.set_title("% of what was lost", fontsize="small")
+    if not shown:
+        axes.text(0.5, 0.5, "nothing is lost", ha="center", va="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return
+    shown.reverse()
+    bars = axes.barh(
+        [name for name, _, _ in shown], [part for _, _, part in shown], color=[color for _, color, _ in shown]
+    )
+    axes.bar_label(bars, fmt="%.1f", padding=2, fontsize="small")
+    axes.set_xlim(0.0, 135.0)
+    axes.set_xticks([0, 50, 100])
+
+
+def close(drawing: Drawing) -> None:
+    """Forget a figure."""
+    plt.close(drawing)

@@ -1,0 +1,285 @@
+"""What is tested of one motion: rises and rates of V, enclosure of the object, convergence, periods, contacts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.energy import energy, pairs_of
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Transition
+from grasp_ros.physics.lyapunov import largest_deformation
+from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
+from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory, ensemble, simulate
+from grasp_ros.simulation.quantities import impact_forces_of
+from lab.paper.cases import Cases, Start, started, text_of
+from lab.paper.measures import MARGIN, measure, seconds, settlings
+from lab.paper.universal import Found
+
+ROUNDING = 1e-12  # of V(0)
+BESIDE = 1e-9  # s, on both sides of an event
+RETURN = 1e-3  # distance to the start, in the norm of V, that counts as a return; of sqrt(V(0))
+WHOLE = 20.0  # s
+LAST = 1.0  # s, through which a grip must press
+DRIFT = 1e-9  # of V_c or of a displacement, that counts as none
+EXACT = 1e-9  # s, an error of a time that counts as none
+ORDER = 0.1  # how much more than h^2 |u'' / u'| / 8 counts as of second order, since u'' is not constant
+ALONE = 400.0  # s
+SHARE = 1e-3  # of the clearance of (37) that rounding may take, in epsilon
+
+
+class Rates(NamedTuple):
+    """Extremes over one motion of 20 s."""
+
+    V_rise: float  # largest rise of the paper's V from one output time to the next, in V(0)
+    V_c_rise: float
+    rate: float  # largest V_rate by (18), in V(0) per s
+    flight: float  # largest |V_rate| with nothing in contact
+    contact: float  # largest V_rate with something in contact
+    clearance: float  # smallest margin of (37), in the larger epsilon
+    collision: float  # smallest of the collision terms of (18), W
+
+
+_RUNS: dict[str, Trajectory] = {}
+
+
+def run_of(scene: Scene) -> Trajectory:
+    """A motion over its horizon, with output times on both sides of every event; remembered."""
+    text = text_of(scene)
+    if text not in _RUNS:
+        events = simulate(scene, grid=np.array([0.0])).event_table[:, 0]
+        beside = np.concatenate([events - BESIDE, events + BESIDE])
+        inside = beside[(beside > 0.0) & (beside < scene.duration)]
+        _RUNS[text] = simulate(scene, grid=np.unique(np.concatenate([np.linspace(0.0, scene.duration, 4001), inside])))
+    return _RUNS[text]
+
+
+def rates(scene: Scene) -> Rates:
+    """The extremes of a motion."""
+    run = run_of(scene)
+    level = run.energy
+    start = float(level.V[0]) or 1.0
+    open_ = level.mode == int(Mode.NONE)
+    epsilon = largest_deformation(scene.system, run.state)[-1]
+    x_l, x_o, x_r = (run.state[:, COLUMN[body]] for body in (LEFT, OBJECT, RIGHT))
+    clearance = min(float((x_o - x_l + epsilon[LEFT]).min()), float((x_r + epsilon[RIGHT] - x_o).min()))
+    terms = [
+        2.0 * scene.system.pairs[side, Law.DISSIPATION] * hertzian_force(Contact(*scene.system.pairs[side]), u) * d * d
+        for side, u, d in pairs_of(scene.system, run.state)
+    ]
+    return Rates(
+        float(np.diff(level.V).max()) / start,
+        float(np.diff(level.V_c).max()) / start,
+        float(level.V_rate.max()) / start,
+        float(np.abs(level.V_rate[open_]).max(initial=0.0)) / start,
+        float(level.V_rate[~open_].max(initial=-np.inf)) / start,
+        clearance / max(float(epsilon.max()), 1e-300),
+        min(float(term.min()) for term in terms),
+    )
+
+
+def paper_V_falls(scene: Scene) -> Found:
+    """The paper's V never rises, across events too."""
+    rise = rates(scene).V_rise
+    return Found(rise, rise <= ROUNDING)
+
+
+def repaired_V_falls(scene: Scene) -> Found:
+    """V_c never rises."""
+    rise = rates(scene).V_c_rise
+    return Found(rise, rise <= ROUNDING)
+
+
+def rate_is_never_positive(scene: Scene) -> Found:
+    """V' of (18), (23), (31) to (34) is <= 0 in each condition of contact."""
+    rate = rates(scene).rate
+    return Found(rate, rate <= ROUNDING)
+
+
+def enclosed(scene: Scene) -> Found:
+    """(37): x_l - eps_l < x_o < x_r + eps_r; equality at the instant of the largest deformation."""
+    clearance = rates(scene).clearance
+    return Found(clearance, clearance >= -SHARE)
+
+
+def separates_slowly(scene: Scene) -> Found:
+    """No pair separates faster than 1/p while it penetrates: the smallest p u' where u > 0."""
+    system, run = scene.system, run_of(scene)
+    slowest = [
+        float((system.pairs[side, Law.DISSIPATION] * d)[u > 0.0].min(initial=0.0))
+        for side, u, d in pairs_of(system, run.state)
+    ]
+    return Found(min(slowest), min(slowest) > -1.0)
+
+
+def collision_term_lowers(scene: Scene) -> Found:
+    """The collision terms of (18) are never negative."""
+    term = rates(scene).collision
+    return Found(term, term >= 0.0)
+
+
+def falls_only_in_contact(scene: Scene) -> Found:
+    """V' is 0 without contact and V falls in contact."""
+    found = rates(scene)
+    level = run_of(scene).energy.V_c
+    lost = float(1.0 - level[-1] / level[0])
+    return Found(lost, found.flight == 0.0 and lost > 0.01)
+
+
+def converges(scene: Scene) -> Found:
+    """All masses settle, within the time that is looked at."""
+    time = measure(scene).settling
+    return Found(time, bool(np.isfinite(time)), f"{float(f'{time:.2g}'):g} s" if np.isfinite(time) else "never")
+
+
+def converges_wherever(scene: Scene) -> Found:
+    """The same from starts that cannot be told apart, and the range of their times."""
+    times = settlings(scene)
+    return Found(max(times), bool(np.isfinite(times).all()), seconds(times))
+
+
+def keeps_V(scene: Scene) -> Found:
+    """Neither grows nor decays: V_c stays what it is."""
+    level = run_of(scene).energy.V_c
+    drift = float(np.abs(level / level[0] - 1.0).max())
+    return Found(drift, drift <= DRIFT)
+
+
+def state_weights(system: System) -> Array:
+    """Square roots of K, m, K, m_o, K, m: the norm of a state is then sqrt(V) without contacts; the object by K_l."""
+    m, K = system.bodies[:, Of.MASS], system.closed_loop[:, Of.STIFFNESS]
+    return np.asarray(np.sqrt(np.array([K[LEFT], m[LEFT], K[LEFT], m[OBJECT], K[RIGHT], m[RIGHT]])))
+
+
+def distance_of_states(scene: Scene, a: Array, b: Array) -> Array:
+    """Distance of states (..., 6) in the norm of `state_weights`."""
+    return np.asarray(np.linalg.norm((np.asarray(a) - b) * state_weights(scene.system), axis=-1))
+
+
+def nearest_return(scene: Scene, seconds: float, step: float = 1e-3) -> tuple[float, float]:
+    """When a motion comes back nearest to its start, in s, and how near, in sqrt(V(0)).
+
+    The first swing away from the start does not count: it ends where the distance is largest within the first second.
+    """
+    scene = scene.changed({"time.duration_s": seconds})
+    grid = np.linspace(0.0, seconds, round(seconds / step) + 1)
+    states = simulate(scene, grid=grid).state
+    start = scene.initial_state
+    distance = distance_of_states(scene, states, start)
+    away = int(np.argmax(distance[: round(1.0 / step)]))
+    best = away + int(np.argmin(distance[away:]))
+    fine = np.linspace(max(grid[best] - step, 0.0), min(grid[best] + step, seconds), 2001)
+    close = distance_of_states(scene, simulate(scene, grid=fine).state, start)
+    level = float(np.sqrt(energy(scene.system, start).V_c))
+    return float(fine[int(np.argmin(close))]), float(close.min()) / level
+
+
+def returns(scene: Scene) -> Found:
+    """A periodic motion comes back to its start within the paper's 20 s."""
+    _, near = nearest_return(scene, WHOLE)
+    return Found(near, near <= RETURN)
+
+
+def holds_on(scene: Scene) -> Found:
+    """A grasp in the sense of a grip: both arms press the object all through the last second, N."""
+    run = run_of(scene)
+    force = float(impact_forces_of(run)[run.t >= scene.duration - LAST].min())
+    return Found(force, force > 0.0)
+
+
+def object_stays(scene: Scene) -> Found:
+    """An object at rest off its origin stays where it is: how far it has moved after 20 s, in its displacement."""
+    offset = 0.5 * min(abs(scene.initial_state[0]), scene.initial_state[4])
+    run = run_of(scene.changed({"object.position_m": float(offset)}))
+    moved = float(np.abs(run.state[:, 2] - offset).max()) / float(offset)
+    return Found(moved, moved <= DRIFT)
+
+
+def object_rests_until_touched(scene: Scene) -> Found:
+    """The same up to the first touch."""
+    offset = 0.5 * min(abs(scene.initial_state[0]), scene.initial_state[4])
+    run = run_of(scene.changed({"object.position_m": float(offset)}))
+    touches = run.event_table[run.event_table[:, 2] == Transition.TOUCH, 0]
+    before = run.t < (touches[0] if len(touches) else np.inf)
+    moved = float(np.abs(run.state[before, 2] - offset).max()) / float(offset)
+    return Found(moved, moved == 0.0)
+
+
+def first_contact_error(step: float, scene: Scene) -> Found:
+    """Error of the paper's interpolated time of the first contact, in s."""
+    error = abs(_first(_theirs(scene, step))[0] - _first(simulate(scene, grid=np.array([0.0])))[0])
+    return Found(error, error <= EXACT)
+
+
+def second_order(step: float, scene: Scene) -> Found:
+    """The same error over that of linear interpolation, at most |u'' / u'| h^2 / 8, with u'' before the touch."""
+    time, side, speed = _first(simulate(scene, grid=np.array([0.0])))
+    half = 0.5 * min(step, time)
+    before = simulate(scene, grid=time - half * np.array([2.0, 1.0, 0.0])).state
+    u = (before[:, 0] - before[:, 2]) if side == LEFT else (before[:, 2] - before[:, 4])
+    curved = float(u @ [1.0, -2.0, 1.0]) / half**2
+    allowed = abs(curved / speed) * step**2 / 8.0 + EXACT
+    share = abs(_first(_theirs(scene, step))[0] - time) / allowed
+    return Found(share, share <= 1.0 + ORDER)
+
+
+def _theirs(scene: Scene, step: float) -> Trajectory:
+    """The paper's method, output at both ends."""
+    return simulate(scene, grid=np.array([0.0, scene.duration]), method="paper", setting=step)
+
+
+def _first(run: Trajectory) -> tuple[float, float, float]:
+    """Time, side and u' of the first touch."""
+    table = run.event_table
+    time, side, _, _, speed = table[table[:, 2] == Transition.TOUCH][0, :5].tolist()
+    return time, side, speed
+
+
+def touches(run: Trajectory) -> int:
+    """Touches of both sides."""
+    return int(np.count_nonzero(run.event_table[:, 2] == Transition.TOUCH))
+
+
+def contacts_found(step: float, scene: Scene) -> float:
+    """Touches that the paper's method finds, over those that there are; on another path it can be more."""
+    return touches(_theirs(scene, step)) / max(touches(simulate(scene, grid=np.array([0.0, scene.duration]))), 1)
+
+
+def none_missed(step: float, scene: Scene) -> Found:
+    """The paper's method finds no fewer touches than there are."""
+    share = contacts_found(step, scene)
+    return Found(share, share >= 1.0)
+
+
+def goes_on(step: float, scene: Scene) -> Found:
+    """The paper's method reaches its end, however many touches come; their number."""
+    run = _theirs(scene, step)
+    return Found(touches(run), run.status is Status.DONE and touches(run) > 0)
+
+
+def without_object(scene: Scene) -> Scene:
+    """The arms alone: nothing to collide with."""
+    kept = {
+        name: numbers
+        for name, numbers in scene.values.items()
+        if name not in ("object", "left_contact", "right_contact")
+    }
+    return scenes.compose(scene.name, kept)
+
+
+def alone_settling(scene: Scene) -> float:
+    """Settling time of the arms without an object, in s, from their closed form; infinite: not within ALONE."""
+    apart = without_object(scene.changed({"time.duration_s": ALONE}))
+    return float(ensemble(apart, {}, ("settling_time",), threads=1).columns["settling_time"][0])
+
+
+def collisions_help(cases: Cases, number: int, start: Start) -> Found:
+    """Settling time with the object over that of the arms alone."""
+    scene = started(cases[number], start)
+    together, alone = measure(scene).settling, alone_settling(scene)
+    share = together / alone if np.isfinite(alone) else (0.0 if np.isfinite(together) else 1.0)
+    return Found(share, share < 1.0 / MARGIN)

@@ -1,0 +1,172 @@
+"""The page: one HTML file with everything in it, and the same content as Markdown with figures beside it."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import jinja2
+from markupsafe import Markup
+
+from grasp_ros.scene.files import writing
+from lab.paper.claims import Claim, Verdict
+from lab.paper.results import Result
+from lab.paper.sample import Equation
+from lab.studies.document import write
+
+Row = tuple[str, ...]
+FIGURES = "paper"  # directory of the figures beside the Markdown page
+PATH = re.compile(rb'\bd="[^"]*"')
+ROUNDED = re.compile(rb"(\d+\.\d\d)\d+")
+
+
+class Picture(NamedTuple):
+    """What stands at a figure of the paper."""
+
+    number: int
+    title: str
+    caption: str
+    readings: Sequence[str]
+
+
+class Image(NamedTuple):
+    """A figure in both forms."""
+
+    svg: bytes
+    png: bytes
+
+
+class Report(NamedTuple):
+    """Everything that the page says."""
+
+    title: str
+    subtitle: str
+    definitions: Sequence[tuple[str, str]]
+    summary: str
+    claims: Sequence[Claim]
+    sweeps: str
+    pictures: Sequence[Picture]
+    quantity_heads: Row
+    quantities: Sequence[Row]
+    agreement: str
+    equations: Sequence[Equation]
+    results: Sequence[Result]
+    doubts: Sequence[tuple[str, str]]
+    replays: Sequence[dict[str, Any]]
+    graph_heads: Row
+    graph: Sequence[Row]
+    origin: str
+    images: Mapping[str, Image]
+
+
+def template(name: str) -> str:
+    """The text of a file of the templates."""
+    return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def claim(path: Path) -> None:
+    """Make sure, before the work, that a page can be written to where it is to go.
+
+    Raises
+    ------
+    Refused
+        If it cannot.
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        there = path.exists()
+        path.open("a", encoding="utf-8").close()
+        if not there:
+            path.unlink()
+
+
+def write_html(report: Report, path: Path) -> None:
+    """Write the page into one file that needs nothing else.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written.
+    """
+    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False)
+    page = environment.from_string(template("page.html"))
+    runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
+    claim(path)
+    write(
+        path,
+        page.render(
+            report=report,
+            css=Markup(template("page.css")),
+            js=Markup(template("replay.js")),
+            runs=Markup(runs),
+            model=_figure(template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
+            figure=lambda key, text: _figure(report.images[key].svg, text),
+        ),
+    )
+
+
+def write_markdown(report: Report, path: Path) -> None:
+    """Write the page as Markdown, and its figures into a directory beside it.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written.
+    """
+    environment = jinja2.Environment(autoescape=False, undefined=jinja2.StrictUndefined)
+    environment.filters |= {"cell": _cell, "row": _row, "rule": _rule}
+    directory = path.parent / FIGURES
+    with writing(directory):
+        directory.mkdir(parents=True, exist_ok=True)
+        for key, image in report.images.items():
+            (directory / f"{key}.png").write_bytes(image.png)
+        (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
+    text = environment.from_string(template("paper.md")).render(report=report)
+    write(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
+
+
+def short_svg(svg: bytes) -> bytes:
+    """An SVG file whose paths have two decimals, which are a hundredth of a point."""
+    return PATH.sub(lambda found: ROUNDED.sub(rb"\1", found[0]), svg)
+
+
+def summary(claims: Sequence[Claim]) -> str:
+    """How many statements hold."""
+    counted = [
+        sum(claim.verdict is verdict for claim in claims) for verdict in (Verdict.HOLDS, Verdict.LIMITED, Verdict.FAILS)
+    ]
+    return (
+        f"Of {len(claims)} statements {counted[0]} hold, {counted[1]} hold within stated limits, and {counted[2]} do"
+        " not hold. A statement holds as far as its weakest part does; the parts and their checks stand below."
+    )
+
+
+def agreement(rows: Sequence[Equation]) -> str:
+    """How many equations agree."""
+    numbers = {row.number for row in rows}
+    return (
+        f"{len(numbers)} equations in {len(rows)} rows; {sum(row.agrees for row in rows)} of them agree. Where a motion"
+        " is differentiated, the differences are of order 8 over the dense output of all eleven cases."
+    )
+
+
+def _figure(svg: bytes, text: str) -> Markup:
+    data = base64.b64encode(svg).decode("ascii")
+    return Markup('<figure><img alt="{}" src="data:image/svg+xml;base64,{}"></figure>').format(text, data)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(map(_cell, cells))} |"
+
+
+def _rule(cells: Sequence[str]) -> str:
+    return f"|{'---|' * len(cells)}"

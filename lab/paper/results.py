@@ -1,0 +1,277 @@
+"""What the paper lacks, and what is doubtful in it, in sentences and tables whose numbers are computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.system import NAMES
+from lab.paper.arms import STEPS, Damped, Stepped, Stiffer
+from lab.paper.beyond import SMALL, WITHIN, Chaos, Gap, Tail
+from lab.paper.cases import PRINTED, SYMMETRIC, Start
+from lab.paper.knife_edge import MOVED, SMALLEST, VISIBLE, Edge
+from lab.paper.measures import MARGIN
+
+Row = tuple[str, ...]
+
+
+class Result(NamedTuple):
+    """One thing that the page says beyond the paper."""
+
+    key: str  # of its figure
+    title: str
+    text: str
+    heads: Row
+    rows: Sequence[Row]
+
+
+class Beyond(NamedTuple):
+    """What was computed for it."""
+
+    gap: Gap
+    tail: Tail
+    chaos: Chaos
+    stiffer: Sequence[Stiffer]
+    damped: Sequence[Damped]
+    stepped: Sequence[Stepped]
+    edge: Sequence[Edge]
+
+
+def results(found: Beyond) -> list[Result]:
+    """All of them."""
+    return [
+        _gap(found.gap),
+        _tail(found.tail),
+        _chaos(found.chaos),
+        _stiffer(found.stiffer),
+        _damped(found.damped),
+        _stepped(found.stepped),
+        _edge(found.edge),
+    ]
+
+
+def _gap(found: Gap) -> Result:
+    unsafe = [str(number) for number, p, safe in found.safe if p >= safe]
+    text = (
+        "The proof shows that V falls within each condition of contact, and not that it does so between them. A pair"
+        " that separates faster than 1/p while it penetrates is noncontact by (10): its Hertz term leaves V, and comes"
+        f" back where u' rises through -1/p. V then jumps up: {len(found.jumps)} times in the two motions of the"
+        f" table. V_c, which keeps the term"
+        f" whenever u > 0, never rises here (largest step {found.V_c_rise:.1e} V_c(0)), and docs/certificate.md proves"
+        " that it cannot. Where p is below sqrt(mu / V_c(0)) no pair can separate so fast and the printed proof is"
+        f" complete; that covers all of the paper's cases but No. {', '.join(unsafe) or 'none'}. What happens in"
+        f" those is"
+        " measured under C1."
+    )
+    rows = [
+        (name, f"{jump.time:.6f}", NAMES[jump.side], f"{1e3 * jump.u:.4f}", f"{jump.height:.6f}")
+        for name, jump in found.jumps
+    ]
+    return Result(
+        "gap",
+        "The gap in the proof, and its repair",
+        text,
+        ("scene", "t, s", "side", "u, mm", "V jumps up by, J"),
+        rows,
+    )
+
+
+def _tail(found: Tail) -> Result:
+    text = (
+        "At the origin a contact has no linear stiffness, so that with C > 0 the end is algebraic and not exponential,"
+        " but for a start that is symmetric to the last bit: there the object rests, V_c falls exponentially (No. 8),"
+        " and"
+        f" the contacts are those of each arm with a wall. V_c tends to (4/5) H (kappa t)^(-5/2), here with kappa ="
+        f" {found.kappa:.6g} /(m s), from the"
+        f" damping C, the stiffness K, H and m_o alone. No. 1 has V_c / law = {found.constant:.4f} after"
+        f" {found.t[-1]:g} s, falls like t^{found.slope:.3f} over the last decade, and has touched"
+        f" {found.contacts[-1]:.0f} times by then, like t^{found.touches_slope:.3f} (the law: t^0.75). The contacts"
+        " go on for ever. Where C = 0 kappa is 0, and the law says nothing of No. 3."
+    )
+    rows = [
+        (f"{t:.3g}", f"{V:.3e}", f"{V / law:.4f}", f"{n:.0f}")
+        for t, V, law, n in zip(found.t, found.V_c, found.law, found.contacts, strict=True)
+    ]
+    decades = [int(np.argmin(np.abs(found.t - 10.0**power))) for power in range(2, 6)]
+    return Result(
+        "tail",
+        "The end is algebraic",
+        text,
+        ("t, s", "V_c, J", "V_c / law", "touches"),
+        [rows[place] for place in dict.fromkeys(decades)],
+    )
+
+
+def _chaos(found: Chaos) -> Result:
+    text = (
+        "Without any loss the motion neither grows nor decays, but it does not repeat either: two motions that begin"
+        f" {SMALL:g} sqrt(V(0)) apart are {found.far:.2g} sqrt(V(0)) apart after {found.apart[0][-1]:g} s. The largest"
+        f" Lyapunov exponent is {found.exponent:.3f} +- {found.error:.3f} /s over {found.t[-1]:g} s (standard error of"
+        f" ten blocks), a factor of {np.exp(20.0 * found.exponent):.1e} in the 20 s of Fig. 3. In {found.seconds:g} s"
+        f" the motion comes back to its start no nearer than some {found.near:.2g} sqrt(V(0)); after"
+        f" {-np.log(np.spacing(1.0)) / found.exponent:.0f} s or so what is computed is one of the motions that begin"
+        " within rounding of this one."
+        " From a start that is symmetric to the last bit the object rests and the arms are periodic: the return is"
+        f" within {found.periodic:.1e}, and the exponent of offsets that keep the symmetry tends to 0"
+        f" ({found.symmetric:.3f} /s). Any other offset leaves that motion faster still, at {found.across:.2f} /s."
+    )
+    rows = [
+        (
+            _at(PRINTED),
+            f"{found.exponent:.3f} +- {found.error:.3f}",
+            f"{found.near:.2g}",
+            f"{found.near_time:.0f}",
+        ),
+        (
+            f"{_at(SYMMETRIC)}, within symmetry",
+            f"{found.symmetric:.3f}",
+            f"{found.periodic:.1e}",
+            f"{found.periodic_time:.1f}",
+        ),
+        (f"{_at(SYMMETRIC)}, across it", f"{found.across:.3f}", "", f"over {WITHIN:g}"),
+    ]
+    return Result(
+        "chaos",
+        "No. 2 is chaos, not a periodic motion",
+        text,
+        ("start", "Lyapunov exponent, 1/s", "nearest return, sqrt(V(0))", "at, s"),
+        rows,
+    )
+
+
+def _at(start: Start) -> str:
+    return f"x_l(0) = {start.x_l:g}, x_r(0) = {start.x_r:g} m"
+
+
+def _edge(rows: Sequence[Edge]) -> Result:
+    grown = [row for row in rows if np.isfinite(row.visible)]
+    robust = [row for row in rows if row not in grown]
+    named = {row.case: row for row in rows}
+    text = (
+        "Figs. 6, 8 and 9 begin symmetrically. With equal arms the object then rests, to the last bit, and what the"
+        f" figures show is one arm against a wall. An offset of {SMALLEST:g} m of one arm, which no experiment can"
+        f" avoid, exceeds {1e3 * VISIBLE:g} mm after {min(row.visible for row in grown):.1f} to"
+        f" {max(row.visible for row in grown):.1f} s in No. {', '.join(str(row.case) for row in grown)}: every touch"
+        " that comes a little early pushes the object, which then meets the other arm earlier still. Only No."
+        f" {', '.join(str(row.case) for row in robust)} forgets it, because its dampers act faster. So the settling"
+        f" times of the symmetric start belong to a motion that nobody will see: No. 5 needs"
+        f" {named[5].settling[0]:.1f} s there and {named[5].settling[1]:.0f} s from {MOVED[1]:g} m beside it, No. 7"
+        f" {named[7].settling[0]:.1f} and, from {MOVED[-1]:g} m, {named[7].settling[-1]:.1f} s. The same holds for the"
+        " period of No. 2."
+    )
+    table = [
+        (
+            f"No. {row.case}",
+            f"{row.rest:g}",
+            f"{row.visible:.2f}" if np.isfinite(row.visible) else f"not in {row.t[-1]:g}",
+            f"{row.rate:.2f}" if np.isfinite(row.rate) else "",
+            *("never" if np.isinf(time) else f"{time:.2f}" for time in row.settling),
+        )
+        for row in rows
+    ]
+    heads = (
+        f"case, from {SYMMETRIC.x_l:g}, {SYMMETRIC.x_r:g} m", "asymmetry without offset, m", f"{1e3 * VISIBLE:g} mm"
+        f" after, s", "mean growth, 1/s",
+        *(f"settled, {offset:g} m beside, s" for offset in MOVED),
+    )
+    return Result("edge", "A symmetric start is a knife-edge", text, heads, table)
+
+
+def _stiffer(rows: Sequence[Stiffer]) -> Result:
+    standard = next(row for row in rows if row.k == 10.0)
+    printed = next(row for row in rows if row.k == 100.0)
+    best, last = min(rows, key=lambda row: row.settling), rows[-1]
+    flat = [row.k for row in rows if row.settling < MARGIN * best.settling]
+    text = (
+        f"Medians over the first {standard.starts} random starts. Ten times the stiffness changes the settling time"
+        f" from"
+        f" {standard.settling:.1f} to"
+        f" {printed.settling:.1f} s. The arms alone do not care ({standard.alone:.1f} and {printed.alone:.1f} s: the"
+        " envelope exp(-C t / 2m) does not know k). With the object a stiffer arm comes back sooner"
+        f" ({standard.rate:.2f} and {printed.rate:.2f} touches a second), meets it faster ({standard.speed:.2f} and"
+        f" {printed.speed:.2f} m/s) and so loses more to impacts ({standard.share:.0%} and {printed.share:.0%} of the"
+        " lost energy), since 1 - e = (2/3) p v to first order. It has an end: from k ="
+        f" {min(flat):g} to {max(flat):g} N/m the settling time is the same to 5 %, and at {last.k:g} N/m it is"
+        f" {last.settling:.1f} s, because an arm that hardly gives way takes"
+        " little from the object (kappa of the tail falls with 1/K^2). Other numbers of starts (O6) give ratios that"
+        " differ by some hundredths."
+    )
+    table = [
+        (
+            f"{row.k:g}",
+            f"{row.settling:.2f}",
+            f"{row.alone:.2f}",
+            f"{row.rate:.2f}",
+            f"{row.speed:.3f}",
+            f"{row.share:.1%}",
+        )
+        for row in rows
+    ]
+    return Result(
+        "stiffer",
+        "Stiffer arms settle sooner, up to a point",
+        text,
+        ("k, N/m", "settling time, s", "arms alone, s", "touches per s", "speed of approach, m/s", "lost to impacts"),
+        table,
+    )
+
+
+def _damped(rows: Sequence[Damped]) -> Result:
+    without = rows[0]
+    later = [row for row in rows if row.C > 0.0 and row.later > 0.5]
+    text = (
+        f"Medians over the first {without.starts} random starts. Where the arms have no damper, impacts are all that"
+        f" stops them: some {float(f'{without.together:.2g}'):g} s with the object, never without. Where they have"
+        f" dampers it is the other way round: from C = {min(row.C for row in later):g} N"
+        " s/m on, in most of the random starts the arms settle later with the object between them than alone, because"
+        " the object has no damper, takes energy over and gives it back. That the term of (18) is negative compares V'"
+        " at one state, not two motions."
+    )
+    table = [
+        (f"{row.C:g}", f"{row.together:.3g}", f"{row.alone:.3g}", f"{row.together / row.alone:.2f}", f"{row.later:.0%}")
+        if np.isfinite(row.alone)
+        else (f"{row.C:g}", f"{float(f'{row.together:.2g}'):g}", "never", "", f"{row.later:.0%}")
+        for row in rows
+    ]
+    return Result(
+        "damped",
+        "Collisions slow arms that are damped",
+        text,
+        ("C, N s/m", "with the object, s", "alone, s", "ratio", "starts with the object later"),
+        table,
+    )
+
+
+def _stepped(rows: Sequence[Stepped]) -> Result:
+    fine, coarse = ([row for row in rows if row.step == step] for step in STEPS)
+    elastic = {row.step: row for row in rows if row.case == 2}
+    text = (
+        "The paper does not print its step. Its method (Runge-Kutta, contact decided at the ends of a step, time and"
+        f" state by linear interpolation) at 1 ms is off by up to {max(row.error for row in fine):.2g} m within 20 s,"
+        f" at 10 ms by up to {max(row.error for row in coarse):.2g} m. In No. 2, where V_c is constant, it loses"
+        f" {-elastic[STEPS[0]].drift:.1%} of it at 1 ms and {-elastic[STEPS[1]].drift:.0%} at 10 ms: a figure drawn"
+        f" that way"
+        f" shows a decay that is not there. It finds between {min(row.touches for row in rows):.0%} and"
+        f" {max(row.touches for row in rows):.0%} of the touches; more than there are, where it is on another path by"
+        f" then."
+    )
+    table = [
+        (
+            str(row.case),
+            f"{1e3 * row.step:g}",
+            f"{row.error:.2g}",
+            f"{row.drift:+.2g}",
+            f"{row.touches:.0%}",
+            f"{row.first:.1e}",
+        )
+        for row in rows
+    ]
+    return Result(
+        "stepped",
+        "What the paper's own method does to its figures",
+        text,
+        ("No.", "step, ms", "largest error, m", "V_c at 20 s off by, V_c(0)", "touches found", "first touch off by, s"),
+        table,
+    )

@@ -1,0 +1,232 @@
+"""`python -m lab paper`: everything computed in several processes, and put together into one report."""
+
+from __future__ import annotations
+
+import io
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import PIL.Image
+from tqdm import tqdm
+
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.scene import Scene
+from grasp_ros.scene.versions import versions
+from grasp_ros.simulation import simulate
+from lab.paper import arms, beyond, beyond_figures, figures
+from lab.paper.cases import (
+    FIGURES,
+    SYMMETRIC,
+    UNIT_OF,
+    Cases,
+    Figure,
+    Start,
+    load_cases,
+    random_starts,
+    started,
+    value_of,
+)
+from lab.paper.compare import Comparison, Variant
+from lab.paper.definitions import SUBTITLE, SWEEPS, TITLE, definitions
+from lab.paper.doubts import doubts
+from lab.paper.equations import equations
+from lab.paper.judgement import Wanted, judged, measured, statements, tasks, wanted_of
+from lab.paper.knife_edge import knife_edge
+from lab.paper.measures import SHORT, Measures, remember
+from lab.paper.page import Image, Picture, Report, agreement, short_svg, summary
+from lab.paper.quantities import quantities
+from lab.paper.replay import replay
+from lab.paper.results import Beyond, results
+from lab.paper.ros import HEADS, through_the_graph
+
+DPI = 220
+COLORS = 256  # of a PNG file
+CHUNK = 8  # scenes that a process measures before it reports
+Job = tuple[str, Callable[..., Any], tuple[Any, ...]]
+
+
+def report(graph: bool, starts: int) -> Report:
+    """Compute everything.
+
+    Parameters
+    ----------
+    graph : bool
+        Whether to run the eleven cases through the graph as well.
+    starts : int
+        Random starts.
+    """
+    cases, drawn = load_cases(), random_starts(starts)
+    asked = wanted_of(cases, drawn, statements())
+    wanted = list({key: wish for own in asked.values() for key, wish in own.items()}.values())
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(os.cpu_count() or 1) as pool, tqdm(
+        total=len(wanted), desc="random starts and sweeps", file=sys.stderr
+    ) as bar:
+        known: dict[Wanted, Measures] = {}
+        for each, found in pool.imap_unordered(measured, wanted, CHUNK):
+            known[each] = found
+            bar.update()
+        remember(known)
+        jobs = [*_jobs(cases, drawn), *(("claim", judged, (task,)) for task in tasks(cases, drawn, asked, known))]
+        bar.reset(len(jobs))
+        bar.set_description("figures, verdicts, what the paper lacks")
+        done: dict[str, list[Any]] = {}
+        for key, value in pool.imap_unordered(_called, jobs):
+            done.setdefault(key, []).append(value)
+            bar.update()
+    rows = through_the_graph(cases) if graph else []
+    return _put_together(cases, drawn, done, rows)
+
+
+def _called(job: Job) -> tuple[str, Any]:
+    key, function, arguments = job
+    return key, function(*arguments)
+
+
+def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
+    """What can be computed at the same time, the longest first."""
+    return [
+        ("found", _chaos, (cases,)),
+        ("found", _stiffer, (cases, drawn)),
+        ("found", _damped, (cases, drawn)),
+        ("image", _sheet, (cases,)),
+        ("equations", equations, (cases,)),
+        *(("image", _large, (figure, cases)) for figure in FIGURES),
+        ("found", _gap, (cases,)),
+        ("found", _tail, (cases,)),
+        ("found", _stepped, (cases,)),
+        ("found", _edge, (cases,)),
+        ("quantities", quantities, (cases,)),
+        ("doubts", doubts, (cases,)),
+        ("replays", _replays, (cases,)),
+    ]
+
+
+def image(drawing: Any) -> Image:
+    """A figure as SVG and as PNG."""
+    files = []
+    for kind in ("svg", "png"):
+        file = io.BytesIO()
+        metadata = {"Date": None} if kind == "svg" else {"Software": None}
+        drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
+        files.append(file)
+    figures.close(drawing)
+    return Image(short_svg(files[0].getvalue()), _few_colors(files[1]))
+
+
+def _few_colors(png: io.BytesIO) -> bytes:
+    """A PNG file with a palette, which is a third as large."""
+    small = io.BytesIO()
+    with PIL.Image.open(png) as picture:
+        few = picture.convert("RGB").quantize(COLORS, PIL.Image.Quantize.FASTOCTREE, dither=PIL.Image.Dither.NONE)
+        few.save(small, format="png", optimize=True)
+    return small.getvalue()
+
+
+def _sheet(cases: Cases) -> tuple[str, Image]:
+    return "sheet", image(figures.sheet([figures.pictured(figure, cases) for figure in FIGURES]))
+
+
+def _large(figure: Figure, cases: Cases) -> tuple[str, Image]:
+    return f"fig_{figure.number:02d}", image(figures.large(figures.pictured(figure, cases)))
+
+
+def _chaos(cases: Cases) -> tuple[str, Any, Image]:
+    found = beyond.chaos(cases, started(cases[2], SYMMETRIC))
+    return "chaos", found, image(beyond_figures.chaos(found))
+
+
+def _gap(cases: Cases) -> tuple[str, Any, Image]:
+    found = beyond.gap(cases)
+    return "gap", found, image(beyond_figures.gap(found))
+
+
+def _tail(cases: Cases) -> tuple[str, Any, Image]:
+    found = beyond.tail(cases[1])
+    return "tail", found, image(beyond_figures.tail(found))
+
+
+def _stiffer(cases: Cases, drawn: list[Start]) -> tuple[str, Any, Image]:
+    found = arms.stiffer(cases, drawn)
+    return "stiffer", found, image(beyond_figures.stiffer(found))
+
+
+def _damped(cases: Cases, drawn: list[Start]) -> tuple[str, Any, Image]:
+    found = arms.damped(cases, drawn)
+    return "damped", found, image(beyond_figures.damped(found))
+
+
+def _stepped(cases: Cases) -> tuple[str, Any, Image]:
+    return "stepped", arms.stepped(cases), image(beyond_figures.stepped(cases))
+
+
+def _edge(cases: Cases) -> tuple[str, Any, Image]:
+    found = knife_edge(cases)
+    return "edge", found, image(beyond_figures.edge(found))
+
+
+def _replays(cases: Cases) -> list[dict[str, Any]]:
+    return [replay(figure, cases[figure.case]) for figure in FIGURES]
+
+
+def picture(figure: Figure, scene: Scene) -> Picture:
+    """Caption of a figure: parameters, start, touches; and the readings of its scene."""
+    run = simulate(scene)
+    left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
+    values = ", ".join(f"{letter} = {value_of(scene, letter):g}" for letter in ("k", "c", "Kp", "Kv", "p", "H", "m_o"))
+    masses = f"m_l = {value_of(scene, 'm_l'):g}, m_r = {scene.values['right_arm']['mass_kg']:g}"
+    x_l, _, x_o, _, x_r, _ = scene.initial_state.tolist()
+    caption = (
+        f"{masses}, {values} (SI units, both sides). At rest from x_l = {x_l:g}, x_o = {x_o:g}, x_r = {x_r:g} m. {left}"
+        f" touches on the left, {right} on the right. Below the paper's two panels: impact forces,"
+        f" V_c{'' if _same_V(run) else ' and V, where they differ'}, and the energy lost so far by cause; beside them"
+        " the contact with the fastest approach, from the dense output."
+    )
+    return Picture(
+        figure.number, figure.title, caption, [each for each in scene.readings if "control period" not in each]
+    )
+
+
+def _same_V(run: Any) -> bool:
+    return bool((run.energy.V_c == run.energy.V).all())
+
+
+def _curves(cases: Cases, drawn: list[Start]) -> list[beyond_figures.Curve]:
+    found: list[beyond_figures.Curve] = []
+    seen: set[tuple[str, str, Variant]] = set()
+    for key, statement in statements().items():
+        for part in statement.parts:
+            known = isinstance(part, Comparison) and (part.letter, part.measure, part.other) in seen
+            if isinstance(part, Comparison) and part.values and key.startswith("O") and not known:
+                seen.add((part.letter, part.measure, part.other))
+                value = value_of(part.changed.scene(cases), part.letter)
+                label = f"{part.letter}, {UNIT_OF[part.letter[:2].rstrip('_')]}"
+                curve = part.curve(cases, drawn)
+                found.append(
+                    beyond_figures.Curve(f"{key} {part.changed}", label, SHORT[part.measure], value, part.higher, curve)
+                )
+    return found
+
+
+def _put_together(
+    cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]], graph: list[Any]
+) -> Report:
+    order = list(statements())
+    claims = sorted(done["claim"], key=lambda claim: order.index(claim.key))
+    found = {key: value for key, value, _ in done["found"]}
+    images = {**dict(done["image"]), **{key: each for key, _, each in done["found"]}}
+    images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, drawn)))
+    [rows], [heads_and_rows], [doubtful], [replays] = (
+        done[key] for key in ("equations", "quantities", "doubts", "replays")
+    )
+    heads, amounts = heads_and_rows
+    return Report(
+        title=TITLE, subtitle=SUBTITLE, definitions=definitions(len(drawn)), summary=summary(claims), claims=claims,
+        sweeps=SWEEPS, pictures=[picture(figure, cases[figure.case]) for figure in FIGURES], quantity_heads=heads,
+        quantities=amounts, agreement=agreement(rows), equations=rows, results=results(Beyond(**found)),
+        doubts=doubtful, replays=replays, graph_heads=HEADS, graph=graph, images=images,
+        origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
+    )

@@ -1,0 +1,1 @@
+"""Measurements that a reader can repeat, and the pages that they write."""

@@ -1,0 +1,144 @@
+"""What accuracy costs in time: every method at every setting on every scene, against the reference.
+
+The study resumes where it stopped: what is in the journal and was measured on this machine, with these versions and
+these sources, is not measured again.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from tqdm import tqdm
+
+from grasp_ros import scene as scenes
+from grasp_ros import simulation
+from grasp_ros.methods import registry
+from grasp_ros.scene import Scene
+from lab.studies import measure
+from lab.studies.contenders import OURS, all_contenders
+from lab.studies.measure import Effort
+from lab.studies.peers import Contender
+from lab.studies.records import Journal, Record, describe_machine, metric, origin, scene_key, write_csv
+
+STANDARD = ("case_01", "case_02", "case_03", "case_04")
+STIFF = ("case_01", 1e8)  # ten thousand times the paper's Hertz coefficient
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-11)
+METRIC = metric(simulation.GRID_POINTS, measure.DIGITS)
+
+
+def default_scenes() -> list[Scene]:
+    """Cases 1 to 4 of the paper, and case 1 with a contact that is stiffer by 1e4."""
+    name, hertzian = STIFF
+    stiff = scenes.load(name, [f"{side}_contact.hertz_N_per_m1_5={hertzian}" for side in ("left", "right")])
+    renamed = scenes.compose(
+        f"{name}_H{hertzian:.0e}".replace("+0", ""), stiff.values, title=stiff.title, readings=stiff.readings,
+        watch=stiff.watch,
+    )
+    return [*map(scenes.load, STANDARD), renamed]
+
+
+def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: Sequence[Contender]) -> list[Record]:
+    """Measure what is not in the journal yet; returns all records of these scenes.
+
+    Raises
+    ------
+    Refused
+        If a scene is one that the contenders cannot treat, see `measure.check` and `methods.registry.check`.
+    """
+    for scene in subjects:
+        registry.check("paper", scene, None)
+        if any(contender.name not in registry.METHODS for contender in contenders):
+            measure.check(scene)
+    journal = Journal(directory)
+    records: list[Record] = []
+    ladders = [contender.ladder[:: effort.stride] for contender in contenders]
+    with tqdm(total=len(subjects) * sum(map(len, ladders)), unit="setting", file=sys.stderr) as bar:
+        for scene in subjects:
+            for contender, ladder in zip(contenders, ladders, strict=True):
+                bar.set_description(f"{scene.name} {contender.name}")
+                records += climb(contender, ladder, scene, journal, effort)
+                bar.update(len(ladder))
+    write_csv(records, directory / "records.csv")
+    return records
+
+
+def climb(
+    contender: Contender, ladder: Iterable[float], scene: Scene, journal: Journal, effort: Effort
+) -> list[Record]:
+    """One method from loose to tight, until a run takes too long."""
+    records = []
+    made_by = origin(contender.family)
+    for setting in ladder:
+        key = f"{scene_key(scene)} {made_by} {contender.name} {setting!r} {effort.budget}"
+        kept = journal.get(key, Record)
+        if kept is None:
+            record, _ = measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
+            journal.put(key, record)
+        else:
+            record = kept._replace(scene=scene.name)
+        records.append(record)
+        if measure.given_up(record, effort):
+            break
+    return records
+
+
+def fastest(records: Iterable[Record], error: float) -> Record | None:
+    """The record that reaches an error in the least time."""
+    reached = [record for record in records if record.good and record.error is not None and record.error <= error]
+    return min(reached, key=lambda record: record.time, default=None)
+
+
+def frontier(records: Iterable[Record]) -> list[Record]:
+    """The records that no other beats in both time and error, from fast to accurate."""
+    best: list[Record] = []
+    for record in sorted((r for r in records if r.good), key=lambda r: (r.time, r.error or 0.0)):
+        if not best or (record.error or 0.0) < (best[-1].error or 0.0):
+            best.append(record)
+    return best
+
+
+def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
+    """Records of each method, in the order of their settings."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record.method, []).append(record)
+    return groups
+
+
+def summary(records: Sequence[Record]) -> list[str]:
+    """Lines for one scene: milliseconds to each target error by method, its best error, and what it missed."""
+    heads = "".join(f"{f'<= {target:.0e}':>11}" for target in TARGETS)
+    lines = [f"{'milliseconds to an error of':30}{heads}{'best error':>12}{'misses':>8}  at its tightest"]
+    for name, group in by_method(records).items():
+        cells = []
+        for target in TARGETS:
+            found = fastest(group, target)
+            cells.append(f"{1e3 * found.time:11.3g}" if found else f"{'-':>11}")
+        best = min((r.error for r in group if r.good and r.error is not None), default=None)
+        last = group[-1]
+        wrong = [r for r in group if r.missed]
+        lines.append(
+            f"  {name:28}{''.join(cells)}{'-' if best is None else f'{best:.1e}':>12}"
+            f"{'-' if last.missed is None and not wrong else f'{len(wrong)}/{len(group)}':>8}"
+            f"  {last.knob} {last.setting:.0e}: {last.status}"
+        )
+    return lines
+
+
+def report(records: Sequence[Record]) -> str:
+    """The text that the command prints."""
+    lines = [
+        f"error: {METRIC}", "time: fastest warm run",
+        "misses: settings at which the count of touches is wrong; -: does not look for them",
+    ]
+    lines += [f"{name} {version}" for name, version in describe_machine().items()]
+    for name in dict.fromkeys(record.scene for record in records):
+        lines += ["", name, *summary([record for record in records if record.scene == name])]
+    return "\n".join(lines)
+
+
+def quick_contenders() -> list[Contender]:
+    """Without the outside peers, some of which compile for seconds."""
+    return [contender for contender in all_contenders() if contender.family == OURS]

@@ -1,0 +1,218 @@
+"""Where the paper's V jumps up while V_c falls, from which p on, and the limits of the control period."""
+
+from __future__ import annotations
+
+import math
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.layout import Law, Transition
+from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.system import NAMES, System
+from grasp_ros.simulation import simulate
+from lab.studies import page_figures
+from lab.studies.document import put, read, write
+from lab.studies.stability import first_limit
+
+JUMPS, LIMITS = "the jumps", "the limits of the control period"  # marked parts of the document
+SCENES = ("v_jump_symmetric", "v_jump_one_sided", "v_jump_smallest_p")
+STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
+HORIZON = 20.0  # s
+AMPLITUDE = 1.0  # m, the axes of the paper's figures
+DRAWS, STEPS, SEED = 8000, 4000, 1
+SMALLEST_P, LARGEST_P = 0.3, 10.0
+
+
+class Jump(NamedTuple):
+    """The paper's V rises from one instant to the next because a clamped pair comes back."""
+
+    time: float  # s
+    side: int
+    u: float  # m
+    height: float  # J of V
+
+
+class Family(NamedTuple):
+    """A set of starts at rest with the arms of Table 1: a box of numbers in which the smallest p is looked for."""
+
+    text: str
+    low: tuple[float, ...]  # -x_l, x_r in m, place of the object between the arms in [0, 1], log10 m_o, log10 H
+    high: tuple[float, ...]
+    part: float  # least height of a jump that counts, in V(0)
+
+    def start(self, place: Array) -> tuple[Array, float, float]:
+        """State, object's mass and H of a point of the box; NaN for the object's place means x_o = 0."""
+        x_l, x_r, between, mass, hertzian = place
+        x_o = 0.0 if math.isnan(between) else -x_l + between * (x_l + x_r)
+        return np.array([-x_l, 0.0, x_o, 0.0, x_r, 0.0]), 10.0**mass, 10.0**hertzian
+
+
+def families() -> list[Family]:
+    """Table 1 itself, with the object anywhere, and with any object and contact; each for two heights."""
+    small = 0.01 * AMPLITUDE
+    table = math.log10(5.0), 4.0
+    boxes = (
+        ("Table 1 with any x_l, x_r and x_o = 0", (small, small, math.nan, *table), (1.0, 1.0, math.nan, *table)),
+        ("Table 1 with any x_l, x_r, the object between", (small, small, 0.0, *table), (1.0, 1.0, 1.0, *table)),
+        ("and any m_o from 0.01 to 1000 kg, H from 1e2 to 1e7", (small, small, 0.0, -2.0, 2.0),
+         (1.0, 1.0, 1.0, 3.0, 7.0)),
+    )
+    return [Family(text, low, high, part) for text, low, high in boxes for part in (1e-2, 1e-6)]
+
+
+def jumps(system: System, duration: float) -> list[Jump]:
+    """All jumps of the paper's V in a run with continuous feedback, from the events alone: (4/5) H u^(5/2) each.
+
+    Raises
+    ------
+    RuntimeError
+        If the run does not reach its end.
+    """
+    integrator = Integrator(system, continuous=True)
+    integrator.advance(duration)
+    if integrator.status is not Status.DONE:
+        raise RuntimeError(integrator.status.value)
+    return [
+        Jump(event.time, event.side, event.u, 0.8 * float(system.pairs[event.side, Law.HERTZIAN]) * event.u**2.5)
+        for event in integrator.events
+        if event.kind is Transition.REENTRY
+    ]
+
+
+def safe_p(grasp: Grasp, start: Array) -> float:
+    """Theorem 2: below this p no pair can part as fast as 1/p, in s/m."""
+    level = sum(
+        (arm.stiffness + arm.position_gain) * start[column] ** 2 + arm.mass * start[column + 1] ** 2
+        for arm, column in ((grasp.left, 0), (grasp.right, 4))
+    ) + grasp.object_mass * start[3] ** 2
+    reduced = min(arm.mass * grasp.object_mass / (arm.mass + grasp.object_mass) for arm in (grasp.left, grasp.right))
+    return math.sqrt(reduced / level)
+
+
+def table_one(p: float, object_mass: float, hertzian: float) -> Grasp:
+    """The arms and gains of Table 1."""
+    return Grasp(STANDARD, STANDARD, Contact(hertzian, p), Contact(hertzian, p), object_mass)
+
+
+class Found(NamedTuple):
+    """The smallest p that a search has found, and where."""
+
+    p: float  # s/m
+    place: Array
+    jump: Jump
+
+
+def highest_jump(family: Family, place: Array, p: float) -> Jump | None:
+    """The highest jump of a start of the family, if it counts."""
+    start, mass, hertzian = family.start(place)
+    found = jumps(System.of(table_one(p, mass, hertzian), start), HORIZON)
+    level = 15.0 * (start[0] ** 2 + start[4] ** 2)  # V(0) at rest
+    best = max(found, key=lambda jump: jump.height, default=None)
+    return best if best is not None and best.height >= family.part * level else None
+
+
+def search(family: Family, draws: int, steps: int, seed: int) -> Found:
+    """Random starts, then random steps around the best one that only accept a smaller p.
+
+    It proves that a jump exists at the p that it returns. That none exists below is proved only up to `safe_p`.
+
+    Raises
+    ------
+    ValueError
+        If no start that was drawn has a jump.
+    """
+    rng = np.random.default_rng(seed)
+    low, high = np.array(family.low), np.array(family.high)
+    best: Found | None = None
+    for _ in tqdm(range(draws), desc="draws", file=sys.stderr, leave=False):
+        place = low + rng.random(5) * (high - low)
+        p = float(np.exp(rng.uniform(math.log(SMALLEST_P), math.log(LARGEST_P))))
+        if (best is None or p < best.p) and (jump := highest_jump(family, place, p)):
+            best = Found(p, place, jump)
+    if best is None:
+        raise ValueError(f"{family.text}: no jump found in {draws} draws")
+    width = 0.3
+    for _ in tqdm(range(steps), desc="steps", file=sys.stderr, leave=False):
+        place = np.minimum(np.maximum(best.place + width * rng.standard_normal(5) * (high - low), low), high)
+        p = best.p * (1.0 - 0.2 * width * float(rng.random()))
+        jump = highest_jump(family, place, p)
+        if jump is not None:
+            best = Found(p, place, jump)
+        width = max(0.995 * width, 1e-7) if jump is None else min(1.3 * width, 0.5)
+    return best
+
+
+def run(document: Path | None) -> None:
+    """Print jumps and limits; with a document, put them and a figure into it.
+
+    Raises
+    ------
+    Refused
+        If the document cannot be read or written, or has no marks.
+    """
+    text = "" if document is None else put(document, put(document, read(document), JUMPS, ""), LIMITS, "")
+    limits = limits_table()
+    print(limits)
+    table = f"{scenes_table()}\n\n{smallest_table(DRAWS, STEPS)}"
+    print(table)
+    if document is not None:
+        figure = document.with_suffix(".png")
+        shown = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 8001)) for name in SCENES[:2]]
+        page_figures.v_jumps(shown, figure)
+        block = f"{table}\n\n![V and V_c]({figure.name})"
+        write(document, put(document, put(document, text, JUMPS, block), LIMITS, limits))
+
+
+def limits_table() -> str:
+    """Markdown table of the first limits of the arm of Table 1."""
+    rows = ["| Kp, N/m | Kv, N s/m | delay, periods | stable for h below, s |", "|---:|---:|---:|---:|"]
+    for position_gain, velocity_gain in ((5.0, 0.5), (5.0, 0.0), (50.0, 5.0)):
+        arm = STANDARD._replace(position_gain=position_gain, velocity_gain=velocity_gain)
+        for delay in (0, 1, 2):
+            limit = first_limit(arm, delay)
+            rows.append(f"| {position_gain:g} | {velocity_gain:g} | {delay} | {limit:.12g} |")
+    return "\n".join(rows)
+
+
+def scenes_table() -> str:
+    """Markdown table of all jumps of the scenes that show them."""
+    rows = [
+        "| scene | t, s | side | u, mm | V jumps up by, J | V_c there, J |",
+        "|---|---:|---|---:|---:|---:|",
+    ]
+    for name in SCENES:
+        scene = scenes.load(name)
+        for jump in jumps(scene.system, scene.duration):
+            level = float(simulate(scene, grid=np.array([jump.time])).energy.V_c[0])
+            side = NAMES[jump.side]
+            rows.append(f"| `{name}` | {jump.time:.6f} | {side} | {1e3 * jump.u:.4f} | {jump.height:.6f} |"
+                        f" {level:.6f} |")
+    return "\n".join(rows)
+
+
+def smallest_table(draws: int, steps: int) -> str:
+    """Markdown table of the smallest p that was found in each family."""
+    rows = [
+        f"Smallest p with a jump; arms of Table 1, released at rest within {AMPLITUDE:g} m, no penetration,"
+        f" {HORIZON:g} s: {draws} random starts, then {steps} steps downhill, seed {SEED}. A jump at the p of the"
+        " third column exists; that there is none below the p of the last column is theorem 2."
+        " Between them nothing is proved.",
+        "",
+        "| starts | jump of at least, V(0) | found at p, s/m | x_l, x_o, x_r, m | m_o, kg | H | t, s | safe below p |",
+        "|---|---:|---:|---|---:|---:|---:|---:|",
+    ]
+    for family in families():
+        p, place, jump = search(family, draws, steps, SEED)
+        start, mass, hertzian = family.start(place)
+        where = ", ".join(f"{x:.5f}" for x in start[0::2])
+        widest = np.array([-AMPLITUDE, 0.0, 0.0, 0.0, AMPLITUDE, 0.0])
+        safe = safe_p(table_one(p, 10.0 ** family.low[3], hertzian), widest)
+        rows.append(f"| {family.text} | {family.part:g} | {p:.4f} | {where} | {mass:.4g} | {hertzian:.4g} |"
+                    f" {jump.time:.4f} | {safe:.4f} |")
+    return "\n".join(rows)

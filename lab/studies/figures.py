@@ -1,0 +1,235 @@
+"""The figures of the studies. A label says what the number is; a failure has a mark of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from grasp_ros.methods.contract import STEP
+from grasp_ros.simulation.plots import save
+from lab.studies.accuracy import by_method, frontier
+from lab.studies.drift import Drift
+from lab.studies.loop import Point
+from lab.studies.predictability import LEVELS, Prediction
+from lab.studies.records import Record
+
+COLORS = {  # by the beginning of a method's name; distinguishable for colour-blind readers
+    "exact": "#000000", "paper": "#d55e00", "rk45": "#56b4e9", "rk4": "#e69f00", "discrete": "#8c6d1f",
+    "dop853": "#0072b2", "radau": "#cc79a7", "lsoda": "#7a5195", "odeint": "#7a5195", "cvode": "#999999",
+    "heyoka": "#009e73",
+}
+HEIGHT, WIDTH = 3.1, 4.3  # inches, of a panel
+DPI = 130
+
+
+def color(method: str) -> str:
+    """One colour per family of methods."""
+    return next(value for name, value in COLORS.items() if method.startswith(name))
+
+
+def style(method: str) -> dict[str, Any]:
+    """Solid where events are located or need not be, dashed where they are left to the right-hand side."""
+    bold = method in ("exact", "paper")
+    located = bold or method.endswith("_events") or method.startswith(("heyoka", "discrete"))
+    mark = {"o": method.endswith("_events") or bold, "s": method == "odeint" or method.startswith("heyoka_")}
+    return {
+        "color": color(method), "linestyle": "-" if located else (0, (4, 2)), "linewidth": 2.2 if bold else 0.9,
+        "marker": next((m for m, is_so in mark.items() if is_so), "^"), "markersize": 3.5 if bold else 2.5,
+        "zorder": 4 if bold else 2,
+    }
+
+
+def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
+    """Error against time, one panel a scene, with the frontier that no method passes."""
+    names = list(dict.fromkeys(record.scene for record in records))
+    figure, panels = _panels(len(names) + 1)
+    for axes, name in zip(panels, names, strict=False):
+        here = [record for record in records if record.scene == name]
+        for method, group in by_method(here).items():
+            good = [record for record in group if record.good]
+            axes.plot(*_points(good), **style(method))
+            wrong = [record for record in good if record.missed or record.status != "done"]
+            axes.plot(*_points(wrong), "x", color="#cc0000", markersize=5, markeredgewidth=1.1, zorder=6)
+        axes.step(
+            *_points(frontier(here)), where="post", color="#f0e442", linewidth=7.0, alpha=0.6, zorder=1,
+            solid_joinstyle="round",
+        )
+        failed = sorted({record.method for record in here if not record.good})
+        axes.set_title(name, fontsize="medium")
+        if failed:
+            axes.text(
+                0.98, 0.98, "no result at some setting:\n" + "\n".join(failed), transform=axes.transAxes, ha="right",
+                va="top", fontsize=6, color="#cc0000",
+            )
+        axes.set(xscale="log", yscale="log", ylim=(1e-14, 1e2), xlabel="fastest warm run, s")
+        axes.grid(alpha=0.25, which="major")
+    _method_legend(panels[len(names)], list(by_method(records)))
+    figure.supylabel("error: " + metric.replace(", against", ",\nagainst"), fontsize="small")
+    save(figure, path, DPI)
+
+
+def _points(records: Sequence[Record]) -> tuple[list[float], list[float]]:
+    """Time and error; an error of zero is drawn at the lower edge."""
+    return [record.time for record in records], [max(record.error or 0.0, 1e-15) for record in records]
+
+
+def _method_legend(axes: Axes, methods: list[str]) -> None:
+    axes.axis("off")
+    handles = [Line2D([], [], label=method, **style(method)) for method in methods]
+    handles += [
+        Line2D([], [], color="#f0e442", linewidth=7.0, alpha=0.6, label="best of all: the frontier"),
+        Line2D([], [], linestyle="", marker="x", color="#cc0000", label="touches missed or invented,\nor stopped"),
+    ]
+    axes.legend(handles=handles, loc="center", ncols=2, fontsize=7, frameon=False, handlelength=3.0)
+
+
+def contacts_missed(records: Sequence[Record], path: Path) -> None:
+    """By how much the count of touches is wrong, against tolerance (above) and step (below)."""
+    names = list(dict.fromkeys(record.scene for record in records))
+    figure, grid = plt.subplots(
+        2, len(names), figsize=(2.6 * len(names), 5.2), sharey=True, sharex="row", layout="constrained", squeeze=False
+    )
+    for column, name in enumerate(names):
+        here = [record for record in records if record.scene == name and record.found is not None]
+        total = sum(here[0].there_are) if here else 0
+        grid[0, column].set_title(f"{name}\n{total} touches there are", fontsize="small")
+        for method, group in by_method(here).items():
+            axes = grid[int(group[0].knob == STEP), column]
+            axes.plot([r.setting for r in group], [r.missed for r in group], **style(method), label=method)
+    for row, knob in enumerate(("tolerance or accuracy", "step, s")):
+        for axes in grid[row]:
+            axes.set(xscale="log", xlabel=knob)
+            axes.set_yscale("symlog", linthresh=1.0)
+            axes.set_ylim(-0.3, 200)
+            axes.set_yticks([0, 1, 10, 100], ["0", "1", "10", "100"])
+            axes.grid(alpha=0.25)
+        if not grid[row, 0].xaxis_inverted():
+            grid[row, 0].invert_xaxis()
+        grid[row, 0].set_ylabel("touches missed\nor invented")
+        lines = {line.get_label(): line for axes in grid[row] for line in axes.get_lines()}
+        figure.legend(
+            lines.values(), lines.keys(), fontsize=7, loc=("outside right upper", "outside right lower")[row],
+            frameon=False,
+        )
+    save(figure, path, DPI)
+
+
+def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
+    """Relative energy drift against time."""
+    figure, axes = plt.subplots(figsize=(8.5, 4.8), layout="constrained")
+    for row in sorted(drifts, key=lambda row: -row.worst):
+        label = f"{row.method}, {row.setting}: {row.worst:.0e}, {row.seconds:.2g} s"
+        if not row.t:
+            axes.plot([], [], " ", label=f"{row.method}, {row.setting}: {row.status}")
+            continue
+        size = np.maximum(np.maximum.accumulate(np.abs(row.drift)), 1e-17)
+        axes.plot(row.t[1:], size[1:], **{**style(row.method), "marker": ""}, label=label)
+    axes.axhline(1e-11, color="#888888", linewidth=0.8, linestyle=":")
+    axes.text(1.1, 1.2e-11, "target 1e-11", fontsize=7, color="#666666")
+    axes.set(
+        xscale="log", yscale="log", xlabel="simulated time, s", ylim=(1e-16, 1e2),
+        ylabel="largest $|V_c/V_c(0) - 1|$ so far", title="case 2, perfectly elastic: energy must stay",
+    )
+    axes.legend(fontsize=7, title="method, setting: worst drift, wall time", title_fontsize=7, loc="center left",
+                bbox_to_anchor=(1.0, 0.5))
+    axes.grid(alpha=0.25)
+    save(figure, path, DPI)
+
+
+def control_period(points: Sequence[Point], name: str, path: Path) -> None:
+    """Deviation and price of the sampled loop against the control period."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4.0), layout="constrained")
+    period = [point.period_ms for point in points]
+    left.plot(period, [point.deviation for point in points], "o-", color="#0072b2")
+    deviation = "largest deviation of a position\nfrom continuous feedback, m"
+    left.set(ylabel=deviation, title=f"{name}: what a short period gives")
+    for label, values, line in (
+        ("one process", [point.one_process for point in points], {"color": "#0072b2", "marker": "o"}),
+        ("four processes, with bag and monitor", [point.four_processes for point in points],
+         {"color": "#d55e00", "marker": "s"}),
+        ("bare rclpy: the same messages and nothing else", [point.bare for point in points],
+         {"color": "#888888", "marker": "^", "linestyle": "--"}),
+    ):
+        there = [(p, value) for p, value in zip(period, values, strict=True) if value is not None]
+        if there:
+            right.plot(*zip(*there, strict=True), label=label, **line)
+    right.axhline(1.0, color="black", linewidth=0.8, linestyle=":")
+    right.text(period[0], 1.15, "real time", fontsize=7)
+    right.set(ylabel="wall seconds per simulated second", title="what it takes")
+    right.legend(fontsize=7)
+    for axes in (left, right):
+        axes.set(xscale="log", yscale="log", xlabel="control period, ms")
+        axes.invert_xaxis()
+        axes.set_xticks([20, 10, 5, 2, 1, 0.5, 0.2, 0.1], ["20", "10", "5", "2", "1", "0.5", "0.2", "0.1"])
+        axes.minorticks_off()
+        axes.grid(alpha=0.25)
+    save(figure, path, DPI)
+
+
+def prediction(predictions: Sequence[Prediction], path: Path) -> None:
+    """How two roundings grow."""
+    figure, axes = plt.subplots(figsize=(8.0, 4.4), layout="constrained")
+    shades = ("#0072b2", "#e69f00", "#d55e00", "#009e73", "#cc79a7", "#000000")
+    for row, shade in zip(predictions, cycle(shades), strict=False):
+        there = row.distance > 0.0
+        axes.plot(row.t[there], row.distance[there], label=row.scene, color=shade, linewidth=1.5)
+    for level in LEVELS:
+        axes.axhline(level, color="#888888", linewidth=0.7, linestyle=":")
+        axes.text(1.01, level, f"{level:.0e}", transform=axes.get_yaxis_transform(), fontsize=8, va="center")
+    axes.set(
+        yscale="log", xlabel="simulated time, s", ylim=(1e-17, 10.0),
+        ylabel="largest distance of motions\nthat begin two roundings apart, m or m/s",
+        title="how far ahead double precision can see: an error is for sale until its line is crossed",
+    )
+    axes.legend(fontsize=8, loc="lower right")
+    axes.grid(alpha=0.25)
+    save(figure, path, DPI)
+
+
+def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str, float], path: Path) -> None:
+    """Spectral radius of the sampled loop against the period, and growth in the simulation.
+
+    Parameters
+    ----------
+    curves : dict
+        By label: periods in s and spectral radii.
+    points : sequence of (period in s, simulated growth per period)
+    limits : dict
+        By label: the first period at which the radius is 1, s.
+    """
+    figure, axes = plt.subplots(figsize=(7.5, 4.0), layout="constrained")
+    for (label, (period, radius)), shade in zip(curves.items(), ("#0072b2", "#d55e00"), strict=False):
+        text = f"{label}: stable to {1e3 * limits[label]:.4g} ms"
+        axes.plot(1e3 * np.asarray(period), radius, color=shade, label=text)
+        axes.plot([1e3 * limits[label]], [1.0], "o", color=shade)
+    axes.plot([1e3 * h for h, _ in points], [growth for _, growth in points], "x", color="black", label="simulated")
+    axes.axhline(1.0, color="black", linewidth=0.8)
+    axes.set(
+        xlabel="control period, ms", ylabel="growth per period: spectral radius",
+        title="the sampled loop of a free arm: below 1 it is stable",
+    )
+    axes.legend(fontsize=8)
+    axes.grid(alpha=0.25)
+    save(figure, path, DPI)
+
+
+def _panels(number: int) -> tuple[Any, list[Axes]]:
+    columns = min(number, 3)
+    rows = -(-number // columns)
+    figure, grid = plt.subplots(
+        rows, columns, figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained", squeeze=False
+    )
+    panels = list(grid.flat)
+    for spare in panels[number:]:
+        spare.axis("off")
+    return figure, panels

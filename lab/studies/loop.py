@@ -1,0 +1,84 @@
+"""What accuracy costs over topics: the control period against deviation and against wall time.
+
+The deviation is that of the sampled loop from the paper's continuous feedback. It is the same in one process and in
+four, bit for bit; only the price differs. The floor is the same graph on bare rclpy, without physics or a bag.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from tqdm import tqdm
+
+from grasp_ros import simulation
+from grasp_ros.scene import Scene
+from lab.studies import graph
+from lab.studies.records import Journal, origin, scene_key
+
+PERIODS_MS = (20.0, 10.0, 5.0, 2.0, 1.0, 0.5, 0.2, 0.1)
+GRAPH_PERIODS_MS = (20.0, 5.0, 1.0, 0.5, 0.1)
+COMMON_S = 0.02  # the deviation is looked at where all periods have a tick
+PAIRS = 2  # of runs, bare and ours in turn; the fastest counts
+TICKS = 1000  # of a graph; its speed does not depend on how far it goes
+
+
+class Point(NamedTuple):
+    """One control period."""
+
+    period_ms: float
+    deviation: float  # largest distance of a position from continuous feedback, m
+    one_process: float  # wall seconds per simulated second
+    four_processes: float | None  # None: not measured at this period
+    bare: float | None
+
+
+def run(scene: Scene, directory: Path, graph_periods: tuple[float, ...] = GRAPH_PERIODS_MS) -> list[Point]:
+    """Measure every period; resumes from the journal.
+
+    Raises
+    ------
+    RuntimeError
+        If a graph does not finish.
+    """
+    journal = Journal(directory)
+    steps = round(scene.duration / COMMON_S)
+    grid = np.linspace(0.0, scene.duration, steps + 1)
+    ideal = simulation.simulate(scene, grid=grid).state
+    points = []
+    for period in (bar := tqdm(PERIODS_MS, unit="period", file=sys.stderr)):
+        bar.set_description(f"control period {period:g} ms")
+        key = f"loop {scene_key(scene)} {origin('grasp_ros')} {period!r} {period in graph_periods}"
+        point = journal.get(key, Point)
+        if point is None:
+            point = _measure(scene, period, grid, ideal, period in graph_periods)
+            journal.put(key, point)
+        points.append(point)
+    return points
+
+
+def _measure(scene: Scene, period_ms: float, grid: Any, ideal: Any, with_graph: bool) -> Point:
+    sampled = scene.changed({"time.control_period_s": period_ms / 1e3})
+    begin = time.perf_counter()
+    state = simulation.simulate(sampled, grid=grid, sampled=True).state
+    one = (time.perf_counter() - begin) / scene.duration
+    four = bare = None
+    if with_graph:
+        short = sampled.changed({"time.duration_s": TICKS * round(period_ms * 1e6) / 1e9})
+        per_tick = 1e3 / period_ms  # ticks per simulated second
+        pairs = [(graph.bare_speed(TICKS), graph.our_speed(short)) for _ in range(PAIRS)]
+        bare, four = (per_tick / max(speeds) for speeds in zip(*pairs, strict=True))
+    return Point(period_ms, float(np.abs(state - ideal)[:, ::2].max()), one, four, bare)
+
+
+def report(points: list[Point]) -> str:
+    """Lines: one per control period."""
+    lines = [f"{'period ms':>10}{'deviation m':>13}   wall seconds per simulated second: one process, four, bare rclpy"]
+    for point in points:
+        seconds = (point.one_process, point.four_processes, point.bare)
+        walls = [f"{'-':>10}" if wall is None else f"{wall:10.3g}" for wall in seconds]
+        lines.append(f"{point.period_ms:10g}{point.deviation:13.2e}   {''.join(walls)}")
+    return "\n".join(lines)

@@ -1,0 +1,120 @@
+"""Runs all studies and writes docs/accuracy.md with its figures and records."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros import simulation
+from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
+from lab.studies import (
+    accuracy,
+    document,
+    drift,
+    figures,
+    loop,
+    measure,
+    predictability,
+    profile,
+    sections,
+    speed,
+    stability,
+    time_sections,
+)
+from lab.studies.contenders import all_contenders, own_contenders
+from lab.studies.records import Journal, Record, write_csv
+
+COMMAND = "python -m lab page"
+LOOP_SCENE = "case_01"
+QUICK_S = 5.0
+QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
+OUTPUT_RUNS = 100
+
+
+def write(docs: Path, directory: Path, quick: bool) -> Path:
+    """Run all studies, as far as the journal does not have them; returns the page.
+
+    Parameters
+    ----------
+    docs : Path
+        Directory of the page; figures and records go to `accuracy` in it.
+    directory : Path
+        The journal.
+    quick : bool
+        Few settings on two short scenes, without the outside peers and without ROS.
+
+    Raises
+    ------
+    Refused
+        If a directory cannot be written.
+    """
+    place = docs / "accuracy"
+    with writing(place):
+        place.mkdir(parents=True, exist_ok=True)
+    subjects = accuracy.default_scenes()
+    case = scenes.load(LOOP_SCENE)
+    if quick:
+        subjects = [predictability.horizon(scene, QUICK_S) for scene in subjects[:2]]
+        case = predictability.horizon(case, QUICK_S)
+    effort, contenders = (
+        (measure.QUICK, accuracy.quick_contenders()) if quick else (measure.FULL, all_contenders())
+    )
+    records = accuracy.run(subjects, directory, effort, contenders)
+    drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
+    predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
+    limits = stability.limits(case.grasp.left)
+    points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
+
+    write_csv(records, place / "records.csv")
+    figures.work_precision(records, accuracy.METRIC, place / "error_against_time.png")
+    figures.contacts_missed(records, place / "contacts_missed.png")
+    figures.energy_drift(drifts, place / "energy_drift.png")
+    figures.prediction(predictions, place / "prediction.png")
+    figures.control_period(points, case.name, place / "control_period.png")
+    figures.stability(*stability.curves(case.grasp.left, limits), place / "stability.png")
+    page = docs / "accuracy.md"
+    text = [
+        sections.head(COMMAND), sections.choice(records), sections.paper(records), sections.tolerance(records),
+        sections.missed(records), sections.energy(drifts), sections.prediction(predictions),
+        sections.topics(case.title, points, limits), time_sections.ahead(records),
+        time_sections.time_spent(records, _profiles(subjects, records)), time_sections.output(_output(subjects)),
+        *([] if quick else [time_sections.final_state(_final_states(subjects, directory))]),
+        sections.methods(), sections.details(records),
+    ]
+    document.write(page, "\n\n".join(text) + "\n")
+    return page
+
+
+def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[profile.Profile]:
+    """Where the time of `exact` goes, at its fastest setting for the error; its finest where that is not reached."""
+    found = []
+    for scene in subjects:
+        own = [record for record in records if (record.scene, record.method) == (scene.name, EXACT)]
+        fastest = accuracy.fastest(own, time_sections.FINAL_ERROR)
+        found.append(profile.profile(scene, METHODS[EXACT].default if fastest is None else fastest.setting))
+    return found
+
+
+def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
+    journal = Journal(directory)
+    error = time_sections.FINAL_ERROR
+    return {scene.name: speed.final_state(scene, measure.truth(scene, journal), error) for scene in subjects}
+
+
+def _output(subjects: Sequence[Scene]) -> dict[str, tuple[float, float]]:
+    """Seconds of `exact` with all output times and with the last alone, in turn."""
+    exact = next(contender for contender in own_contenders() if contender.name == EXACT)
+    costs = {}
+    for scene in subjects:
+        solve = exact.build(scene, METHODS[EXACT].default)
+        grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
+        pairs = [(measure.seconds(solve, grid), measure.seconds(solve, grid[-1:])) for _ in range(OUTPUT_RUNS)]
+        both, last = zip(*pairs, strict=True)
+        costs[scene.name] = (statistics.median(both), statistics.median(last))
+    return costs

@@ -1,0 +1,59 @@
+"""The commands of `python -m lab`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytestmark = pytest.mark.slow  # whole studies, though quick ones
+
+SHORT = "time.duration_s=2"
+
+
+def test_accuracy_quick_writes_records_and_figures(lab_command: Any, tmp_path: Path) -> None:
+    result = lab_command("accuracy", "case_01", "--set", SHORT, "--quick", "-o", "out")
+    assert result.returncode == 0, result.stderr
+    assert {"journal.jsonl", "records.csv", "error_against_time.png", "contacts_missed.png"} <= {
+        path.name for path in (tmp_path / "out").iterdir()
+    }
+    assert "discrete_gradient" in result.stdout
+    assert "largest absolute error over six states" in result.stdout
+
+
+def test_page_quick_has_all_sections_and_figures(lab_command: Any, tmp_path: Path) -> None:
+    result = lab_command("page", "--quick", "--docs", "docs", "-o", "journal")
+    assert result.returncode == 0, result.stderr
+    text = (tmp_path / "docs" / "accuracy.md").read_text()
+    for title in ("Which method", "What the paper's method costs", "Energy in the elastic case", "over topics",
+                  "Where the time goes", "How many times as long others take"):
+        assert title in text
+    shown = [part.split(")")[0] for part in text.split("](accuracy/")[1:]]
+    assert len(shown) == 7
+    assert all((tmp_path / "docs" / "accuracy" / name).stat().st_size > 1000 for name in shown)
+    assert "275.0566374 ms" in text
+
+
+def test_advise_answers_with_a_command(lab_command: Any) -> None:
+    wish = ("advise", "case_01", "--set", "time.duration_s=0.5", "--quick", "-o", "out")
+    result = lab_command(*wish, "--error", "1e-6")
+    assert result.returncode == 0, result.stderr
+    assert "\nthat is: grasp simulate case_01 --method " in result.stdout
+    too_much = lab_command(*wish, "--error", "1e-30")
+    assert too_much.returncode == 1
+    assert "no method reaches it; closest: " in too_much.stdout
+    neither = lab_command(*wish)
+    assert neither.returncode == 2
+    assert "--error, --budget: allowed: exactly one of them" in neither.stderr
+
+
+def test_maps_quick_writes_its_page_and_figures(lab_command: Any, tmp_path: Path) -> None:
+    for _ in range(2):  # the second time from what is there
+        result = lab_command("maps", "--quick", "--docs", "docs", "-o", "runs")
+        assert result.returncode == 0, result.stderr
+    text = (tmp_path / "docs" / "maps.md").read_text()
+    for title in ("Where the grasp of case 3 settles", "Control period, delay and noise", "Robustness"):
+        assert title in text
+    for name in ("settling", "limits", "robustness"):
+        assert (tmp_path / "docs" / "maps" / f"{name}.png").stat().st_size > 1000

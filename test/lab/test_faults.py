@@ -1,0 +1,75 @@
+"""The fault drills: a handful of them, and that each way to fail is seen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lab.drills.faults import run
+from lab.drills.faults.output import Output, plain
+from lab.drills.faults.verdict import Evidence, Verdict
+
+GOOD = Evidence(said="it is gone", noticed=0.5, exits={"grasp run": 1})
+
+
+@pytest.mark.slow
+@pytest.mark.alone
+def test_quick_drills_pass_and_are_written(lab_command: Any, tmp_path: Path) -> None:
+    result = lab_command("faults", "--quick", "-o", "faults.md")
+    assert result.returncode == 0, result.stdout + result.stderr
+    drills = run.chosen((), quick=True)
+    text = (tmp_path / "faults.md").read_text()
+    assert len(drills) >= 3
+    for drill in drills:
+        [row] = [line for line in text.splitlines() if line.startswith(f"| {drill.fault} |")]
+        assert row.endswith(("| survived |", "| ended with a sentence |"))
+    assert str(tmp_path) not in text
+    assert "/tmp" not in text
+
+
+@pytest.mark.parametrize(
+    ("change", "verdict"),
+    [
+        ({}, Verdict.SENTENCE), ({"went_on": True, "said": "", "noticed": math.nan}, Verdict.SURVIVED),
+        ({"traceback": "KeyError: 1", "went_on": True}, Verdict.TRACEBACK), ({"left": 1}, Verdict.LEFT),
+        ({"hung": True}, Verdict.HUNG), ({"lost": 0.3}, Verdict.LOST),
+        ({"lost": math.inf, "nothing_to_keep": True}, Verdict.SENTENCE), ({"wrong": "x"}, Verdict.WRONG),
+        ({"said": ""}, Verdict.SILENT), ({"said": "", "mute": True}, Verdict.SENTENCE),
+        ({"noticed": 9.0}, Verdict.LATE), ({"noticed": math.nan}, Verdict.LATE),
+        ({"noticed": 9.0, "asked": True}, Verdict.SENTENCE), ({"skipped": "no network"}, Verdict.SKIPPED),
+    ],
+)
+def test_each_way_to_end_is_seen(change: dict[str, Any], verdict: Verdict) -> None:
+    assert replace(GOOD, **change).verdict is verdict
+    assert verdict.passes is (verdict in (Verdict.SENTENCE, Verdict.SURVIVED, Verdict.SKIPPED))
+
+
+def test_a_drill_that_is_not_there_is_refused(lab_command: Any) -> None:
+    result = lab_command("faults", "--only", "earthquake")
+    assert result.returncode == 2
+    assert "--only: earthquake: no such drill; allowed: SIGHUP-grasp, " in result.stderr
+
+
+def test_drills_have_names_of_their_own() -> None:
+    names = [drill.name for drill in run.all_drills()]
+    assert len(names) == len(set(names)) > 80
+
+
+def test_sentences_are_found_among_bars_of_progress() -> None:
+    output = Output()
+    bar = "a: 1%|| 0/2 [00:00<?, ?tick/s]"
+    for text in (f"{bar}[WARN] [17.5] [plant]: waits", bar, "a:  2%|x | 1/2 [00:00<00:08, 2.5tick/s]",
+                 f"{bar}a: 3%|| 0/2 [0<1, 1.5s/tick]grasp: DIR: over", "[INFO] [17.5] [plant]: on"):
+        output._take(1.0, text)
+    assert [line.text for line in output.news(0.0, 2.0)] == ["[WARN] [17.5] [plant]: waits", "grasp: DIR: over"]
+    assert plain(output.lines[0].text, []) == "plant: waits"
+    found = plain("grasp: /a/b/run: t = 1.5 s, tick 7, 30 bytes", [Path("/a/b")])
+    assert found == "grasp: DIR/run: t = T s, tick N, N bytes"
+    assert output.traceback == ""
+    for text in (f"{bar}Traceback (most recent call last):", "  File", "ValueError: no"):
+        output._take(3.0, text)
+    assert output.traceback == "ValueError: no"

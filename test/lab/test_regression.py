@@ -1,0 +1,57 @@
+"""Regression scenes against their answers in 25 digits, which `lab.cases.regression` writes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from grasp_ros.physics.layout import Work
+from grasp_ros.simulation import simulate
+from lab.cases.regression import answer, answers, load, names, verdict
+
+ANSWERS = answers()
+FEW, MORE = 10.0, 100.0  # roundings
+MANY_IMPACTS = (
+    "chain_friction_pulse_1", "chain_loop_set_point_feed_forward_friction_table_1", "rest_then_pushed_alarm",
+)
+CHEAP = ("through_the_finger", "together", "free_fall", "pressed_for_a_moment")
+
+
+@pytest.mark.parametrize("name", ANSWERS)
+def test_the_motion_is_right_within_roundings(name: str) -> None:
+    found = verdict(load(name), ANSWERS[name])
+    limit = MORE if name in MANY_IMPACTS else FEW
+    assert found.error <= limit, f"{name}: {found.status}, error in roundings {found.error:.3g}"
+
+
+@pytest.mark.parametrize(("name", "steps"), [("chain_1", 40), ("chain_set_point_friction_1", 180),
+                                             ("chain_friction_4", 180)])
+def test_a_pair_that_begins_beside_a_harder_one_takes_steps_of_a_part_of_its_age(name: str, steps: int) -> None:
+    """Its u grows like t^3.5 over decades of time, by a factor in each step."""
+    scene = load(name)
+    assert simulate(scene, grid=[0.0, scene.duration]).work[Work.CONTACT_STEPS] <= steps
+
+
+def test_answers_belong_to_scenes() -> None:
+    assert set(ANSWERS) <= set(names())
+    assert all(len(row) == 6 for right in ANSWERS.values() for row in right.state)
+
+
+@pytest.mark.parametrize("name", CHEAP)
+def test_answers_are_those_of_the_reference(name: str) -> None:
+    found, right = answer(load(name)), ANSWERS[name]
+    assert (found.t, found.state, found.status) == (right.t, right.state, right.status)
+    assert found.amplification == pytest.approx(right.amplification, rel=0.1)
+
+
+def test_a_wrong_answer_is_seen() -> None:
+    right = ANSWERS["touching_chain"]
+    moved = [[f"{float(value) * (1 + 1e-9):.20e}" for value in row] for row in right.state]
+    assert verdict(load("touching_chain"), right._replace(state=moved)).error > 1e4
+
+
+def test_a_pair_that_leaves_by_a_low_accuracy_is_pushed_back_by_a_new_force() -> None:
+    """At the loosest accuracy both pairs are about to part before the tick at which their arms are pushed together."""
+    loose = simulate(load("leaving_pushed_gently"), accuracy=1e-3)
+    right = np.array(ANSWERS["leaving_pushed_gently"].state[-1], dtype=float)
+    assert loose.state[-1] == pytest.approx(right, rel=1e-3, abs=1e-12)
