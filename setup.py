@@ -7,6 +7,7 @@ from setuptools import find_packages, setup
 NAME = "grasp_ros"
 
 setup(
+    python_requires=">=3.11,<3.13",
     packages=[*find_packages(include=[NAME, f"{NAME}.*"]), f"{NAME}.config"],
     package_dir={f"{NAME}.config": "config"},  # scenes and layouts are part of the package however it is installed
     package_data={NAME: ["py.typed"], f"{NAME}.config": ["*"]},

@@ -58,7 +58,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 --controller left=math:sin --controller left=math:cos", "allowed: one for the left side"),
         ("simulate arm_alone --controller right=math:hypot", "'right' is not allowed; allowed: left"),
         ("simulate case_01 --method rk4 --controller left=math:hypot", "rk4: "),
-        ("study advise case_01 --error x", "argument --error: invalid float value: 'x'"),
+        ("lab advise case_01 --error x", "argument --error: invalid float value: 'x'"),
         ("simulate nowhere", "nowhere: no such scene; allowed: a path that ends in .yaml, or one of case_01"),
         ("simulate nowhere.yaml", "nowhere.yaml: no such file"),
         (f"simulate {LONG}.yaml", "cannot be read: File name too long"),
@@ -108,38 +108,41 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("plot arm_alone -o figure", "figure: no ending; allowed: one of "),
         ("plot arm_alone -o .png", ".png: no ending; allowed: "),
         ("plot arm_alone -o no/x.png", "no/x.png: cannot be written: No such file or directory"),
-        ("study accuracy --set time.duration_s=1", "--set: allowed: with a SCENE"),
-        ("study accuracy hammer", "hammer: right_arm, right_contact, right_feedback: paper knows"),
-        ("study accuracy case_01 -o file/x", "file/x: cannot be written: Not a directory"),
-        ("study accuracy case_01 --quick -o keys", "keys/journal.jsonl: not the journal of a study"),
-        ("study accuracy case_01 --quick -o list", "list/journal.jsonl: not the journal of a study"),
-        ("study accuracy case_01 --quick -o bytes", "bytes/journal.jsonl: 'utf-8' codec can't decode"),
-        ("study accuracy case_01 --quick -o words", "words/journal.jsonl: not the journal of a study"),
-        ("study advise case_01", "--error, --budget: allowed: exactly one of them"),
-        ("study advise case_01 --budget -1", "--error, --budget: allowed: exactly one of them, a number > 0"),
-        ("study loop hammer", "hammer: not the paper's grasp"),
-        ("study loop case_01 --no-graph --set time.duration_s=1.001", "1.001 is not allowed; allowed: a whole number"),
-        ("study prediction case_01 -o file/x", "file/x: cannot be written"),
-        ("study page --quick --docs file/x", "file/x/accuracy: cannot be written"),
-        ("study speed case_01 --error 0", "--error 0.0 is not allowed; allowed: a number > 0"),
-        ("study speed hammer", "hammer: starts in contact"),
-        ("study effects case_01 -o nothing.md", "nothing.md: cannot be read: No such file or directory"),
-        ("study effects case_01 -o bytes.md", "bytes.md: 'utf-8' codec can't decode"),
-        ("study certificate -o nomarks.md", "nomarks.md: no marks; allowed: a text with "),
-        ("study hard -o list", "list: cannot be read: Is a directory"),
-        ("study fuzz --seconds nan", "--seconds nan is not allowed"),
-        ("study fuzz --seed -1", "--seed -1 is not allowed"),
-        ("study fuzz --draws 0", "--draws 0 is not allowed"),
-        ("study fuzz --jobs 0", "--jobs 0 is not allowed"),
-        ("study graph nothing", "nothing: no such scene"),
+        ("lab accuracy --set time.duration_s=1", "--set: allowed: with a SCENE"),
+        ("lab accuracy hammer", "hammer: right_arm, right_contact, right_feedback: paper knows"),
+        ("lab accuracy case_01 -o file/x", "file/x: cannot be written: Not a directory"),
+        ("lab accuracy case_01 --quick -o keys", "keys/journal.jsonl: not the journal of a study"),
+        ("lab accuracy case_01 --quick -o list", "list/journal.jsonl: not the journal of a study"),
+        ("lab accuracy case_01 --quick -o bytes", "bytes/journal.jsonl: 'utf-8' codec can't decode"),
+        ("lab accuracy case_01 --quick -o words", "words/journal.jsonl: not the journal of a study"),
+        ("lab advise case_01", "--error, --budget: allowed: exactly one of them"),
+        ("lab advise case_01 --budget -1", "--error, --budget: allowed: exactly one of them, a number > 0"),
+        ("lab loop hammer", "hammer: not the paper's grasp"),
+        ("lab loop case_01 --no-graph --set time.duration_s=1.001", "1.001 is not allowed; allowed: a whole number"),
+        ("lab prediction case_01 -o file/x", "file/x: cannot be written"),
+        ("lab page --quick --docs file/x", "file/x/accuracy: cannot be written"),
+        ("lab speed case_01 --error 0", "--error 0.0 is not allowed; allowed: a number > 0"),
+        ("lab speed hammer", "hammer: starts in contact"),
+        ("lab effects case_01 -o nothing.md", "nothing.md: cannot be read: No such file or directory"),
+        ("lab effects case_01 -o bytes.md", "bytes.md: 'utf-8' codec can't decode"),
+        ("lab certificate -o nomarks.md", "nomarks.md: no marks; allowed: a text with "),
+        ("lab hard -o list", "list: cannot be read: Is a directory"),
+        ("lab fuzz --seconds nan", "--seconds nan is not allowed"),
+        ("lab fuzz --seed -1", "--seed -1 is not allowed"),
+        ("lab fuzz --draws 0", "--draws 0 is not allowed"),
+        ("lab fuzz --jobs 0", "--jobs 0 is not allowed"),
+        ("lab graph nothing", "nothing: no such scene"),
     ],
 )
-def test_bad_input_ends_in_a_line(workplace: Path, command: Any, words: str, complaint: str) -> None:
+def test_bad_input_ends_in_a_line(
+    workplace: Path, command: Any, lab_command: Any, words: str, complaint: str
+) -> None:
     before = set(workplace.rglob("*"))
-    result = command(*words.split(" "))
+    program, *rest = words.split(" ")
+    result = lab_command(*rest) if program == "lab" else command(program, *rest)
     last = result.stderr.splitlines()[-1]
     assert result.returncode == 2
-    assert last.startswith("grasp")
+    assert last.startswith(("grasp", "python -m lab"))
     assert complaint in last
     assert not [path for path in set(workplace.rglob("*")) - before if path.is_file()]
 

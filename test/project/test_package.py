@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -28,9 +29,57 @@ def colcon_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return workspace / "install" / "grasp_ros"
 
 
+@pytest.fixture(scope="module")
+def pip_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, installed; its dependencies are those of this Python."""
+    prefix = tmp_path_factory.mktemp("prefix")
+    words = ["wheel", "--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir", str(prefix), str(ROOT)]
+    subprocess.run([sys.executable, "-m", "pip", *words], timeout=300, check=True)
+    shutil.rmtree(ROOT / "build", ignore_errors=True)
+    [wheel] = prefix.glob("*.whl")
+    words = ["install", "--quiet", "--no-deps", "--ignore-installed", "--prefix", str(prefix), str(wheel)]
+    subprocess.run([sys.executable, "-m", "pip", *words], timeout=300, check=True)
+    return prefix
+
+
 @pytest.fixture(params=["pip", "colcon"])
 def prefix(request: pytest.FixtureRequest) -> Path:
-    return Path(sys.prefix) if request.param == "pip" else request.getfixturevalue("colcon_prefix")
+    path: Path = request.getfixturevalue(f"{request.param}_prefix")
+    return path
+
+
+def installed(prefix: Path) -> dict[str, str]:
+    """An environment in which the package of a prefix is found first."""
+    [site] = prefix.glob("lib/python*/site-packages")
+    return {**os.environ, "PYTHONPATH": str(site), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+
+
+def test_the_wheel_holds_the_product_alone(pip_prefix: Path) -> None:
+    [site] = pip_prefix.glob("lib/python*/site-packages")
+    assert {path.name for path in site.iterdir() if path.suffix != ".dist-info"} == {"grasp_ros"}
+    assert [path.name for path in (pip_prefix / "bin").iterdir()] == ["grasp"]
+    [info] = site.glob("*.dist-info")
+    needs = [line for line in (info / "METADATA").read_text().splitlines() if line.startswith("Requires-Dist")]
+    plain = {re.split(r"[^\w.-]", need.split(": ")[1])[0] for need in needs if "extra ==" not in need}
+    assert {"numba", "rosbags"} <= plain
+    assert not plain & {"scipy", "gmpy2", "mpmath", "heyoka", "xarray", "pytest"}
+
+
+def test_the_wheel_runs_a_graph_a_verification_and_a_map(pip_prefix: Path, tmp_path: Path) -> None:
+    """In an empty directory, away from the checkout."""
+    environment = installed(pip_prefix)
+
+    def grasp(*words: str) -> str:
+        result = subprocess.run(
+            [sys.executable, "-m", "grasp_ros.cli", *words], cwd=tmp_path, env=environment, capture_output=True,
+            text=True, timeout=300, check=False,
+        )
+        assert result.returncode == 0, result.stderr
+        return result.stdout
+
+    grasp("run", "case_01", "--set", "time.duration_s=1", "-o", "run")
+    assert "equal" in grasp("verify", "run")
+    grasp("map", "case_01", "--set", "time.duration_s=1", "--x", "left_arm.mass_kg=1:2:4", "-o", "map.zarr")
 
 
 def test_ros2_finds_the_package_and_its_executables(prefix: Path) -> None:
@@ -44,8 +93,7 @@ def test_ros2_finds_the_package_and_its_executables(prefix: Path) -> None:
 
 def test_executables_run_from_where_ros2_looks(prefix: Path, tmp_path: Path) -> None:
     """As `ros2 run` starts them: by their path, here with the package of that prefix."""
-    site = next(prefix.glob("lib/python*/site-packages"))
-    environment = {**os.environ, "PYTHONPATH": str(site), "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"}
+    environment = installed(prefix)
     result = subprocess.run(
         [prefix / "lib/grasp_ros/grasp", "scenes"], cwd=tmp_path, env=environment, capture_output=True, text=True,
         timeout=60, check=False,
