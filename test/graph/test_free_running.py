@@ -61,10 +61,11 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any,
 def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: str, status: int) -> None:
     plant = launch(
         *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
-        "real_time_factor:=50", "-p", "left_timeout_s:=0.25", "-p", f"left_on_timeout:={reaction}",
-        stderr=subprocess.PIPE,
+        "real_time_factor:=50", "-p", "left_timeout_s:=0.25", "-p", f"left_on_timeout:={reaction}", "-p",
+        "progress:=true", stderr=subprocess.PIPE,
     )
     errors = plant.communicate(timeout=DEADLINE)[1]
+    assert "%|" not in errors  # no bar of progress where no terminal is
     assert plant.returncode == status
     assert f"left: no command for 0.25 s at tick 250: {reaction}" in errors
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")

@@ -67,7 +67,8 @@ class Controller(PeerNode):
         self._ready_to_answer = self._listening = False
         self._held: State | None = None  # the state that came before this node was ready
         self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0})
-        self.add_on_set_parameters_callback(self._on_set)
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._stage)
         self.on_text(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
@@ -108,16 +109,19 @@ class Controller(PeerNode):
         self._scene, self._answered, self.concern = scene, -1, ""
         self._law = scene.system.laws[SIDES[self._side]]
 
-    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
-        wanted = {parameter.name: parameter.value for parameter in parameters if "." in parameter.name}
-        if self._scene is None or not wanted:
-            return SetParametersResult(successful=True)
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Whether numbers of the law may be set; somebody else may still refuse them."""
         try:
-            self._scene.changed({**self._staged, **wanted})
+            if self._scene is not None:
+                self._scene.changed({**self._staged, **_numbers(parameters)})
         except SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        self._staged.update(wanted)
         return SetParametersResult(successful=True)
+
+    def _stage(self, parameters: list[Parameter]) -> None:
+        """Let numbers that were set act from the next state on."""
+        if self._scene is not None:
+            self._staged.update(_numbers(parameters))
 
     def _ready(self) -> bool:
         listeners = [JOINT_STATES, LYAPUNOV] if self._monitored else [JOINT_STATES]
@@ -200,6 +204,11 @@ class Controller(PeerNode):
     def _answer(self, time_ns: int) -> None:
         """Publish the command that answers a state."""
         self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
+
+
+def _numbers(parameters: list[Parameter]) -> dict[str, Any]:
+    """Those of the scene."""
+    return {parameter.name: parameter.value for parameter in parameters if "." in parameter.name}
 
 
 def main(name: str, received: Sequence[int]) -> int:

@@ -90,8 +90,7 @@ class GraspNode(Node):
     def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
         """The value that the start has given, or the default."""
         with _refusing():
-            value = self.declare_parameter(name, default, descriptor).value
-        return list(value) if isinstance(value, array) else value
+            return _plain(self.declare_parameter(name, default, descriptor).value)
 
     def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
         """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
@@ -125,14 +124,19 @@ class GraspNode(Node):
             del self._parameters[name], self._descriptors[name]
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Set parameters; integers become floating-point numbers, and a refusal says why."""
+        """Set parameters; integers become floating-point numbers, and a refusal says why.
+
+        What is fixed may be set to what it is, so that a node takes its own dump.
+        """
         numbers = []
         for parameter in parameter_list:
             if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
+                if _plain(parameter.value) == _plain(self.get_parameter(parameter.name).value):
+                    continue
                 return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
             whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
             numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
-        return super().set_parameters_atomically(numbers)
+        return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
 
     def _is_whole(self, name: str) -> bool:
         """Whether a parameter was declared as an integer for good."""
@@ -288,6 +292,11 @@ class GraspNode(Node):
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
+
+
+def _plain(value: Any) -> Any:
+    """Value of a parameter, a list where rclpy has an array."""
+    return list(value) if isinstance(value, array) else value
 
 
 @contextmanager

@@ -42,6 +42,10 @@ class _Terminal(io.TextIOBase):
 
     encoding = sys.stderr.encoding
 
+    def isatty(self) -> bool:
+        """Whether it is one: a file or a journal gets no bar."""
+        return sys.stderr.isatty()
+
     def write(self, text: str) -> int:
         with suppress(OSError):
             sys.stderr.write(text)
@@ -84,7 +88,8 @@ class Plant(SteppedNode):
         self._begin = math.nan  # wall time of the first state
         self.counters.update(tick=0, resets=0)
         self._bar = tqdm(
-            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=not progress, file=_Terminal()
+            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True,
+            file=_Terminal(),
         )
         self._states = self.publisher(JOINT_STATES)
         self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
