@@ -15,7 +15,7 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
-from grasp_ros.graph.host import network
+from grasp_ros.graph.host import check, network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
@@ -79,7 +79,8 @@ def _add_network(sub: argparse.ArgumentParser) -> None:
 
 
 def _reach(options: argparse.Namespace) -> None:
-    """Let the processes that come be reached from where the options say."""
+    """Let the processes that come be reached from where the options say, and refuse where none can be."""
+    check(os.environ, alone=getattr(options, "one_process", False))
     if options.network:
         os.environ.update(network(os.environ))
 
@@ -107,8 +108,8 @@ def _run(options: argparse.Namespace) -> int:
         return 1
     seconds = time.monotonic() - begin
     if not (graph.bag / "metadata.yaml").exists():
-        print("interrupted before the first tick: no bag")
-        return 0
+        print("grasp: interrupted before the first tick: no bag", file=sys.stderr)
+        return 130
     return _report(graph, stopped, seconds)
 
 

@@ -124,7 +124,7 @@ def describe_recording(recording: Recording) -> list[Row]:
         ("messages", per_topic),
         ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
         ("end", recording.lost["end"]),
-        ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items())),
+        ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items()) or "not said"),
     ]
     for tick, numbers in recording.changes.items():
         rows.append((f"set at {scene.time_of(tick):g} s", ", ".join(f"{name} {n:g}" for name, n in numbers.items())))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator
+from itertools import chain, islice
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,20 +19,33 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.columns import Alike, alike
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.rosbag2 import BagError, decode, names_of
+from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding, read_text
-from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
+from grasp_ros.scene.topics import (
+    CHANGES,
+    DIAGNOSTICS,
+    JOINT_STATES,
+    LYAPUNOV,
+    LYAPUNOV_NAMES,
+    RUN,
+    SCENE,
+    Topic,
+    state_of,
+)
 
 __all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
 KIND = "a bag of this package"
 VERSION = "version "  # how the keys of versions begin
 BATCH_BYTES = 2**18  # of the messages of a topic that are decoded at once
 MOST_NS = 2**63 - 1
+MOST_AHEAD = 16  # messages, of which two say what the bag holds
+ZSTD = b"\x28\xb5\x2f\xfd"
+CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
@@ -45,9 +59,47 @@ def open_storage(path: Path, salvage: bool = False) -> Storage:
     """
     with decoding(path, KIND, BagError):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-        if len(files) != 1:
-            raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
-        return Storage(files[0], salvage)
+        if len(files) == 1 and files[0].suffix != ".db3":
+            return Storage(files[0], salvage)
+        if any((path / "bag").glob("*.mcap")):
+            raise BagError(f"{path}: the directory of a run; its bag is {path / 'bag'}")
+        if any(path.glob("*.db3")) or path.suffix == ".db3":
+            raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
+        if any(path.glob("*.mcap.*")):
+            raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
+        raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
+
+
+def begin(storage: Storage, path: Path) -> Iterator[Stored]:
+    """All messages of a bag; from the first one on its records say which scene it holds, and how that ran.
+
+    In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
+
+    Raises
+    ------
+    BagError
+        If nothing in the bag says it.
+    """
+    messages = storage.messages()
+    first = list(islice(messages, 1))
+    if first and OWN_RECORD not in storage.records:
+        first += islice(messages, MOST_AHEAD)
+        if any(stored.cdr.startswith(ZSTD) for stored in first):
+            raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
+        storage.records[OWN_RECORD] = _said(first, path)
+    return chain(first, messages)
+
+
+def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
+    """What the topics of a bag say of it, as its own record would."""
+    there = {stored.topic.rpartition("/")[2]: stored for stored in first if stored.type == SCENE.type}
+    if not {SCENE.name, RUN.name} <= there.keys():
+        missing = " and ".join(topic.name for topic in (SCENE, RUN) if topic.name not in there)
+        raise BagError(f"{path}: not {KIND}: nothing at its beginning on {missing}; allowed: all topics of a graph")
+    found = {topic.name: decode(topic, there[topic.name].cdr).data for topic in (SCENE, RUN)}
+    scene, root = scenes.parse(found["scene"], path.name, str(path)), there[SCENE.name].topic.removesuffix(SCENE.name)
+    moved = [topic for topic in topics_of(scene) if topic != DIAGNOSTICS]
+    return {**found, **{f"{TOPIC}{topic.name}": f"{root}{topic.name.lstrip('/')}" for topic in moved}}
 
 
 def scene_of(storage: Storage, path: Path) -> scenes.Scene:
@@ -78,7 +130,7 @@ def names(path: Path) -> dict[str, Topic]:
     """
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError,)):
-        next(storage.messages())
+        next(begin(storage, path), None)
         scene = scene_of(storage, path)
         return {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
 
@@ -106,7 +158,7 @@ def read(path: Path) -> Recording:
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
         content = None
-        for stored in storage.messages():
+        for stored in begin(storage, path):
             if content is None:
                 content = _Content(path, storage)
             content.take(stored)
@@ -119,7 +171,7 @@ def read(path: Path) -> Recording:
 def _check_metadata(path: Path, storage: Storage) -> None:
     """Refuse a metadata.yaml that is not the one that was written when the bag was closed."""
     file = path / "metadata.yaml"
-    there = storage.closed and path.is_dir() and file.exists()
+    there = storage.closed and LOST_RECORD in storage.records and path.is_dir() and file.exists()
     if there and checksum(read_text(file, BagError)) != storage.records[LOST_RECORD][BESIDE]:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
@@ -259,7 +311,8 @@ def _values(topic: Topic, group: Alike) -> Array:
 
 def _lost(storage: Storage) -> dict[str, str]:
     """What the bag says about its end; in place of a word that it does not have, what its reader has seen."""
-    if storage.closed:
-        return {key: word for key, word in storage.records[LOST_RECORD].items() if key != BESIDE}
-    left_out = sum(size for _, size, _ in storage.left_out)
-    return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
+    if not storage.closed:
+        left_out = sum(size for _, size, _ in storage.left_out)
+        return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
+    anew = {"end": "written anew by another program, which does not say what was lost"}
+    return {key: word for key, word in storage.records.get(LOST_RECORD, anew).items() if key != BESIDE}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -56,6 +57,8 @@ class Verification(NamedTuple):
         """For a reader."""
         if self.difference is not None:
             return f"NOT EQUAL, first at {self.difference}"
+        if not self.ticks:
+            return f"nothing: {self.problem}"
         equal = f"{self.ticks} states follow from the recorded inputs, bit for bit"
         return f"{equal}; {self.problem}" if self.problem else equal
 
@@ -135,7 +138,7 @@ def _numbers(recording: Recording) -> Iterator[tuple[str, Array]]:
 def _episodes(recording: Recording) -> Iterator[np.ndarray]:
     """Rows of the bag from each beginning of the scene to the next, or to a gap."""
     begins = np.searchsorted(recording.tick, recording.starts)
-    for begin, end in zip(begins, [*begins[1:], len(recording.tick)], strict=True):
+    for begin, end in pairwise([*begins, len(recording.tick)]):
         rows = np.arange(begin, end)
         gaps = np.flatnonzero(np.diff(recording.tick[rows]) != 1)
         yield rows[: gaps[0] + 1] if len(gaps) else rows

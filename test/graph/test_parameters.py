@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
-from processes import wait_for
+from processes import DEADLINE, START, wait_for
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.plant import Plant
+from grasp_ros.graph.parameters import FREE, NODES
 
 pytestmark = pytest.mark.slow  # real nodes
 GAIN = "left_feedback.position_gain_N_per_m"
@@ -63,3 +68,56 @@ def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> 
     refusing.append(False)
     assert controller.set_parameters([Parameter(GAIN, value=9.0)])[0].successful
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller._law.position_gain == 9.0, "the new gain")
+
+
+def test_help_names_what_can_be_set(loop: tuple[Any, ...]) -> None:
+    """It starts no node."""
+    plant, controller, _ = loop
+    ros = ("use_sim_time", "start_type_description_service", "qos_overrides", "steps")
+    for name, node, later in (("plant", plant, {*FREE}), ("left_controller", controller, set())):
+        declared = {key for key in node._parameters if not key.startswith(ros) and "." not in key}
+        assert declared | later == {*NODES[name]}
+    for name in ("plant", "left_controller", "right_controller", "monitor"):
+        for words in (["--help"], ["-h", "--ros-args", "-p", "scene:=case_99"]):
+            command = [*START, name, *words]
+            found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+            assert (found.returncode, found.stderr) == (0, "")
+            assert found.stdout.startswith(f"usage: {name} ")
+            assert all(f"  {key} " in found.stdout for key in NODES[name])
+
+
+REFUSED = [
+    ("ROS_DOMAIN_ID", "1.5", "allowed: 0 to 232"), ("ROS_DOMAIN_ID", "-1", "allowed: 0 to 232"),
+    ("ROS_DOMAIN_ID", "233", "allowed: 0 to 232"),
+    ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "no node would find another"),
+    ("ROS_AUTOMATIC_DISCOVERY_RANGE", "local", "allowed: LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "why"), REFUSED, ids=[f"{name}={value}" for name, value, _ in REFUSED])
+def test_where_no_graph_can_be_none_starts(
+    command: Any, monkeypatch: pytest.MonkeyPatch, name: str, value: str, why: str
+) -> None:
+    monkeypatch.setenv(name, value)
+    for words in (["run", "case_01"], ["watch"], ["ctl", "status"]):
+        found = command(*words)
+        assert found.returncode == 2
+        assert f"{name}: {value!r} is not allowed" in found.stderr
+        assert why in found.stderr
+    found = subprocess.run([*START, "monitor"], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert found.returncode == 2
+    assert why in found.stderr
+
+
+def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    run = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process"]
+    found = subprocess.run(run, capture_output=True, text=True, timeout=DEADLINE, check=False, env=environment,
+                           cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+
+
+def test_a_word_that_no_node_takes_is_refused() -> None:
+    found = subprocess.run([*START, "plant", "case_03"], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert found.returncode == 2
+    assert found.stderr == "plant: case_03: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...\n"

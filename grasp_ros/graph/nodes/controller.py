@@ -52,9 +52,9 @@ class Controller(PeerNode):
         super().__init__(name, **options)
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
-        self._monitored = self.read_only("wait_for_monitor", False, "answer only once a monitor listens")
+        self._monitored = self.read_only("wait_for_monitor", False)
         self._priority = Priority(self)
-        law = self.read_only("law", "", "a law of your own in place of the scene's, module:object")
+        law = self.read_only("law", "")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
         self._announcements = self.publisher(CHANGES[self._side])

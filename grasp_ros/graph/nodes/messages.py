@@ -76,6 +76,11 @@ def reader_qos(topic: Topic) -> QoSProfile:
     return profile
 
 
+def glance_qos(topic: Topic) -> QoSProfile:
+    """That of a reader for which nobody waits: it may miss what it has no time for."""
+    return QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
 def to_time(time_ns: int) -> Time:
     """Stamp of an integer time in ns."""
     return Time(sec=time_ns // NANOSECONDS, nanosec=time_ns % NANOSECONDS)

@@ -71,7 +71,7 @@ class Monitor(PeerNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("monitor", **options)
         default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
-        self._path = Path(self.read_only("bag", default, "directory of the bag; it must not exist"))
+        self._path = Path(self.read_only("bag", default))
         with reading(self._path):
             if self._path.exists():
                 raise Refused(f"bag: {str(self._path)!r} exists; allowed: a directory that does not exist yet")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
@@ -20,8 +21,10 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
+from grasp_ros.graph.host import place
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.messages import Level
+from grasp_ros.graph.parameters import TEXTS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
@@ -71,15 +74,15 @@ class GraspNode(Node):
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.strangers = ""  # who publishes what somebody else does
-        self.state = "waiting for peers"
+        self.state = f"waiting for peers {place(os.environ, self.get_namespace())}"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
         self.wall_timer(REPORT_SECONDS, self.report)
 
-    def read_only(self, name: str, default: Any, text: str) -> Any:
+    def read_only(self, name: str, default: Any) -> Any:
         """Declare a parameter that is set at start only, and return its value."""
         number = isinstance(default, float)  # for which an integer will do as well
-        descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=number)
+        descriptor = ParameterDescriptor(description=TEXTS[name], read_only=True, dynamic_typing=number)
         value = self._declare(name, default, descriptor)
         if not number:
             return value

@@ -75,11 +75,9 @@ class PeerNode(GraspNode):
     def __init__(self, name: str, **options: Any) -> None:
         self._inputs: list[Topic] = []
         super().__init__(name, **options)
-        self.patience = self.read_only("peer_timeout_s", PEER_SECONDS, "wall time without a sign of life or an answer")
-        self.start_patience = self.read_only(
-            "start_timeout_s", START_SECONDS, "wall time for peers to come and to answer first; 0: any"
-        ) or math.inf
-        reaction = self.read_only("on_silence", "wait", "what is done when a peer is gone or silent: end or wait")
+        self.patience = self.read_only("peer_timeout_s", PEER_SECONDS)
+        self.start_patience = self.read_only("start_timeout_s", START_SECONDS) or math.inf
+        reaction = self.read_only("on_silence", "wait")
         if not 0.0 < self.patience <= self.start_patience:
             raise Refused(f"peer_timeout_s: {self.patience:g} is not allowed; allowed: a number > 0, not above"
                           " start_timeout_s")

@@ -12,9 +12,11 @@ import signal
 import sys
 from importlib import import_module
 
-from grasp_ros.graph.host import this_host
+from grasp_ros.graph.host import check, this_host
+from grasp_ros.graph.parameters import usage
 from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
+from grasp_ros.physics.errors import Refused
 
 
 def main(name: str, child: bool = False) -> int:
@@ -22,6 +24,17 @@ def main(name: str, child: bool = False) -> int:
 
     A child ends with the process that holds the other end of its standard input.
     """
+    words = _own_words(name)
+    if {"-h", "--help"} & set(words):
+        print(usage(name))
+        return 0
+    try:
+        check(os.environ, alone=name == "together")
+        if words and name != "together":
+            raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
+    except Refused as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 2
     received: list[int] = []
     note_signals(received)
     gc.disable()  # until the nodes are there: imports make little garbage and much to look through
@@ -38,6 +51,16 @@ def main(name: str, child: bool = False) -> int:
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)
     return status
+
+
+def _own_words(name: str) -> list[str]:
+    """Words of the command line that are not ROS's."""
+    words = sys.argv[1:]
+    if "--ros-args" not in words:
+        return words
+    begin = words.index("--ros-args")
+    end = words.index("--", begin) + 1 if "--" in words[begin:] else len(words)
+    return words[:begin] + words[end:]
 
 
 def _spare_the_plant() -> None:
@@ -71,6 +94,5 @@ def monitor() -> int:
 
 if __name__ == "__main__":
     is_child = sys.argv[1] == "child"
-    if is_child:
-        del sys.argv[1]
-    sys.exit(main(sys.argv[1], is_child))
+    del sys.argv[1 : 1 + is_child]
+    sys.exit(main(sys.argv.pop(1), is_child))
