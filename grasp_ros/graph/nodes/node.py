@@ -25,6 +25,7 @@ from grasp_ros.graph.host import place
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.messages import Level
 from grasp_ros.graph.parameters import TEXTS
+from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
@@ -255,6 +256,7 @@ class GraspNode(Node):
     def fail(self, reason: str) -> None:
         """End with a sentence, and with the exit status 1."""
         self.state = reason
+        tell_parent(self.get_name(), reason)
         self.get_logger().fatal(reason)
         self.exit_code = 1
         self.finished = True

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from grasp_ros.graph.nodes.beats import BEAT_SECONDS
+from grasp_ros.graph.stopping import tell_parent
 
 EVERY_SECONDS = 5.0  # from one sentence to the next
 PAUSE_SECONDS = 2.0 * BEAT_SECONDS  # between two beats, if the process was stopped itself
@@ -73,4 +74,5 @@ class Watchdog:
             with suppress(OSError):
                 print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
+            tell_parent(self._name, f"stands: {' and '.join(self._frozen()) or 'a law'}")
             os._exit(1)
