@@ -6,21 +6,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
-from itertools import chain, islice
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import running as runnings
 from grasp_ros.graph.columns import Alike, alike
+from grasp_ros.graph.opening import KIND, begin, open_storage, running_of, scene_of
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.rosbag2 import BagError, decode, names_of
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
@@ -28,96 +27,19 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding, read_text
 from grasp_ros.scene.topics import (
     CHANGES,
-    DIAGNOSTICS,
     JOINT_STATES,
     LYAPUNOV,
     LYAPUNOV_NAMES,
-    RUN,
-    SCENE,
+    TIMING,
     Topic,
     state_of,
 )
 
 __all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
-KIND = "a bag of this package"
 VERSION = "version "  # how the keys of versions begin
 BATCH_BYTES = 2**18  # of the messages of a topic that are decoded at once
 MOST_NS = 2**63 - 1
-MOST_AHEAD = 16  # messages, of which two say what the bag holds
-ZSTD = b"\x28\xb5\x2f\xfd"
-CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
-
-
-def open_storage(path: Path, salvage: bool = False) -> Storage:
-    """The storage file of a bag, or of a directory that holds one.
-
-    Raises
-    ------
-    BagError
-        If there is none, or more than one.
-    """
-    with decoding(path, KIND, BagError):
-        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-        if len(files) == 1 and files[0].suffix != ".db3":
-            return Storage(files[0], salvage)
-        if any((path / "bag").glob("*.mcap")):
-            raise BagError(f"{path}: the directory of a run; its bag is {path / 'bag'}")
-        if any(path.glob("*.db3")) or path.suffix == ".db3":
-            raise BagError(f"{path}: its storage is sqlite3; allowed: MCAP, {CONVERT}")
-        if any(path.glob("*.mcap.*")):
-            raise BagError(f"{path}: its file is compressed as a whole; allowed: chunks, {CONVERT}")
-        raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
-
-
-def begin(storage: Storage, path: Path) -> Iterator[Stored]:
-    """All messages of a bag; from the first one on its records say which scene it holds, and how that ran.
-
-    In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
-
-    Raises
-    ------
-    BagError
-        If nothing in the bag says it.
-    """
-    messages = storage.messages()
-    first = list(islice(messages, 1))
-    if first and OWN_RECORD not in storage.records:
-        first += islice(messages, MOST_AHEAD)
-        if any(stored.cdr.startswith(ZSTD) for stored in first):
-            raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
-        storage.records[OWN_RECORD] = _said(first, path)
-    return chain(first, messages)
-
-
-def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
-    """What the topics of a bag say of it, as its own record would."""
-    there = {stored.topic.rpartition("/")[2]: stored for stored in first if stored.type == SCENE.type}
-    if not {SCENE.name, RUN.name} <= there.keys():
-        missing = " and ".join(topic.name for topic in (SCENE, RUN) if topic.name not in there)
-        raise BagError(f"{path}: not {KIND}: nothing at its beginning on {missing}; allowed: all topics of a graph")
-    found = {topic.name: decode(topic, there[topic.name].cdr).data for topic in (SCENE, RUN)}
-    scene, root = scenes.parse(found["scene"], path.name, str(path)), there[SCENE.name].topic.removesuffix(SCENE.name)
-    moved = [topic for topic in topics_of(scene) if topic != DIAGNOSTICS]
-    return {**found, **{f"{TOPIC}{topic.name}": f"{root}{topic.name.lstrip('/')}" for topic in moved}}
-
-
-def scene_of(storage: Storage, path: Path) -> scenes.Scene:
-    """The scene of a bag, once its first record has been read.
-
-    Raises
-    ------
-    BagError
-        If the bag has none.
-    """
-    if OWN_RECORD not in storage.records:
-        raise BagError(f"{path}: not {KIND}: its scene is missing")
-    return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))
-
-
-def running_of(storage: Storage) -> Running:
-    """How the plant of a bag ran, once its first record has been read."""
-    return runnings.parse(storage.records[OWN_RECORD]["run"])
 
 
 def names(path: Path) -> dict[str, Topic]:
@@ -181,7 +103,7 @@ class _Content:
 
     def __init__(self, path: Path, storage: Storage) -> None:
         self.path, self.storage, self.scene = path, storage, scene_of(storage, path)
-        self.changes, self.held = _Changes(), Counter[Topic]()
+        self.changes, self.held, self.timing = _Changes(), Counter[Topic](), list[Any]()
         known = {name: topic for topic, name in names_of(self.scene, storage.records[OWN_RECORD]).items()}
         self.columns = {topic: _Columns(name, topic, self.scene) for name, topic in known.items()}
         held = () if running_of(storage).lockstep else self.scene.controllers.values()
@@ -191,6 +113,8 @@ class _Content:
         """What is done with the messages of a topic."""
         if topic in CHANGES.values():
             return lambda stored: self.changes.add(topic, stored, self.scene)
+        if topic == TIMING:
+            return lambda stored: self.timing.append(decode(topic, stored.cdr))
         if topic in held:  # as they came, not one for each tick
             return lambda _: self.held.update([topic])
         return self.columns[topic].add if topic in self.scene.topics else lambda _: None
@@ -224,7 +148,7 @@ class _Content:
             path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
             counts, ticks, joints[:, :6], joints[:, 6:], command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-            dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage),
+            dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
         )
 
 
@@ -296,6 +220,13 @@ class _Changes(dict[int, dict[str, float]]):
         if new := {name: number for name, number in numbers.items() if now[name] != number}:
             self.setdefault(tick, {}).update(new)
             self._now.update(new)
+
+
+def _table(messages: Sequence[Any]) -> dict[str, Array]:
+    """Lists of numbers with names as columns; those that have not the names of the last one are left out."""
+    alike = [message for message in messages if message.name == messages[-1].name]
+    columns = np.array([message.position for message in alike]).T
+    return dict(zip(messages[-1].name, columns, strict=True)) if messages else {}
 
 
 def _values(topic: Topic, group: Alike) -> Array:

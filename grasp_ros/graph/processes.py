@@ -103,6 +103,7 @@ class Graph:
     peer_timeout: float | None = None
     on_silence: str = "end"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+    begun: float | None = None  # wall time at which the bag was there
     _stopped: dict[str, float] = field(default_factory=dict)  # since when
     _segments: set[str] = field(default_factory=set)  # of shared memory, that were there before
     # The children read the other end: when this one closes, however that comes, they end. They say there why they end.
@@ -197,6 +198,8 @@ class Graph:
             if time.monotonic() > deadline:
                 raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
             self._check()
+            if self.begun is None and self.bag.exists():
+                self.begun = time.monotonic()
             time.sleep(POLL_SECONDS)
         if not received:
             self._check()

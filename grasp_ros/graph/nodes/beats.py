@@ -116,7 +116,8 @@ class Beats:
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
         self._heard = heard
-        self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", _process(str(os.getpid()))[1], False)
+        process = _process(str(os.getpid()))[1]
+        self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
         self._signs: dict[str, Sign] = {}
         self._told = 0.0  # wall time of the last own sign
         self.prepared = 0.0

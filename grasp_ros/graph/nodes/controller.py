@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, TypeGuard
 
@@ -12,6 +13,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph import running as runnings
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
@@ -23,7 +25,7 @@ from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
-from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE
+from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.scene.validation import SceneError
 
 ANNOUNCE_SECONDS = 1.0
@@ -32,10 +34,11 @@ ANNOUNCE_SECONDS = 1.0
 class Controller(PeerNode):
     """Node `left_controller` or `right_controller`; parameters law, wait_for_monitor and others.
 
-    It takes its law from the scene that the plant announces and answers every state with a command of the same
-    stamp. It announces the numbers of its law before the first command that rests on them: at the beginning, after a
-    reset, and when they were set while it runs. With a law of the user's own it announces nothing. When a plant comes
-    with another scene it goes on with that. Other parameters are `real_time_priority` and the numbers of the scene.
+    It takes its law from the scene that the plant announces and answers every state with a command of the same stamp,
+    in a free run the newest one that has come. It announces the numbers of its law before the first command that rests
+    on them: at the beginning, after a reset, and when they were set while it runs. With a law of the user's own it
+    announces nothing. When a plant comes with another scene it goes on with that. Other parameters are
+    `real_time_priority` and the numbers of the scene.
 
     Parameters
     ----------
@@ -65,10 +68,13 @@ class Controller(PeerNode):
         self._turn = 0  # how often the plant had been reset then
         self._force = 0.0  # that answer
         self._ready_to_answer = self._listening = False
+        self._reader = StateReader((self._side,))
         self._held: State | None = None  # the state that came before this node was ready
-        self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0})
+        self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0, "skipped states": 0})
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._stage)
+        self._free = False  # whether the plant waits for no answer
+        self.on_text(RUN, self._on_run)
         self.on_text(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
@@ -81,6 +87,9 @@ class Controller(PeerNode):
     def progress(self) -> object:
         """The last state answered."""
         return self._answered, self._scene
+
+    def _on_run(self, text: str) -> None:
+        self._free = not runnings.parse(text).lockstep
 
     def _on_scene(self, text: str) -> None:
         """A plant has come: the first one, or one after another."""
@@ -134,7 +143,7 @@ class Controller(PeerNode):
         self._priority.take()
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
-            self.subscribe(JOINT_STATES, self._on_state, read=StateReader((self._side,)).read)
+            self._states = self.subscribe(JOINT_STATES, self._on_state, read=self._reader.read)
         self._ready_to_answer = True
         if self._held is not None:
             held, self._held = self._held, None
@@ -175,6 +184,8 @@ class Controller(PeerNode):
             return
         if self._scene is None or not self._admits(state):  # the scene of a new plant may still be on its way
             return
+        if self._free:
+            state = self._newest(state)
         time_ns = state.time_ns
         if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
             self.count("repeated states")  # it, or what answered it, was lost on the way
@@ -200,6 +211,20 @@ class Controller(PeerNode):
         self._force = force
         self._answer(time_ns)
         self.count("answered states")
+
+    def _newest(self, state: State) -> State:
+        """The last state that waits here, or the first after a reset."""
+        for cdr in self.waiting(self._states):
+            newer = None
+            with suppress(*messages.UNREADABLE):
+                newer = self._reader.read(cdr)
+            if not self._admits(newer):
+                continue
+            before, state = state, newer
+            self.count("skipped states")
+            if state.time_ns < before.time_ns:
+                break
+        return state
 
     def _answer(self, time_ns: int) -> None:
         """Publish the command that answers a state."""

@@ -8,6 +8,7 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -261,6 +262,15 @@ class GraspNode(Node):
         self.exit_code = 1
         self.finished = True
 
+    def waiting(self, subscription: Subscription) -> Iterator[Any]:
+        """What has come on a topic and was not taken by the executor."""
+        while True:
+            with subscription.handle:
+                found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            if found is None:
+                return
+            yield found[0]
+
     def sweep(self) -> None:
         """Take what the executor has not been told of.
 
@@ -268,12 +278,8 @@ class GraspNode(Node):
         topic can lie there until the second comes.
         """
         for subscription in tuple(self.subscriptions):
-            for _ in range(SWEEP):
-                with subscription.handle:
-                    found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-                if found is None:
-                    break
-                subscription.callback(found[0])
+            for message in islice(self.waiting(subscription), SWEEP):
+                subscription.callback(message)
         for service in tuple(self.services):
             with service.handle:
                 request, header = service.handle.service_take_request(service.srv_type.Request)

@@ -86,7 +86,8 @@ class Evidence:
             Verdict.SKIPPED: bool(self.skipped), Verdict.TRACEBACK: bool(self.traceback),
             Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
             Verdict.LOST: not self.nothing_to_keep and self.lost > LOST_SECONDS,
-            Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent, Verdict.NAME: self.blames_another,
+            Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent,
+            Verdict.NAME: self.blames_another,
             Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= NOTICE_SECONDS + SLACK_SECONDS,
         }
         return next((verdict for verdict, holds in found.items() if holds), Verdict.SENTENCE)
