@@ -32,6 +32,8 @@ from grasp_ros.scene.topics import (
     LYAPUNOV_NAMES,
     TIMING,
     Topic,
+    announcement_number,
+    between,
     state_of,
 )
 
@@ -149,6 +151,7 @@ class _Content:
             counts, ticks, joints[:, :6], joints[:, 6:], command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
             dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
+            {name: number for name, number in self.changes.unheard.items() if number},
         )
 
 
@@ -209,10 +212,14 @@ class _Changes(dict[int, dict[str, float]]):
 
     def __init__(self) -> None:
         self._now: dict[str, float] = {}
+        self._numbers: dict[Topic, int] = {}
+        self.unheard: Counter[str] = Counter()
 
     def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
         message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
+        before, self._numbers[topic] = self._numbers.get(topic, 0), announcement_number(message)
+        self.unheard[topic.name] += between(before, self._numbers[topic])
         known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
         if not numbers.keys() <= known.keys():
             raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(known)}")

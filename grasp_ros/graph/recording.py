@@ -52,6 +52,8 @@ class Recording:
         the beginning. `tick` and `t` go on where a reset puts simulated time back.
     timing : dict of str to array (m,)
         What a free run has published of its quality, about once a second, see `nodes.timing`; empty in lockstep.
+    unheard : dict of str to int
+        How many announcements of changed numbers the bag lacks, by topic, as far as their numbers show it.
     lost : dict of str to str
         How the recording ended and what is missing from it, as the bag itself says; if it was not closed, what the
         reader has found.
@@ -72,6 +74,7 @@ class Recording:
     starts: np.ndarray
     lost: dict[str, str] = field(default_factory=dict)
     timing: dict[str, Array] = field(default_factory=dict)
+    unheard: dict[str, int] = field(default_factory=dict)
 
     @cached_property
     def t(self) -> Array:
@@ -142,7 +145,10 @@ class Recording:
 
     @property
     def missing(self) -> dict[str, int]:
-        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run."""
+        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run.
+
+        And what is `unheard`.
+        """
         ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else [topic.name for topic in self.scene.controllers.values()]
-        return {name: ticks - count for name, count in self.counts.items() if name not in held}
+        return {**{name: ticks - count for name, count in self.counts.items() if name not in held}, **self.unheard}

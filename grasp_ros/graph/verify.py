@@ -20,7 +20,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CHANGES, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
 STATES = ("left position", "left velocity", "object position", "object velocity", "right position", "right velocity")
@@ -108,6 +108,9 @@ def laws_of(recording: Recording) -> dict[str, str]:
             laws = scenes[tick].system.laws if tick in scenes else laws
             equal += laws[body].command(at, x[row], v[row]) == recording.command[row, body]
         every = len(recording.tick)
+        if equal < every and (lost := recording.unheard.get(CHANGES[side].name)):
+            found[side] = f"not known: the bag lacks {lost} announcements of its numbers"
+            continue
         found[side] = "the scene's law" if equal == every else (
             f"foreign: {every - equal} of {every} commands on {topic.name} are not those of the scene's law"
         )

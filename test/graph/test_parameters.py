@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import rclpy
 from processes import DEADLINE, START, wait_for
@@ -16,9 +17,16 @@ from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 
+from grasp_ros import scene
+from grasp_ros.graph import bag, rosbag2
 from grasp_ros.graph.nodes.controller import Controller
+from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
+from grasp_ros.graph.verify import laws_of
+from grasp_ros.scene.topics import CHANGES
+from grasp_ros.simulation import simulate
+from grasp_ros.studies import recorder
 
 pytestmark = pytest.mark.slow  # real nodes
 GAIN = "left_feedback.position_gain_N_per_m"
@@ -68,6 +76,50 @@ def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> 
     refusing.append(False)
     assert controller.set_parameters([Parameter(GAIN, value=9.0)])[0].successful
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller._law.position_gain == 9.0, "the new gain")
+
+
+def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: Path) -> None:
+    """One for each state that the plant may be ahead of it."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    (tmp_path / "scene.yaml").write_text(scene.load("arm_alone", ["time.duration_s=0.6"]).to_yaml())
+    watched = Parameter("wait_for_monitor", value=True)
+    given = [Parameter("scene", value=str(tmp_path / "scene.yaml")), watched]
+    plant = Plant(context=context, parameter_overrides=given)
+    controller = Controller("left_controller", context=context, parameter_overrides=[watched])
+    monitor = Monitor(context=context, parameter_overrides=[Parameter("bag", value=str(tmp_path / "bag"))])
+    loop, behind = (SingleThreadedExecutor(context=context) for _ in range(2))
+    for executor, node in ((loop, plant), (loop, controller), (behind, monitor)):
+        executor.add_node(node)
+    wait_for(lambda: [executor.spin_once(timeout_sec=0.01) for executor in (loop, behind)] and plant.tick > 2, "ticks")
+    while plant.tick < 490:
+        assert controller.set_parameters([Parameter(GAIN, value=1.0 + plant.tick)])[0].successful
+        loop.spin_once(timeout_sec=0.1)
+    wait_for(lambda: [executor.spin_once(timeout_sec=0.001) for executor in (loop, behind)] and monitor.finished, "end")
+    for node in (plant, controller, monitor):
+        node.end()
+    context.shutdown()
+    recording = bag.read(tmp_path / "bag")
+    assert len(recording.changes) > 400
+    assert laws_of(recording) == {"left": "the scene's law"}
+    assert not any(recording.missing.values())
+    assert recording.lost["lost announcements"] == recording.lost["refused announcements"] == "0"
+
+
+def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:
+    run = simulate(scene.load("arm_alone", ["time.duration_s=0.004"]), sampled=True)
+    writer = bag.Recorder(tmp_path / "bag", run.scene, {})
+    numbers = run.scene.numbers_of("left_controller")
+    for tick, (time_ns, rows, own) in enumerate(recorder.ticks_of(run)):
+        values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
+        said = rosbag2.list_message(time_ns, list(numbers), values, frame=str(1 + 2 * tick))
+        beside = [(CHANGES["left"], said)] if tick < 3 else []
+        writer.write_tick(time_ns, [*beside, *rows], own)
+    writer.close()
+    recording = bag.read(tmp_path / "bag")
+    assert recording.unheard == {"left/parameters": 2}
+    assert recording.missing["left/parameters"] == 2
+    assert laws_of(recording) == {"left": "not known: the bag lacks 2 announcements of its numbers"}
 
 
 def test_help_names_what_can_be_set(loop: tuple[Any, ...]) -> None:

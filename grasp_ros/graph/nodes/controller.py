@@ -67,6 +67,7 @@ class Controller(PeerNode):
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
         self._turn = 0  # how often the plant had been reset then
         self._force = 0.0  # that answer
+        self._number = 0  # of the last announcement for this scene
         self._ready_to_answer = self._listening = False
         self._reader = StateReader((self._side,))
         self._held: State | None = None  # the state that came before this node was ready
@@ -115,7 +116,7 @@ class Controller(PeerNode):
         self.forget_scene()
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
-        self._scene, self._answered, self.concern = scene, -1, ""
+        self._scene, self._answered, self.concern, self._number = scene, -1, "", 0
         self._law = scene.system.laws[SIDES[self._side]]
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
@@ -162,8 +163,9 @@ class Controller(PeerNode):
         self._staged.clear()
         self._law = self._scene.system.laws[SIDES[self._side]]
         if self._own is None:
-            numbers = self._scene.numbers_of(self._executable)
-            self._announcements.publish(messages.named_list(time_ns, list(numbers), list(numbers.values())))
+            numbers, self._number = self._scene.numbers_of(self._executable), self._number + 1
+            message = messages.named_list(time_ns, list(numbers), list(numbers.values()), self._number)
+            self._announcements.publish(message)
             # What a reader has received before it receives the command, it also sees before.
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
