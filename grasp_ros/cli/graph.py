@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import signal
 import sys
 import time
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
-from grasp_ros.graph.host import network
+from grasp_ros.graph.host import check, network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
+
+if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
+    from grasp_ros.graph.recording import Recording
 
 
 def add_to(commands: Any) -> None:
@@ -49,6 +53,9 @@ def add_to(commands: Any) -> None:
     sub.add_argument(
         "--on-silence", choices=("end", "wait"), default="end", help="what is done when a node is gone or silent"
     )
+    sub.add_argument("--no-check", action="store_true", help="do not simulate the run again to compare every bit")
+    sub.add_argument("--no-figure", action="store_true", help="draw no figure")
+    _add_limits(sub)
     _add_network(sub)
     sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
     sub.add_argument("bag", type=Path)
@@ -56,6 +63,7 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
+    _add_limits(sub)
     sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
     sub.add_argument("bag", type=Path)
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
@@ -74,12 +82,34 @@ def add_to(commands: Any) -> None:
     sub.add_argument("bag", type=Path)
 
 
+def _add_limits(sub: argparse.ArgumentParser) -> None:
+    """What a free run has to keep."""
+    sub.add_argument("--max-age", type=float, metavar="N", help="of a free run: exit status 1 if a command was older,"
+                     " in control periods")
+    sub.add_argument("--min-factor", type=float, metavar="F", help="of a free run: exit status 1 if it was slower,"
+                     " simulated seconds in a second")
+
+
+def _keeps(recording: Recording, options: argparse.Namespace) -> bool:
+    """Whether a run kept the limits that were stated; says which it did not keep."""
+    broken = []
+    oldest = max((most for _, most in recording.ages.values()), default=math.nan)
+    if options.max_age is not None and not oldest <= options.max_age:
+        broken.append(f"--max-age {options.max_age:g}: the oldest command was {oldest:g} periods old")
+    if options.min_factor is not None and not recording.reached >= options.min_factor:
+        broken.append(f"--min-factor {options.min_factor:g}: {recording.reached:.3g} s in a second was reached")
+    for words in broken:
+        print(f"grasp: {words}", file=sys.stderr)
+    return not broken
+
+
 def _add_network(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--network", action="store_true", help="let other hosts take part; default: this host alone")
 
 
 def _reach(options: argparse.Namespace) -> None:
-    """Let the processes that come be reached from where the options say."""
+    """Let the processes that come be reached from where the options say, and refuse where none can be."""
+    check(os.environ, alone=getattr(options, "one_process", False))
     if options.network:
         os.environ.update(network(os.environ))
 
@@ -90,8 +120,10 @@ def _run(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     Running(options.accuracy, real_time_factor=options.free_running or 0.0)  # refuses what is wrong
+    spent = Spent()
     if not kernels_on_disk():  # otherwise the plant alone loads them
         prepare()
+        spent.note("compilation")
     plant = {"paused": str(options.paused).lower()}
     if options.free_running is not None:
         plant.update(free_running="true", real_time_factor=repr(options.free_running))
@@ -100,19 +132,36 @@ def _run(options: argparse.Namespace) -> int:
         plant=plant, one_process=options.one_process, namespace=options.namespace,
         peer_timeout=options.peer_timeout, on_silence=options.on_silence,
     )
-    begin = time.monotonic()
     try:
-        stopped = _live(graph)
+        stopped = _live(graph, spent)
     except GraphError:
         return 1
-    seconds = time.monotonic() - begin
     if not (graph.bag / "metadata.yaml").exists():
-        print("interrupted before the first tick: no bag")
-        return 0
-    return _report(graph, stopped, seconds)
+        print("grasp: interrupted before the first tick: no bag", file=sys.stderr)
+        return 130
+    return _report(graph, stopped, spent, options)
 
 
-def _live(graph: Graph) -> bool:
+class Spent:
+    """Wall time of a command, by what took it."""
+
+    def __init__(self) -> None:
+        self._begin = self._last = time.monotonic()
+        self._parts: list[str] = []
+
+    def note(self, what: str, until: float | None = None) -> None:
+        """Something has ended."""
+        now = time.monotonic() if until is None else until
+        self._parts.append(f"{what} {now - self._last:.1f}")
+        self._last = now
+
+    @property
+    def words(self) -> str:
+        """For a reader."""
+        return f"{time.monotonic() - self._begin:.1f} s: {', '.join(self._parts)}"
+
+
+def _live(graph: Graph, spent: Spent) -> bool:
     """Start a graph, wait for its end and stop it; returns whether a signal has ended it."""
     received: list[int] = []
     before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
@@ -120,33 +169,43 @@ def _live(graph: Graph) -> bool:
     try:
         graph.start()
         graph.wait(received)
+        spent.note("start", graph.begun)
+        spent.note("run")
     except GraphError as error:  # said before the others are stopped, which takes a while
         there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
         print(f"grasp: {error}{there}", file=sys.stderr)
         raise
     finally:
         graph.stop()
+        spent.note("stop")
         for number, handler in before.items():
             signal.signal(number, handler)
     return bool(received)
 
 
-def _report(graph: Graph, stopped: bool, seconds: float) -> int:
+def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespace) -> int:
     """Print and draw what a run has recorded; the exit status says whether it is all there and right."""
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.comparison import compare_recording
-    from grasp_ros.simulation import plots
 
     recording = bag.read(graph.bag)
-    rows, whole = report.describe_recording(recording), True
+    rows, whole = report.describe_recording(recording), _keeps(recording, options)
+    spent.note("reading")
     if not stopped:
+        whole = whole and not recording.alarms and not any(recording.missing.values())
+    if not (stopped or options.no_check):
         comparison = compare_recording(recording)
-        whole = comparison.equal and not recording.alarms and not any(recording.missing.values())
+        whole, rows = whole and comparison.equal, rows + comparison.rows
+        spent.note("check")
+    if not (stopped or options.no_figure):
+        from grasp_ros.simulation import plots
+
         figure = graph.directory / "figure.png"
         plots.draw(recording, figure, graph.scene.feedback_in_words(sampled=True))
-        rows += [*comparison.rows, ("figure", str(figure))]
-    print(report.table([*rows, ("wall time", f"{seconds:.1f} s with start and stop")]))
+        rows.append(("figure", str(figure)))
+        spent.note("figure")
+    print(report.table([*rows, ("wall time", spent.words)]))
     return 0 if whole else 1
 
 
@@ -174,7 +233,7 @@ def _inspect(options: argparse.Namespace) -> int:
         comparison = compare_recording(recording)
         rows, equal = rows + comparison.rows, comparison.equal
     print(report.table(rows))
-    return 0 if equal else 1
+    return 0 if equal and _keeps(recording, options) else 1
 
 
 def _replay(options: argparse.Namespace) -> int:

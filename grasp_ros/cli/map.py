@@ -70,7 +70,7 @@ def _run(options: argparse.Namespace) -> int:
     setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.max_events, options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
     prepare()
-    with tqdm(total=plan.rows, unit="run", desc=scene.name, smoothing=0.05) as bar:
+    with tqdm(total=plan.rows, unit="run", desc=scene.name, smoothing=0.05, disable=None) as bar:
         def progress(done: int, _: int) -> None:
             bar.update(done - bar.n)
 

@@ -115,16 +115,18 @@ def describe_recording(recording: Recording) -> list[Row]:
     per_topic = ", ".join(f"{name} {count}" for name, count in recording.counts.items())
     resets = len(recording.starts) - 1
     missing = {name: count for name, count in recording.missing.items() if count}
+    lost = ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"
     rows = [
         ("bag", str(recording.path)),
         ("scene", scene.title),
         ("feedback", scene.feedback_in_words(sampled=True)),
         ("run", recording.running.words + (f", {resets} resets" if resets > 0 else "")),
+        *_timing(recording),
         ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
         ("messages", per_topic),
-        ("lost", ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"),
+        ("lost", lost),
         ("end", recording.lost["end"]),
-        ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items())),
+        ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items()) or "not said"),
     ]
     for tick, numbers in recording.changes.items():
         rows.append((f"set at {scene.time_of(tick):g} s", ", ".join(f"{name} {n:g}" for name, n in numbers.items())))
@@ -133,15 +135,28 @@ def describe_recording(recording: Recording) -> list[Row]:
         mode, level = named["mode"], recording.energy
         of = "" if recording.closed else " of the plant alone"
         begun = [_beginnings(mode, flag) for flag in (Mode.LEFT, Mode.RIGHT)]
-        rows.insert(6, ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"))
-        rows.insert(7, (f"V{of}", _ends(level.V)))
-        rows.insert(8, (f"V_c{of}", _ends(level.V_c)))
-        rows.insert(9, ("certificate", scene.certificate_in_words(sampled=True) if recording.closed else
-                        "none: the law of a controller is not known"))
-        rows.insert(10, ("work of the held forces", f"{0.5 * float(np.nansum(named['work'])):.6g} J"))
-        alarms = f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"
-        rows.insert(11, ("energy balance", alarms))
+        at = rows.index(("lost", lost))
+        rows[at:at] = [
+            ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"),
+            (f"V{of}", _ends(level.V)), (f"V_c{of}", _ends(level.V_c)),
+            ("certificate", scene.certificate_in_words(sampled=True) if recording.closed else
+             "none: the law of a controller is not known"),
+            ("work of the held forces", f"{0.5 * float(np.nansum(named['work'])):.6g} J"),
+            ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"),
+        ]
     return _with_words(scene, rows)
+
+
+def _timing(recording: Recording) -> list[Row]:
+    """What a free run came to."""
+    if not recording.timing:
+        return []
+    ages = "; ".join(f"{side} {most:.0f}, 99 % {usual:.0f}" for side, (usual, most) in recording.ages.items())
+    given_up = float(recording.timing["lost_s"][-1])
+    return [
+        ("reached", f"{recording.reached:.3g} s in a second, {recording.overruns} overruns, {given_up:.2g} s given up"),
+        ("oldest commands", f"{ages or 'none'}, periods"),
+    ]
 
 
 def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:

@@ -79,7 +79,7 @@ def _simulate(options: argparse.Namespace) -> int:
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
     silent = METHODS[options.method].knob == STEP
-    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=silent, delay=1.0) as bar:
+    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=silent or None, delay=1.0) as bar:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,

@@ -45,9 +45,10 @@ def play(recording: Recording, rate: float) -> None:
 
 def moment_of(recording: Recording, row: int, words: str) -> Moment:
     """What the view shows of a tick of a recording."""
-    commands = {side: float(recording.command[row, body]) for side, body in SIDES.items()
-                if body in recording.scene.system.laws}
+    lockstep = recording.running.lockstep
+    forces = recording.command if lockstep else recording.effort
+    commands = {side: float(forces[row, body]) for side, body in SIDES.items() if body in recording.scene.system.laws}
     impacts = {side: float(recording.outputs[topic.name][row]) for side, topic in CONTACTS.items()
                if topic.name in recording.outputs}
     level = named(recording.lyapunov[row])
-    return Moment(float(recording.t[row]), recording.state[row], commands, impacts, level, words)
+    return Moment(float(recording.t[row]), recording.state[row], commands, impacts, level, words, lockstep)

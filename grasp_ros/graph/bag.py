@@ -6,66 +6,42 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import running as runnings
 from grasp_ros.graph.columns import Alike, alike
+from grasp_ros.graph.opening import KIND, begin, open_storage, running_of, scene_of
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.rosbag2 import BagError, decode, names_of
-from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding, read_text
-from grasp_ros.scene.topics import CHANGES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
+from grasp_ros.scene.topics import (
+    CHANGES,
+    JOINT_STATES,
+    LYAPUNOV,
+    LYAPUNOV_NAMES,
+    TIMING,
+    Topic,
+    announcement_number,
+    between,
+    state_of,
+)
 
 __all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
-KIND = "a bag of this package"
 VERSION = "version "  # how the keys of versions begin
 BATCH_BYTES = 2**18  # of the messages of a topic that are decoded at once
 MOST_NS = 2**63 - 1
 WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
-
-
-def open_storage(path: Path, salvage: bool = False) -> Storage:
-    """The storage file of a bag, or of a directory that holds one.
-
-    Raises
-    ------
-    BagError
-        If there is none, or more than one.
-    """
-    with decoding(path, KIND, BagError):
-        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
-        if len(files) != 1:
-            raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
-        return Storage(files[0], salvage)
-
-
-def scene_of(storage: Storage, path: Path) -> scenes.Scene:
-    """The scene of a bag, once its first record has been read.
-
-    Raises
-    ------
-    BagError
-        If the bag has none.
-    """
-    if OWN_RECORD not in storage.records:
-        raise BagError(f"{path}: not {KIND}: its scene is missing")
-    return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))
-
-
-def running_of(storage: Storage) -> Running:
-    """How the plant of a bag ran, once its first record has been read."""
-    return runnings.parse(storage.records[OWN_RECORD]["run"])
 
 
 def names(path: Path) -> dict[str, Topic]:
@@ -78,7 +54,7 @@ def names(path: Path) -> dict[str, Topic]:
     """
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError,)):
-        next(storage.messages())
+        next(begin(storage, path), None)
         scene = scene_of(storage, path)
         return {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
 
@@ -106,7 +82,7 @@ def read(path: Path) -> Recording:
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
         content = None
-        for stored in storage.messages():
+        for stored in begin(storage, path):
             if content is None:
                 content = _Content(path, storage)
             content.take(stored)
@@ -119,7 +95,7 @@ def read(path: Path) -> Recording:
 def _check_metadata(path: Path, storage: Storage) -> None:
     """Refuse a metadata.yaml that is not the one that was written when the bag was closed."""
     file = path / "metadata.yaml"
-    there = storage.closed and path.is_dir() and file.exists()
+    there = storage.closed and LOST_RECORD in storage.records and path.is_dir() and file.exists()
     if there and checksum(read_text(file, BagError)) != storage.records[LOST_RECORD][BESIDE]:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
@@ -129,7 +105,7 @@ class _Content:
 
     def __init__(self, path: Path, storage: Storage) -> None:
         self.path, self.storage, self.scene = path, storage, scene_of(storage, path)
-        self.changes, self.held = _Changes(), Counter[Topic]()
+        self.changes, self.held, self.timing = _Changes(), Counter[Topic](), list[Any]()
         known = {name: topic for topic, name in names_of(self.scene, storage.records[OWN_RECORD]).items()}
         self.columns = {topic: _Columns(name, topic, self.scene) for name, topic in known.items()}
         held = () if running_of(storage).lockstep else self.scene.controllers.values()
@@ -139,6 +115,8 @@ class _Content:
         """What is done with the messages of a topic."""
         if topic in CHANGES.values():
             return lambda stored: self.changes.add(topic, stored, self.scene)
+        if topic == TIMING:
+            return lambda stored: self.timing.append(decode(topic, stored.cdr))
         if topic in held:  # as they came, not one for each tick
             return lambda _: self.held.update([topic])
         return self.columns[topic].add if topic in self.scene.topics else lambda _: None
@@ -172,7 +150,8 @@ class _Content:
             path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
             counts, ticks, joints[:, :6], joints[:, 6:], command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-            dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage),
+            dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
+            {name: number for name, number in self.changes.unheard.items() if number},
         )
 
 
@@ -233,10 +212,14 @@ class _Changes(dict[int, dict[str, float]]):
 
     def __init__(self) -> None:
         self._now: dict[str, float] = {}
+        self._numbers: dict[Topic, int] = {}
+        self.unheard: Counter[str] = Counter()
 
     def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
         message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
+        before, self._numbers[topic] = self._numbers.get(topic, 0), announcement_number(message)
+        self.unheard[topic.name] += between(before, self._numbers[topic])
         known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
         if not numbers.keys() <= known.keys():
             raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(known)}")
@@ -244,6 +227,13 @@ class _Changes(dict[int, dict[str, float]]):
         if new := {name: number for name, number in numbers.items() if now[name] != number}:
             self.setdefault(tick, {}).update(new)
             self._now.update(new)
+
+
+def _table(messages: Sequence[Any]) -> dict[str, Array]:
+    """Lists of numbers with names as columns; those that have not the names of the last one are left out."""
+    alike = [message for message in messages if message.name == messages[-1].name]
+    columns = np.array([message.position for message in alike]).T
+    return dict(zip(messages[-1].name, columns, strict=True)) if messages else {}
 
 
 def _values(topic: Topic, group: Alike) -> Array:
@@ -259,7 +249,8 @@ def _values(topic: Topic, group: Alike) -> Array:
 
 def _lost(storage: Storage) -> dict[str, str]:
     """What the bag says about its end; in place of a word that it does not have, what its reader has seen."""
-    if storage.closed:
-        return {key: word for key, word in storage.records[LOST_RECORD].items() if key != BESIDE}
-    left_out = sum(size for _, size, _ in storage.left_out)
-    return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
+    if not storage.closed:
+        left_out = sum(size for _, size, _ in storage.left_out)
+        return {"end": f"not closed; {left_out} bytes behind the last whole chunk are left out"}
+    anew = {"end": "written anew by another program, which does not say what was lost"}
+    return {key: word for key, word in storage.records.get(LOST_RECORD, anew).items() if key != BESIDE}

@@ -57,7 +57,7 @@ def compare_recording(recording: Recording) -> Comparison:
 
 
 def _foreign(law: str) -> bool:
-    return law.startswith("foreign")
+    return law.startswith(("foreign", "not known"))
 
 
 def _equal(same: Trajectory, recording: Recording) -> bool:

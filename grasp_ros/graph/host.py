@@ -10,9 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from grasp_ros import CONFIG
+from grasp_ros.physics.errors import Refused
 
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
-LOCALHOST, SUBNET = "LOCALHOST", "SUBNET"
+OFF, LOCALHOST, SUBNET = "OFF", "LOCALHOST", "SUBNET"
+RANGES = ("", LOCALHOST, SUBNET, "SYSTEM_DEFAULT")
+DOMAIN, MOST_DOMAIN = "ROS_DOMAIN_ID", 232  # the last one whose ports exist
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 PROFILE = CONFIG / "this_host.xml"
 OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
@@ -34,3 +37,31 @@ def this_host(given: Mapping[str, str]) -> dict[str, str]:
         return {}
     own = given.get("RMW_IMPLEMENTATION", OURS) != OURS or any(given.get(name) for name in OTHER_WISHES)
     return {RANGE: LOCALHOST} if own else {RANGE: LOCALHOST, PROFILES: str(PROFILE)}
+
+
+def place(given: Mapping[str, str], namespace: str) -> str:
+    """Where a process with these variables looks for others, in words."""
+    reach = "this host" if given.get(RANGE) == LOCALHOST else "the network"
+    return f"in ROS domain {given.get(DOMAIN) or 0}, namespace {namespace}, on {reach}"
+
+
+def check(given: Mapping[str, str], alone: bool = False) -> None:
+    """Refuse variables with which a graph would be somewhere else, or in no place where its nodes find each other.
+
+    Parameters
+    ----------
+    given : mapping of str to str
+    alone : bool, optional
+        Whether all nodes are in one process, which need not look for others.
+
+    Raises
+    ------
+    Refused
+        ROS itself would take another domain, or wait.
+    """
+    domain, reach = given.get(DOMAIN, ""), given.get(RANGE, "")
+    if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):
+        raise Refused(f"{DOMAIN}: {domain!r} is not allowed; allowed: 0 to {MOST_DOMAIN}")
+    if reach not in RANGES and not (alone and reach == OFF):
+        why = ", no node would find another" if reach == OFF else ""
+        raise Refused(f"{RANGE}: {reach!r} is not allowed{why}; allowed: {', '.join(RANGES[1:])}")

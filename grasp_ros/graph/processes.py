@@ -6,10 +6,12 @@ import json
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -28,6 +30,7 @@ PEER_SECONDS = 1.5  # without a sign of life of a node
 # was stopped.
 NODES_SECONDS = 0.4
 MONITOR_NICE = 10
+LONGEST = 2**16  # bytes of last words
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
@@ -100,9 +103,12 @@ class Graph:
     peer_timeout: float | None = None
     on_silence: str = "end"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
+    begun: float | None = None  # wall time at which the bag was there
     _stopped: dict[str, float] = field(default_factory=dict)  # since when
     _segments: set[str] = field(default_factory=set)  # of shared memory, that were there before
-    _lifeline: int = -1  # the children read the other end: when this one closes, however that comes, they end
+    # The children read the other end: when this one closes, however that comes, they end. They say there why they end.
+    _lifeline: socket.socket | None = None
+    _causes: list[tuple[float, str]] = field(default_factory=list)  # wall time, and what was said then
 
     @property
     def bag(self) -> Path:
@@ -155,16 +161,17 @@ class Graph:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         shared_memory.remove_left()
         self._segments = shared_memory.segments()
-        end, self._lifeline = os.pipe()
+        self._lifeline, end = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._lifeline.setblocking(False)
         try:
             for name, command in self._commands(settings).items():
                 self.processes[name] = subprocess.Popen(
-                    command, env=environment, start_new_session=True, stdin=end, stderr=self.errors
+                    command, env=environment, start_new_session=True, stdin=end.fileno(), stderr=self.errors
                 )
             if "free_running" in self.plant and not self.one_process:  # the monitor may be late, the others may not
                 os.setpriority(os.PRIO_PROCESS, self.processes["monitor"].pid, MONITOR_NICE)
         finally:
-            os.close(end)
+            end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
@@ -191,16 +198,34 @@ class Graph:
             if time.monotonic() > deadline:
                 raise GraphError(f"{running[0]}: still runs although its counterpart has ended")
             self._check()
+            if self.begun is None and self.bag.exists():
+                self.begun = time.monotonic()
             time.sleep(POLL_SECONDS)
         if not received:
             self._check()
 
     def _check(self) -> None:
-        """Nobody has failed, or stands still."""
+        """Nobody has failed, or stands still; the one to name is the first that has said why, or that was killed."""
+        ended = {name: process.returncode for name, process in self.processes.items() if process.poll() is not None}
+        self._hear()
+        for name, status in ended.items():
+            if status < 0:
+                self._causes.append((time.monotonic(), f"{name}: was killed by {signal.Signals(-status).name}"))
+        if ended and self._causes:
+            raise GraphError(min(self._causes)[1])
+        for name, status in ended.items():
+            if status or name.endswith("controller"):
+                raise GraphError(f"{name}: ended with exit status {status} before the run was over")
         for name, process in self.processes.items():
-            if process.poll() or (process.poll() == 0 and name.endswith("controller")):
-                raise GraphError(f"{name}: ended with exit status {process.returncode} before the run was over")
             self._see_whether_stopped(name, process)
+
+    def _hear(self) -> None:
+        """Take what the nodes have said about their ends."""
+        assert self._lifeline is not None
+        with suppress(BlockingIOError):
+            while content := self._lifeline.recv(LONGEST):
+                when, node, why = json.loads(content)
+                self._causes.append((when, f"{node}: {why}"))
 
     def _see_whether_stopped(self, name: str, process: subprocess.Popen[bytes]) -> None:
         """Nobody else is there to notice it when all nodes are in one process, or when all are stopped."""
@@ -228,9 +253,9 @@ class Graph:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-        if self._lifeline >= 0:
-            os.close(self._lifeline)
-            self._lifeline = -1
+        if self._lifeline is not None:
+            self._lifeline.close()
+            self._lifeline = None
         statuses = {name: process.returncode for name, process in self.processes.items()}
         if any(status < 0 for status in statuses.values()):  # killed: what it has left is of no use to anybody
             shared_memory.remove_unused(shared_memory.segments() - self._segments)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -14,6 +15,7 @@ from grasp_ros.graph.running import Running
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.scene.topics import EXTERNAL_FORCES, LYAPUNOV_NAMES
 
@@ -48,6 +50,10 @@ class Recording:
     starts : int array (k,)
         Ticks of the bag at which the plant began the scene, again after each reset; the first is 0 in a bag that has
         the beginning. `tick` and `t` go on where a reset puts simulated time back.
+    timing : dict of str to array (m,)
+        What a free run has published of its quality, about once a second, see `nodes.timing`; empty in lockstep.
+    unheard : dict of str to int
+        How many announcements of changed numbers the bag lacks, by topic, as far as their numbers show it.
     lost : dict of str to str
         How the recording ended and what is missing from it, as the bag itself says; if it was not closed, what the
         reader has found.
@@ -67,6 +73,8 @@ class Recording:
     running: Running
     starts: np.ndarray
     lost: dict[str, str] = field(default_factory=dict)
+    timing: dict[str, Array] = field(default_factory=dict)
+    unheard: dict[str, int] = field(default_factory=dict)
 
     @cached_property
     def t(self) -> Array:
@@ -88,6 +96,22 @@ class Recording:
             inputs += np.stack([self.outputs.get(external[body], nothing) for body in (LEFT, RIGHT, OBJECT)], axis=1)
         inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
         return inputs
+
+    @property
+    def reached(self) -> float:
+        """Simulated seconds in a second that a free run has reached, without pauses; NaN if it has not said it."""
+        return float(self.timing["reached"][-1]) if self.timing else math.nan
+
+    @property
+    def overruns(self) -> int:
+        """Periods of a free run that were computed later than a whole period."""
+        return int(self.timing["overruns"][-1]) if self.timing else 0
+
+    @property
+    def ages(self) -> dict[str, tuple[float, float]]:
+        """By how many periods the states that commands answer are older: 99th percentile and largest, by side."""
+        return {side: (float(self.timing[f"{side}_age_p99_all"][-1]), float(self.timing[f"{side}_age_max_all"][-1]))
+                for side in SIDES if f"{side}_age_p99_all" in self.timing}
 
     @property
     def closed(self) -> bool:
@@ -121,7 +145,10 @@ class Recording:
 
     @property
     def missing(self) -> dict[str, int]:
-        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run."""
+        """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run.
+
+        And what is `unheard`.
+        """
         ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else [topic.name for topic in self.scene.controllers.values()]
-        return {name: ticks - count for name, count in self.counts.items() if name not in held}
+        return {**{name: ticks - count for name, count in self.counts.items() if name not in held}, **self.unheard}

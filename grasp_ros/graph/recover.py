@@ -10,11 +10,9 @@ from typing import NamedTuple
 from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import bag
-from grasp_ros.graph import running as runnings
+from grasp_ros.graph import bag, opening
 from grasp_ros.graph.recorder import OWN_RECORD, Recorder
 from grasp_ros.graph.rosbag2 import BagError, decode, names_of
-from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import decoding
@@ -43,21 +41,19 @@ def recover(path: Path, new: Path) -> Recovery:
     BagError
         If nothing can be saved, or if the new bag cannot be written.
     """
-    storage = bag.open_storage(path, salvage=True)
-    with decoding(path, bag.KIND, BagError, (SerdeError,)):
-        messages = storage.messages()
+    storage = opening.open_storage(path, salvage=True)
+    with decoding(path, opening.KIND, BagError, (SerdeError,)):
+        messages = opening.begin(storage, path)
         first = next(messages, None)
         if first is None:
             raise BagError(f"{path}: nothing can be recovered: it holds no whole chunk")
-        custom = storage.records.get(OWN_RECORD) or {"scene": decode(SCENE, first.cdr).data}
-        scene = scenes.parse(custom["scene"], path.name, str(path))
-    ticks = _ticks(storage, first, messages, scene)
+        custom, scene = storage.records[OWN_RECORD], opening.scene_of(storage, path)
+    ticks = _ticks(storage, chain([first], messages), scene)
     begin = next(ticks, None)
     if begin is None:
         raise BagError(f"{path}: nothing can be recovered: it holds no complete tick")
-    running = runnings.parse(custom["run"]) if "run" in custom else Running()
     versions = {key.removeprefix(bag.VERSION): word for key, word in custom.items() if key.startswith(bag.VERSION)}
-    recorder, written = Recorder(new, scene, versions, names_of(scene, custom), running), 0
+    recorder, written = Recorder(new, scene, versions, names_of(scene, custom), opening.running_of(storage)), 0
     try:
         for time_ns, tick, beside in chain([begin], ticks):
             stamp_ns, own = _lyapunov(path, tick.pop(LYAPUNOV))
@@ -75,7 +71,7 @@ def recover(path: Path, new: Path) -> Recovery:
 
 def _lyapunov(path: Path, cdr: bytes) -> tuple[int, list[float]]:
     """Time in ns and numbers of what the monitor had computed."""
-    with decoding(path, bag.KIND, BagError, (SerdeError, AttributeError)):
+    with decoding(path, opening.KIND, BagError, (SerdeError, AttributeError)):
         own = decode(LYAPUNOV, cdr)
         values = own.position.tolist()
     if len(values) != len(LYAPUNOV_NAMES):
@@ -83,16 +79,15 @@ def _lyapunov(path: Path, cdr: bytes) -> tuple[int, list[float]]:
     return own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec, values
 
 
-def _ticks(storage: Storage, first: Stored, following: Iterator[Stored], scene: scenes.Scene
+def _ticks(storage: Storage, messages: Iterator[Stored], scene: scenes.Scene
            ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
     """Time, messages by topic, and what lies beside them, of every tick of which all are there, in ascending order."""
-    custom = storage.records.get(OWN_RECORD, {})
-    known = {(name, topic.type): topic for topic, name in names_of(scene, custom).items()}
-    lockstep = "run" not in custom or runnings.parse(custom["run"]).lockstep
-    wanted = {topic for topic in scene.topics if lockstep or topic not in scene.controllers.values()}
+    known = {(name, topic.type): topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
+    held = () if opening.running_of(storage).lockstep else scene.controllers.values()
+    wanted = {topic for topic in scene.topics if topic not in held}
     before = -1
-    with decoding(storage.path, bag.KIND, BagError, (SerdeError,)):
-        for time_ns, group in groupby(chain([first], following), lambda stored: stored.time_ns):
+    with decoding(storage.path, opening.KIND, BagError, (SerdeError,)):
+        for time_ns, group in groupby(messages, lambda stored: stored.time_ns):
             tick: dict[Topic, bytes] = {}
             beside = []
             for stored in group:

@@ -1,21 +1,25 @@
 """The signals that end a process cleanly, and the end of the process that started it.
 
-A process of the graph inherits the reading end of a pipe as its standard input. Whatever ends the process that holds
-the other end, a SIGKILL included, closes it.
+A process of the graph inherits one end of a pair of sockets as its standard input. Whatever ends the process that holds
+the other end, a SIGKILL included, closes it. On the same way it tells that process why it ends itself.
 """
 
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import signal
 import sys
 import threading
+import time
 from contextlib import suppress
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 GRACE_SECONDS = 10.0  # to end cleanly after the process that started this one has ended
+MOST_WORDS = 4000  # characters
 PR_SET_PDEATHSIG = 1  # of prctl(2)
+_parent: list[int] = []  # file descriptor of the way to the process that started this one, if it is one of ours
 
 
 def note_signals(received: list[int]) -> None:
@@ -45,6 +49,13 @@ def raise_on_signals() -> None:
         os.register_at_fork(after_in_child=give_back)
 
 
+def tell_parent(node: str, why: str) -> None:
+    """Let the process that started this one know why a node ends early, and since when."""
+    with suppress(OSError):  # it has ended
+        for way in _parent:
+            os.write(way, json.dumps([time.monotonic(), node, why[:MOST_WORDS]]).encode())
+
+
 def end_with_parent(received: list[int], name: str) -> None:
     """Note the end of the process that holds the other end of the standard input; then end, if late by force.
 
@@ -55,6 +66,7 @@ def end_with_parent(received: list[int], name: str) -> None:
     name : str
         Of the node.
     """
+    _parent.append(0)
     if sys.platform == "linux":  # a process that was stopped could not end: its parent's death lets it go on
         with suppress(OSError, AttributeError):
             ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGCONT)

@@ -183,12 +183,14 @@ class Storage:
 
     def _check_sums(self) -> None:
         """Refuse a closed file of which a byte is wrong."""
-        data = self._data
+        data = memoryview(self._data)
         footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
         end = footer.summary_start
-        index = memoryview(data)[end : len(data) - len(MAGIC) - 4]
-        good = end <= len(data) and zlib.crc32(index) == footer.summary_crc
-        if not good or zlib.crc32(memoryview(data)[: end - DATA_END_BYTES]) != SUM.unpack_from(data, end - SUM.size)[0]:
+        if not DATA_END_BYTES <= end <= len(data):
+            self._refuse("its end does not say where its index is")
+        parts = ((data[end : -len(MAGIC) - SUM.size], footer.summary_crc),
+                 (data[: end - DATA_END_BYTES], SUM.unpack_from(data, end - SUM.size)[0]))
+        if any(stored and zlib.crc32(part) != stored for part, stored in parts):  # 0: its writer has made none
             self._refuse("a checksum is wrong")
 
     def _check_end(self, offset: int, end: int) -> None:

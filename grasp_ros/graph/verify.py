@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from copy import copy
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CHANGES, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
 STATES = ("left position", "left velocity", "object position", "object velocity", "right position", "right velocity")
@@ -56,6 +57,8 @@ class Verification(NamedTuple):
         """For a reader."""
         if self.difference is not None:
             return f"NOT EQUAL, first at {self.difference}"
+        if not self.ticks:
+            return f"nothing: {self.problem}"
         equal = f"{self.ticks} states follow from the recorded inputs, bit for bit"
         return f"{equal}; {self.problem}" if self.problem else equal
 
@@ -105,6 +108,9 @@ def laws_of(recording: Recording) -> dict[str, str]:
             laws = scenes[tick].system.laws if tick in scenes else laws
             equal += laws[body].command(at, x[row], v[row]) == recording.command[row, body]
         every = len(recording.tick)
+        if equal < every and (lost := recording.unheard.get(CHANGES[side].name)):
+            found[side] = f"not known: the bag lacks {lost} announcements of its numbers"
+            continue
         found[side] = "the scene's law" if equal == every else (
             f"foreign: {every - equal} of {every} commands on {topic.name} are not those of the scene's law"
         )
@@ -135,7 +141,7 @@ def _numbers(recording: Recording) -> Iterator[tuple[str, Array]]:
 def _episodes(recording: Recording) -> Iterator[np.ndarray]:
     """Rows of the bag from each beginning of the scene to the next, or to a gap."""
     begins = np.searchsorted(recording.tick, recording.starts)
-    for begin, end in zip(begins, [*begins[1:], len(recording.tick)], strict=True):
+    for begin, end in pairwise([*begins, len(recording.tick)]):
         rows = np.arange(begin, end)
         gaps = np.flatnonzero(np.diff(recording.tick[rows]) != 1)
         yield rows[: gaps[0] + 1] if len(gaps) else rows

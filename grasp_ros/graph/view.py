@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +32,7 @@ class Moment(NamedTuple):
     impacts: Mapping[str, float]  # N, by side
     level: Mapping[str, float]  # by `topics.LYAPUNOV_NAMES`
     words: str  # where it comes from, and how fast
+    answers: bool = True  # whether the commands answer this state; otherwise they are the forces that acted until it
 
 
 class View:
@@ -41,10 +42,16 @@ class View:
     ----------
     scene : Scene
         Its initial state gives the scale of the line.
+
+    Attributes
+    ----------
+    controlled : dict of str to int
+        Bodies that have a controller, by side.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self._scene = scene
+        self.scene = scene
+        self.controlled = {side: body for side, body in SIDES.items() if body in scene.system.laws}
         places = np.abs(scene.initial_state[0::2])
         self._reach = 1.25 * float(places.max()) or 1.0
         self._most = 0.0  # energy shown so far, J
@@ -56,7 +63,7 @@ class View:
             self._line(moment.state), self._ruler(), "", self._bodies(moment), "", self._energy(moment.level)
         )
         below = f"t = {moment.time:.3f} s   {moment.words}"
-        return Panel(parts, title=self._scene.title, subtitle=below, width=80)
+        return Panel(parts, title=self.scene.title, subtitle=below, width=80)
 
     def _line(self, state: Array) -> Text:
         """Each body at its place; one that is behind another is moved aside by a character."""
@@ -79,7 +86,8 @@ class View:
 
     def _bodies(self, moment: Moment) -> Table:
         table = Table(box=None, padding=(0, 2))
-        for heading in ("", "x, m", "v, m/s", "command, N", "impact, N"):
+        force = "command, N" if moment.answers else "acted, N"
+        for heading in ("", "x, m", "v, m/s", force, "impact, N"):
             table.add_column(heading, justify="right" if heading else "left")
         for body, name in NAMES.items():
             x, v = moment.state[COLUMN[body] : COLUMN[body] + 2]
@@ -105,6 +113,6 @@ class View:
         return table
 
 
-def named(values: Array) -> dict[str, float]:
+def named(values: Iterable[float]) -> dict[str, float]:
     """What `lyapunov` carries, by name."""
     return dict(zip(LYAPUNOV_NAMES, (float(value) for value in values), strict=True))

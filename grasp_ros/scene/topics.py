@@ -44,7 +44,19 @@ COMMANDS = {"left": LEFT_COMMAND, "right": RIGHT_COMMAND}
 CONTACTS = {"left": LEFT_CONTACT, "right": RIGHT_CONTACT}
 EXTERNAL_FORCES = {name: Topic(f"external_force/{name}", FORCE) for name in ("left_arm", "object", "right_arm")}
 CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True, depth=1) for side in ("left", "right")}
+MOST_DIGITS = 10  # of a number of an announcement
 LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm", "V_plant", "work", "closed"]
+
+
+def announcement_number(message: Any) -> int:
+    """Which announcement of its controller a message is, from 1 on; 0: it does not say."""
+    word = message.header.frame_id
+    return int(word) if word.isascii() and word.isdecimal() and len(word) < MOST_DIGITS else 0
+
+
+def between(before: int, number: int) -> int:
+    """How many announcements are missing between two that came one after the other."""
+    return max(number - before - 1, 0) if before and number else 0
 
 
 def state_of(message: Any, many: tuple[int, ...] = ()) -> tuple[Array, Array]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -68,6 +70,51 @@ def test_a_comparison_sees_inputs_that_differ_and_leaves_out_what_the_bag_does_n
     gap = {name: np.delete(values, 100, axis=0) for name, values in cut.items()}
     assert np.flatnonzero(np.isnan(replace(recording, **gap).inputs[:, 0])).tolist() == [99, 498]
     assert compare_recording(replace(recording, **gap)).equal
+
+
+def test_a_bag_that_begins_late_is_not_verified_and_says_why(two_runs: tuple[Path, Path]) -> None:
+    """Of a monitor that came to a plant that does not wait for it."""
+    recording = bag.read(two_runs[0] / "bag")
+    late = replace(
+        recording, starts=recording.starts[:0], outputs={name: rows[100:] for name, rows in recording.outputs.items()},
+        **{name: getattr(recording, name)[100:] for name in ("tick", "state", "effort", "command", "lyapunov")},
+    )
+    found = compare_recording(late)
+    assert found.verification.words == "nothing: the bag begins at tick 100, not at the beginning of the scene"
+    assert found.equal
+    assert not found.verification.holds
+
+
+CONVERTED = [
+    ("--dst-storage mcap", "3001 states follow from the recorded inputs, bit for bit"),
+    ("--dst-storage mcap --exclude-topic /lyapunov", "the bag lacks lyapunov of 3001 ticks, the first 0"),
+    ("--dst-storage mcap --include-topic /joint_states", "nothing at its beginning on scene and run; allowed: all"),
+    ("--dst-storage mcap --compress zstd --compress-mode message", "its messages are compressed one by one; allowed:"),
+    ("--dst-storage mcap --compress zstd", "its file is compressed as a whole; allowed: chunks, as `rosbags-convert"),
+    ("--dst-storage sqlite3", "its storage is sqlite3; allowed: MCAP, as `rosbags-convert"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), CONVERTED, ids=[options for options, _ in CONVERTED])
+def test_a_bag_that_another_program_has_written_anew_is_read_or_refused_for_its_own_reason(
+    two_runs: tuple[Path, Path], tmp_path: Path, command: Any, options: str, words: str
+) -> None:
+    convert = [sys.executable, "-m", "rosbags.convert", "--src", two_runs[0] / "bag", "--dst", tmp_path / "new"]
+    subprocess.run([*convert, *options.split()], check=True, timeout=DEADLINE)
+    found = command("verify", "new")
+    assert words in found.stdout + found.stderr
+    assert found.returncode == (2 if "allowed" in words else 1 if "lacks" in words else 0)
+    if found.returncode == 0:
+        shown = command("inspect", "new").stdout
+        assert "written anew by another program, which does not say what was lost" in shown
+        assert command("recover", "new").returncode == 0
+        assert "3001 states follow" in command("verify", "new_recovered").stdout
+
+
+def test_the_directory_of_a_run_is_no_bag_and_says_where_it_is(two_runs: tuple[Path, Path], command: Any) -> None:
+    found = command("inspect", str(two_runs[0]))
+    assert found.returncode == 2
+    assert found.stderr == f"grasp: {two_runs[0]}: the directory of a run; its bag is {two_runs[0] / 'bag'}\n"
 
 
 def test_four_processes_and_one_record_the_same_bytes(two_runs: tuple[Path, Path]) -> None:

@@ -61,13 +61,51 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any,
 def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: str, status: int) -> None:
     plant = launch(
         *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
-        "real_time_factor:=50", "-p", "left_timeout_s:=0.25", "-p", f"left_on_timeout:={reaction}",
-        stderr=subprocess.PIPE,
+        "real_time_factor:=50", "-p", "left_timeout_s:=0.25", "-p", f"left_on_timeout:={reaction}", "-p",
+        "progress:=true", stderr=subprocess.PIPE,
     )
     errors = plant.communicate(timeout=DEADLINE)[1]
+    assert "%|" not in errors  # no bar of progress where no terminal is
     assert plant.returncode == status
-    assert f"left: no command for 0.25 s at tick 250: {reaction}" in errors
+    assert f"left: no command that answers a state of the last 0.25 s, at tick 250: {reaction}" in errors
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
+
+
+SLOW = """
+import time
+def law(tick, t, x, v):
+    time.sleep(0.005)
+    return -5.0 * x - 0.5 * v
+"""
+
+
+def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
+    launch: Any, tmp_path: Path, command: Any
+) -> None:
+    """5 ms for a period of 0.5 ms of wall time: to answer each state would take five times as long as the run."""
+    (tmp_path / "slow.py").write_text(SLOW)
+    run = launch(
+        sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=3", "-o", "run",
+        "--free-running", "2", "--controller", "left=slow:law", "--max-age", "1", "--no-figure", "--min-factor", "2.5",
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )
+    out, err = run.communicate(timeout=DEADLINE)
+    recording = bag.read(tmp_path / "run" / "bag")
+    usual, most = recording.ages["left"]
+    assert 9.0 <= usual <= most < 1000.0
+    assert recording.counts["left/effort_command"] < 1500
+    assert 0.0 < recording.reached <= 2.05
+    assert run.returncode == 1
+    assert f"grasp: --max-age 1: the oldest command was {most:g} periods old" in err
+    assert f"grasp: --min-factor 2.5: {recording.reached:.3g} s in a second was reached" in err
+    words = f"{recording.reached:.3g} s in a second, {recording.overruns} overruns, "
+    for text in (out, command("inspect", "run/bag").stdout):
+        assert words in text
+        assert f"left {most:.0f}, 99 % {usual:.0f}, periods" in text
+    assert re.search(r"wall time +\d+\.\d s: (compilation .*, )?start \d.*, run .*, stop .*, reading .*, check", out)
+    assert not (tmp_path / "run" / "figure.png").exists()
+    assert command("inspect", "run/bag", "--max-age", "1").returncode == 1
+    assert command("inspect", "run/bag", "--max-age", "1000", "--min-factor", "0.01").returncode == 0
 
 
 def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(

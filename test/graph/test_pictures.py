@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import pty
@@ -16,6 +17,8 @@ import numpy as np
 import pytest
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import ReliabilityPolicy
+from rich.console import Console
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -24,12 +27,14 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.picture import ASIDE, NEWTONS_PER_METRE, TOUCHING, markers
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.view import SIGNS, TRACK, View
+from grasp_ros.graph.view import SIGNS, TRACK, Moment, View
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.quantities import impact_forces_of
 
 pytestmark = pytest.mark.slow  # real processes
 CONFIG = Path(__file__).parents[2] / "config"
@@ -99,6 +104,91 @@ def test_the_markers_show_what_the_drawing_of_the_same_state_shows(two_runs: tup
         arrows = [marker for marker in picture if marker.ns == "contact forces" and marker.action == Marker.ADD]
         lengths = [abs(arrow.points[1].x - arrow.points[0].x) for arrow in arrows]
         assert np.allclose([length * NEWTONS_PER_METRE for length in lengths], [f for f in impact.values() if f > 0.0])
+
+
+LATE = """
+import sys, time
+import rclpy
+from geometry_msgs.msg import WrenchStamped
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from grasp_ros import scene
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.running import Running
+from grasp_ros.scene.topics import *
+rclpy.init()
+node = rclpy.create_node("late")
+case = scene.load("case_01")
+topics = [SCENE, RUN, *case.topics]
+out = {topic: node.create_publisher(messages.TYPES[topic.type], topic.name, messages.qos(topic)) for topic in topics}
+out[SCENE].publish(messages.text(case.to_yaml()))
+out[RUN].publish(messages.text(Running().to_yaml()))
+tick = 0
+while True:  # what belongs to a state comes up to 90 ticks behind it, as from a monitor that is busy
+    rclpy.spin_once(node, timeout_sec=0.002)
+    tick += 1
+    for number, topic in enumerate(case.topics):
+        k = tick - (0, 3, 3, 1, 1, 90)[number]
+        if k < 0:
+            continue
+        ns, v = k * case.period_ns, 1e-4 * k
+        if topic == JOINT_STATES:
+            message = JointState(name=["left", "object", "right"], position=[v] * 3, velocity=[v] * 3, effort=[0.0] * 3)
+            message.header.stamp = messages.to_time(ns)
+        else:
+            message = messages.wrench(ns, v) if topic != LYAPUNOV else messages.lyapunov(ns, [v, v, *[0.0] * 6, 1.0])
+        out[topic].publish(message)
+"""
+
+
+def test_a_live_picture_is_one_state_and_no_writer_waits_for_it(
+    node: tuple[Any, SingleThreadedExecutor], launch: Any
+) -> None:
+    """Every number of the message k is 1e-4 k, and some topics are late."""
+    peer, _ = node
+    launch(sys.executable, "-c", LATE)
+    ours, theirs = pty.openpty()
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
+    launch(*START, "watch", stdout=theirs, stderr=theirs, env=environment)
+    shown = ""
+    while len(re.findall(r"t = 1\.\d+ s", shown)) < 3:
+        shown += os.read(ours, 65536).decode(errors="replace")
+    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)
+    pictures = [part for part in text.split("Case 1, Fig. 2: standard parameters")[1:] if " t = " in part]
+    assert len(pictures) > 10
+    for picture in pictures:
+        time_s = float(re.findall(r"t = (\S+) s", picture)[0])
+        left = re.findall(r"left +(\S+) +(\S+) +(\S+) +(\S+)", picture)[0]
+        level = re.findall(r"V_c +(\S+) J", picture)[0]
+        assert {round(float(word), 4) for word in (*left, level)} == {round(0.1 * time_s, 4)}
+    for topic in ("joint_states", "lyapunov", "left/effort_command", "contact/right"):
+        [reader] = peer.get_subscriptions_info_by_topic(topic)
+        assert reader.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_watch_without_a_plant_says_where_it_has_looked(launch: Any) -> None:
+    watch = launch(*START, "watch", stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    _, err = watch.communicate(timeout=DEADLINE)
+    assert watch.returncode == 1
+    domain = os.environ["ROS_DOMAIN_ID"]
+    assert f"no plant has come for 10 s in ROS domain {domain}, namespace /, on this host" in err
+
+
+def test_the_picture_of_the_page_is_one_state() -> None:
+    """That of the standard case without ROS; what the page adds is the speed."""
+    [page] = re.findall(r"(?m)^    (╭.*(?:\n    .*)*╯)$", (CONFIG.parent / "docs" / "graph.md").read_text())
+    tick = round(1000 * float(re.findall(r"t = (\S+) s", page)[0]))
+    [words] = re.findall(r"t = \S+ s +(\d+ ticks/s)", page)
+    run = simulate(scene.load("case_01", ["time.duration_s=8"]), sampled=True)
+    view, level, impacts = View(run.scene), run.energy, impact_forces_of(run)
+    for row in (0, tick):
+        known = {"V": level.V[row], "V_c": level.V_c[row], "mode": float(level.mode[row]), "closed": 1.0}
+        moment = Moment(float(run.t[row]), run.state[row], dict(zip(CONTACTS, run.command[row], strict=True)),
+                        dict(zip(CONTACTS, impacts[row], strict=True)), known, words)
+        picture = view.draw(moment)
+    console = Console(width=80, file=io.StringIO(), color_system=None)
+    console.print(picture)
+    assert page.replace("\n    ", "\n") == console.file.getvalue().strip()  # type: ignore[attr-defined]
 
 
 def test_layouts_name_topics_and_values_that_are_there() -> None:

@@ -54,7 +54,7 @@ ONE_BY_ONE = """
 import json, sys
 from grasp_ros.graph.nodes import start
 for name, arguments in json.loads(sys.argv[1]):
-    sys.argv[1:] = [name, "--ros-args", *arguments.split()]
+    sys.argv[1:] = ["--ros-args", *arguments.split()]
     status = start.main(name)
     print(f"exit status {status}", file=sys.stderr, flush=True)
 """

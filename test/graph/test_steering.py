@@ -111,4 +111,4 @@ def test_a_bag_is_published_again_with_its_clock(
 def test_without_a_plant_ctl_says_so(tmp_path: Path) -> None:
     found = grasp("ctl", "status", "--namespace", "/nobody", cwd=tmp_path)
     assert (found.returncode, found.stdout) == (1, "")
-    assert "no plant answers here" in found.stderr
+    assert "no plant answers in ROS domain" in found.stderr

@@ -7,8 +7,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,10 +17,9 @@ import rclpy
 from processes import DEADLINE, START, wait_for
 
 from grasp_ros import scene
-from grasp_ros.graph import bag, processes
-from grasp_ros.graph.processes import Graph
+from grasp_ros.graph import bag
 from grasp_ros.graph.stopping import STOP_SIGNALS
-from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
@@ -45,7 +42,7 @@ def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signa
         wait_for(lambda: (tmp_path / "run" / "case_01.yaml").exists(), "the first process")
     process.send_signal(number)
     out, err = process.communicate(timeout=DEADLINE)
-    assert process.returncode == 0, err
+    assert process.returncode == (0 if moment == "recording" else 130), err
     assert "Traceback" not in err + out
     if moment == "recording":
         recording = bag.read(recorded.parent)
@@ -85,42 +82,6 @@ def test_lonely_nodes_end_cleanly_on_a_signal(
 
 def is_seen(observer: Any, name: str) -> bool:
     return name in observer.get_node_names()
-
-
-def test_run_notices_a_plant_that_was_stopped(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Any, signal_handlers: None
-) -> None:
-    monkeypatch.setattr(processes, "TOGETHER_SECONDS", 0.2)  # the monitor itself notices later
-    graphs: list[Graph] = []
-    start = Graph.start
-
-    def noted(graph: Graph) -> None:
-        graphs.append(graph)
-        start(graph)
-
-    monkeypatch.setattr(Graph, "start", noted)
-    recorded = tmp_path / "run" / "bag" / "bag.mcap"
-
-    def stop_the_plant() -> None:
-        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 100_000, "a bag that grows")
-        graphs[0].processes["plant"].terminate()
-
-    stopper = threading.Thread(target=stop_the_plant)
-    stopper.start()
-    result = command("run", "case_01", "-o", "run")
-    stopper.join()
-    assert result.returncode == 1
-    assert "monitor: still runs although its counterpart has ended" in result.stderr
-    assert bag.read(recorded.parent).counts[JOINT_STATES.name] > 100
-
-
-@pytest.fixture
-def signal_handlers() -> Iterator[None]:
-    """Puts back what `grasp run` changes in its process."""
-    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
-    yield
-    for number, handler in before.items():
-        signal.signal(number, handler)
 
 
 WRONG_PLANT = """

@@ -204,7 +204,7 @@ def test_the_option_asks_for_the_network(tmp_path: Path, asked: bool) -> None:
     assert (b"ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET" in (became.parent / "environ").read_bytes()) is asked
     _, err = process.communicate(timeout=DEADLINE)
     assert process.returncode == 1
-    assert "no plant answers here" in err
+    assert "no plant answers in ROS domain" in err
 
 
 @pytest.mark.slow

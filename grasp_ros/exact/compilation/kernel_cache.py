@@ -36,12 +36,12 @@ def _base() -> Path:
 @cache
 def cache_directory() -> Path:
     """A writable directory for the kernels."""
-    directory = _base() / sources_digest()
     try:
-        directory.mkdir(parents=True, exist_ok=True)
+        (_base() / sources_digest()).mkdir(parents=True, exist_ok=True)
     except OSError:
-        directory = Path(tempfile.mkdtemp(prefix="grasp_ros"))
-    return directory
+        os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="grasp_ros")  # for those that this process starts, too
+        (_base() / sources_digest()).mkdir(parents=True)
+    return _base() / sources_digest()
 
 
 def kernels_on_disk() -> bool:

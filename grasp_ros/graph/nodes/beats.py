@@ -60,6 +60,8 @@ class Sign:
         Number and beginning of the process, as the kernel has them.
     heard : float, s
         Wall time of the last sign.
+    ready : bool
+        Whether it has begun to look for others: before it may compile.
     """
 
     node: str
@@ -68,6 +70,7 @@ class Sign:
     texts: list[str]
     ended: str
     process: str
+    ready: bool
     heard: float = 0.0
 
     @property
@@ -107,13 +110,17 @@ class Beats:
     ----------
     own : Sign
     publisher : Publisher
+    prepared : float, s
+        Wall time of the last sign of a node that is not ready.
     """
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
         self._heard = heard
-        self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", _process(str(os.getpid()))[1])
+        process = _process(str(os.getpid()))[1]
+        self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
         self._signs: dict[str, Sign] = {}
         self._told = 0.0  # wall time of the last own sign
+        self.prepared = 0.0
         self.publisher = node.publisher(ALIVE)
         node.subscribe(ALIVE, self._on_beat)
         self._stop = threading.Event()
@@ -129,7 +136,7 @@ class Beats:
 
     def _beat(self) -> None:
         own, self._told = self.own, time.monotonic()
-        content = [own.node, own.identity, own.turn, own.texts, own.ended, own.process]
+        content = [own.node, own.identity, own.turn, own.texts, own.ended, own.process, own.ready]
         self.publisher.publish(messages.text(json.dumps(content)))
 
     def tell(self) -> None:
@@ -151,6 +158,8 @@ class Beats:
         if sign is None or sign.identity == self.own.identity:
             return
         sign.heard = time.monotonic()
+        if not sign.ready:
+            self.prepared = sign.heard
         if self._signs.pop(sign.identity, None) is None and sign.heard > self._told + GREET_SECONDS:
             self._beat()
         self._signs[sign.identity] = sign
@@ -211,10 +220,10 @@ def _parsed(text: str) -> Sign | None:
     if len(text) > MOST_BYTES:
         return None
     try:
-        node, identity, turn, texts, ended, process = json.loads(text)
+        node, identity, turn, texts, ended, process, ready = json.loads(text)
     except (ValueError, TypeError, RecursionError):
         return None
     kinds = isinstance(texts, list) and isinstance(turn, int)
     if not kinds or not all(isinstance(word, str) for word in (node, identity, ended, process, *texts)):
         return None
-    return Sign(node, identity, turn, texts, ended, process)
+    return Sign(node, identity, turn, texts, ended, process, ready is True)

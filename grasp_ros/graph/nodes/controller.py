@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, TypeGuard
 
@@ -12,6 +13,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph import running as runnings
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
@@ -23,7 +25,7 @@ from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
-from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, SCENE
+from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.scene.validation import SceneError
 
 ANNOUNCE_SECONDS = 1.0
@@ -32,10 +34,11 @@ ANNOUNCE_SECONDS = 1.0
 class Controller(PeerNode):
     """Node `left_controller` or `right_controller`; parameters law, wait_for_monitor and others.
 
-    It takes its law from the scene that the plant announces and answers every state with a command of the same
-    stamp. It announces the numbers of its law before the first command that rests on them: at the beginning, after a
-    reset, and when they were set while it runs. With a law of the user's own it announces nothing. When a plant comes
-    with another scene it goes on with that. Other parameters are `real_time_priority` and the numbers of the scene.
+    It takes its law from the scene that the plant announces and answers every state with a command of the same stamp,
+    in a free run the newest one that has come. It announces the numbers of its law before the first command that rests
+    on them: at the beginning, after a reset, and when they were set while it runs. With a law of the user's own it
+    announces nothing. When a plant comes with another scene it goes on with that. Other parameters are
+    `real_time_priority` and the numbers of the scene.
 
     Parameters
     ----------
@@ -52,9 +55,9 @@ class Controller(PeerNode):
         super().__init__(name, **options)
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
-        self._monitored = self.read_only("wait_for_monitor", False, "answer only once a monitor listens")
+        self._monitored = self.read_only("wait_for_monitor", False)
         self._priority = Priority(self)
-        law = self.read_only("law", "", "a law of your own in place of the scene's, module:object")
+        law = self.read_only("law", "")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
         self._announcements = self.publisher(CHANGES[self._side])
@@ -64,10 +67,15 @@ class Controller(PeerNode):
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
         self._turn = 0  # how often the plant had been reset then
         self._force = 0.0  # that answer
+        self._number = 0  # of the last announcement for this scene
         self._ready_to_answer = self._listening = False
+        self._reader = StateReader((self._side,))
         self._held: State | None = None  # the state that came before this node was ready
-        self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0})
-        self.add_on_set_parameters_callback(self._on_set)
+        self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0, "skipped states": 0})
+        self.add_on_set_parameters_callback(self._check)
+        self.add_post_set_parameters_callback(self._stage)
+        self._free = False  # whether the plant waits for no answer
+        self.on_text(RUN, self._on_run)
         self.on_text(SCENE, self._on_scene)
         self.when(self._ready, self._start)
 
@@ -80,6 +88,9 @@ class Controller(PeerNode):
     def progress(self) -> object:
         """The last state answered."""
         return self._answered, self._scene
+
+    def _on_run(self, text: str) -> None:
+        self._free = not runnings.parse(text).lockstep
 
     def _on_scene(self, text: str) -> None:
         """A plant has come: the first one, or one after another."""
@@ -105,19 +116,22 @@ class Controller(PeerNode):
         self.forget_scene()
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
-        self._scene, self._answered, self.concern = scene, -1, ""
+        self._scene, self._answered, self.concern, self._number = scene, -1, "", 0
         self._law = scene.system.laws[SIDES[self._side]]
 
-    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
-        wanted = {parameter.name: parameter.value for parameter in parameters if "." in parameter.name}
-        if self._scene is None or not wanted:
-            return SetParametersResult(successful=True)
+    def _check(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Whether numbers of the law may be set; somebody else may still refuse them."""
         try:
-            self._scene.changed({**self._staged, **wanted})
+            if self._scene is not None:
+                self._scene.changed({**self._staged, **_numbers(parameters)})
         except SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))
-        self._staged.update(wanted)
         return SetParametersResult(successful=True)
+
+    def _stage(self, parameters: list[Parameter]) -> None:
+        """Let numbers that were set act from the next state on."""
+        if self._scene is not None:
+            self._staged.update(_numbers(parameters))
 
     def _ready(self) -> bool:
         listeners = [JOINT_STATES, LYAPUNOV] if self._monitored else [JOINT_STATES]
@@ -130,7 +144,7 @@ class Controller(PeerNode):
         self._priority.take()
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
-            self.subscribe(JOINT_STATES, self._on_state, read=StateReader((self._side,)).read)
+            self._states = self.subscribe(JOINT_STATES, self._on_state, read=self._reader.read)
         self._ready_to_answer = True
         if self._held is not None:
             held, self._held = self._held, None
@@ -149,8 +163,9 @@ class Controller(PeerNode):
         self._staged.clear()
         self._law = self._scene.system.laws[SIDES[self._side]]
         if self._own is None:
-            numbers = self._scene.numbers_of(self._executable)
-            self._announcements.publish(messages.named_list(time_ns, list(numbers), list(numbers.values())))
+            numbers, self._number = self._scene.numbers_of(self._executable), self._number + 1
+            message = messages.named_list(time_ns, list(numbers), list(numbers.values()), self._number)
+            self._announcements.publish(message)
             # What a reader has received before it receives the command, it also sees before.
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
@@ -171,6 +186,8 @@ class Controller(PeerNode):
             return
         if self._scene is None or not self._admits(state):  # the scene of a new plant may still be on its way
             return
+        if self._free:
+            state = self._newest(state)
         time_ns = state.time_ns
         if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
             self.count("repeated states")  # it, or what answered it, was lost on the way
@@ -197,9 +214,28 @@ class Controller(PeerNode):
         self._answer(time_ns)
         self.count("answered states")
 
+    def _newest(self, state: State) -> State:
+        """The last state that waits here, or the first after a reset."""
+        for cdr in self.waiting(self._states):
+            newer = None
+            with suppress(*messages.UNREADABLE):
+                newer = self._reader.read(cdr)
+            if not self._admits(newer):
+                continue
+            before, state = state, newer
+            self.count("skipped states")
+            if state.time_ns < before.time_ns:
+                break
+        return state
+
     def _answer(self, time_ns: int) -> None:
         """Publish the command that answers a state."""
         self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
+
+
+def _numbers(parameters: list[Parameter]) -> dict[str, Any]:
+    """Those of the scene."""
+    return {parameter.name: parameter.value for parameter in parameters if "." in parameter.name}
 
 
 def main(name: str, received: Sequence[int]) -> int:

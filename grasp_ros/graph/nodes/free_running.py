@@ -42,15 +42,13 @@ class Held:
     ----------
     force : float, N
     answers : int
-        Tick of the state that it answers; the tick of its arrival where it carries no stamp.
-    arrival : int
-        Tick at which it came, for the timeout.
+        Tick of the state that it answers, from which its age counts; that of its arrival where it carries no stamp.
     late : bool
-        Whether the timeout has passed.
+        Whether it is older than the timeout.
     """
 
     def __init__(self) -> None:
-        self.force, self.answers, self.arrival, self.late = 0.0, 0, 0, False
+        self.force, self.answers, self.late = 0.0, 0, False
 
 
 class FreeRunning:
@@ -83,7 +81,7 @@ class FreeRunning:
         commands = plant.scene.controllers.values()
         self._sides = [topic.name.split("/")[0] for topic in commands]
         self._held = {side: Held() for side in self._sides}
-        self._timing = Timing(self._sides, self._period)
+        self._timing = Timing(self._sides, self._period, running.real_time_factor)
         self._quality = plant.publisher(TIMING)
         for topic, side in zip(commands, self._sides, strict=True):
             plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
@@ -119,7 +117,7 @@ class FreeRunning:
         elif tick < held.answers:
             plant.count("stale commands")
         elif self._limits.admit(topic, command):
-            held.force, held.answers, held.arrival, held.late = force, tick, plant.tick, False
+            held.force, held.answers = force, tick
             self.advance()
 
     def advance(self) -> None:
@@ -136,6 +134,7 @@ class FreeRunning:
             while not plant.finished and self._steering.steps and self._steering.go_on():
                 self._step()
         if self._steering.stands:
+            self._timing.pause()
             self._set_anchor()
             return
         self._catch_up()
@@ -166,30 +165,30 @@ class FreeRunning:
         forces: Array = np.zeros(3)
         for number, side in zip(self._plant.scene.system.laws, self._sides, strict=True):
             held = self._held[side]
-            if self._plant.tick - held.arrival >= self._timeouts[side]:
-                self._time_out(side, held)
-            forces[number] = held.force
+            before, held.late = held.late, self._plant.tick - held.answers >= self._timeouts[side]
+            if held.late and not before:
+                self._time_out(side)
+            forces[number] = 0.0 if held.late and self._running.reactions[side] == "zero" else held.force
             self._timing.age(side, self._plant.tick - held.answers)
-        if not self._plant.finished:
-            self._plant.step(forces)
-
-    def _time_out(self, side: str, held: Held) -> None:
-        if held.late:
+        if self._plant.finished:
             return
-        held.late = True
+        if self._plant.tick + 1 == self._plant.scene.ticks:
+            self.report()  # before the last state, with which a monitor closes its bag
+        self._plant.step(forces)
+
+    def _time_out(self, side: str) -> None:
         self._plant.count("timeouts")
         reaction = self._running.reactions[side]
-        words = f"{side}: no command for {self._running.timeouts[side]:g} s at tick {self._plant.tick}: {reaction}"
+        age = self._running.timeouts[side]
+        words = f"{side}: no command that answers a state of the last {age:g} s, at tick {self._plant.tick}: {reaction}"
         if reaction == "stop":
             self._plant.fail(words)
             return
         self._plant.get_logger().warning(words)
-        if reaction == "zero":
-            held.force = 0.0
 
     def report(self) -> None:
         """Publish the quality of the last second; say whose commands are missing."""
-        late = [f"no command of {side}" for side, held in self._held.items() if held.late]
+        late = [f"no young command of {side}" for side, held in self._held.items() if held.late]
         self._plant.concern = "; ".join(late)
         values = self._timing.take()
         if values:

@@ -14,8 +14,9 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.topics import WINDOW
 
-MOST_WAITING = 64  # announcements of a controller: it makes one for a command
+MOST_WAITING = WINDOW + 100  # announcements of a controller: it makes at most one for a command
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -13,6 +14,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused, place_of
 
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
@@ -37,13 +39,15 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
         gc.enable()
         spin(nodes, received)
     except Refused as error:
+        tell_parent(_names(nodes), str(error))
         with suppress(OSError):  # nobody reads it
             print(error, file=sys.stderr)
         return 2
     except Exception as error:  # a fault of this package: in one line, and where
-        words = f"{type(error).__name__}: {error}, in {place_of(error)}"
+        words = f"a fault of this package: {type(error).__name__}: {error}, in {place_of(error)}"
+        tell_parent(_names(nodes), words)
         with suppress(OSError):
-            print(f"{', '.join(node.get_name() for node in nodes)}: a fault of this package: {words}", file=sys.stderr)
+            print(f"{_names(nodes)}: {words}", file=sys.stderr)
         return 1
     finally:
         for node in nodes:
@@ -74,12 +78,18 @@ def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
             if finished and (set(waited_for) <= set(finished) or any(node.exit_code for node in finished)):
                 break
             executor.spin_once(timeout_sec=POLL_SECONDS)
+        if received:
+            tell_parent(_names(nodes), f"was ended by {signal.Signals(received[0]).name}")
         if received and len(nodes) == 1:  # of several, nobody is behind
             _take_what_came(executor, nodes[0])
         executor.shutdown()
     finally:
         for node in nodes:
             node.end()
+
+
+def _names(nodes: Sequence[GraspNode]) -> str:
+    return ", ".join(node.get_name() for node in nodes) or "a node"
 
 
 def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:

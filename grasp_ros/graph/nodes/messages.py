@@ -26,7 +26,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.topics import DEPTH, FRAME, LYAPUNOV_NAMES, Topic
+from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES, SCENE, Topic
 
 TYPES = {
     "sensor_msgs/msg/JointState": JointState,
@@ -69,11 +69,16 @@ def reader_qos(topic: Topic) -> QoSProfile:
     push out those of the others. Fast DDS keeps at most 5000 otherwise, and lets the writers wait.
     """
     profile = qos(topic)
-    if topic.depth < DEPTH:
+    if topic.type == SCENE.type:
         profile.depth = max(profile.depth, READER_DEPTH)
     else:
         profile.history = HistoryPolicy.KEEP_ALL
     return profile
+
+
+def glance_qos(topic: Topic) -> QoSProfile:
+    """That of a reader for which nobody waits: it may miss what it has no time for."""
+    return QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def to_time(time_ns: int) -> Time:
@@ -130,9 +135,10 @@ def wrench(time_ns: int, force: float) -> WrenchStamped:
     return message
 
 
-def named_list(time_ns: int, names: Sequence[str], values: Sequence[float]) -> JointState:
-    """A stamped list of numbers with names, which plotters show by name."""
+def named_list(time_ns: int, names: Sequence[str], values: Sequence[float], number: int = 0) -> JointState:
+    """A stamped list of numbers with names, which plotters show by name; numbered where none may be missed."""
     message = JointState(name=list(names))
+    message.header.frame_id = str(number or "")
     message.header.stamp = to_time(time_ns)
     message.position = array("d", [float(value) for value in values])
     return message

@@ -47,6 +47,8 @@ from grasp_ros.scene.topics import (
     TIMING,
     WINDOW,
     Topic,
+    announcement_number,
+    between,
     state_of,
 )
 from grasp_ros.scene.versions import versions
@@ -71,7 +73,7 @@ class Monitor(PeerNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("monitor", **options)
         default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
-        self._path = Path(self.read_only("bag", default, "directory of the bag; it must not exist"))
+        self._path = Path(self.read_only("bag", default))
         with reading(self._path):
             if self._path.exists():
                 raise Refused(f"bag: {str(self._path)!r} exists; allowed: a directory that does not exist yet")
@@ -80,6 +82,7 @@ class Monitor(PeerNode):
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._values: list[float] = []  # of the last tick
+        self._numbers = dict.fromkeys(CHANGES, 0)  # of the last announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._leaving = 0  # after a signal: ticks to which it still records, what was on the way with them
         self._plant = ""  # identity of the one that is recorded
@@ -87,8 +90,8 @@ class Monitor(PeerNode):
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
-            "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "alarms": 0,
-            "ticks without V": 0, "messages not recorded": 0, "restored commands": 0,
+            "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "lost announcements": 0,
+            "alarms": 0, "ticks without V": 0, "messages not recorded": 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
         self._output, self._template = self.publisher(LYAPUNOV), lyapunov_template()
@@ -193,6 +196,8 @@ class Monitor(PeerNode):
                 raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
             message = deserialize_message(cdr, JointState)
             numbers = dict(zip(message.name, message.position, strict=True))
+            before, self._numbers[side] = self._numbers[side], announcement_number(message)
+            self.count("lost announcements", between(before, self._numbers[side]))
             self._judge.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", CHANGES[side])

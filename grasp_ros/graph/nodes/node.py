@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import islice
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -20,8 +22,11 @@ from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
+from grasp_ros.graph.host import place
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.messages import Level
+from grasp_ros.graph.parameters import TEXTS
+from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
@@ -71,15 +76,15 @@ class GraspNode(Node):
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.strangers = ""  # who publishes what somebody else does
-        self.state = "waiting for peers"
+        self.state = f"waiting for peers {place(os.environ, self.get_namespace())}"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
         self.wall_timer(REPORT_SECONDS, self.report)
 
-    def read_only(self, name: str, default: Any, text: str) -> Any:
+    def read_only(self, name: str, default: Any) -> Any:
         """Declare a parameter that is set at start only, and return its value."""
         number = isinstance(default, float)  # for which an integer will do as well
-        descriptor = ParameterDescriptor(description=text, read_only=True, dynamic_typing=number)
+        descriptor = ParameterDescriptor(description=TEXTS[name], read_only=True, dynamic_typing=number)
         value = self._declare(name, default, descriptor)
         if not number:
             return value
@@ -90,8 +95,7 @@ class GraspNode(Node):
     def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
         """The value that the start has given, or the default."""
         with _refusing():
-            value = self.declare_parameter(name, default, descriptor).value
-        return list(value) if isinstance(value, array) else value
+            return _plain(self.declare_parameter(name, default, descriptor).value)
 
     def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
         """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
@@ -125,14 +129,19 @@ class GraspNode(Node):
             del self._parameters[name], self._descriptors[name]
 
     def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Set parameters; integers become floating-point numbers, and a refusal says why."""
+        """Set parameters; integers become floating-point numbers, and a refusal says why.
+
+        What is fixed may be set to what it is, so that a node takes its own dump.
+        """
         numbers = []
         for parameter in parameter_list:
             if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
+                if _plain(parameter.value) == _plain(self.get_parameter(parameter.name).value):
+                    continue
                 return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
             whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
             numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
-        return super().set_parameters_atomically(numbers)
+        return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
 
     def _is_whole(self, name: str) -> bool:
         """Whether a parameter was declared as an integer for good."""
@@ -248,9 +257,19 @@ class GraspNode(Node):
     def fail(self, reason: str) -> None:
         """End with a sentence, and with the exit status 1."""
         self.state = reason
+        tell_parent(self.get_name(), reason)
         self.get_logger().fatal(reason)
         self.exit_code = 1
         self.finished = True
+
+    def waiting(self, subscription: Subscription) -> Iterator[Any]:
+        """What has come on a topic and was not taken by the executor."""
+        while True:
+            with subscription.handle:
+                found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+            if found is None:
+                return
+            yield found[0]
 
     def sweep(self) -> None:
         """Take what the executor has not been told of.
@@ -259,12 +278,8 @@ class GraspNode(Node):
         topic can lie there until the second comes.
         """
         for subscription in tuple(self.subscriptions):
-            for _ in range(SWEEP):
-                with subscription.handle:
-                    found = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-                if found is None:
-                    break
-                subscription.callback(found[0])
+            for message in islice(self.waiting(subscription), SWEEP):
+                subscription.callback(message)
         for service in tuple(self.services):
             with service.handle:
                 request, header = service.handle.service_take_request(service.srv_type.Request)
@@ -288,6 +303,11 @@ class GraspNode(Node):
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
+
+
+def _plain(value: Any) -> Any:
+    """Value of a parameter, a list where rclpy has an array."""
+    return list(value) if isinstance(value, array) else value
 
 
 @contextmanager

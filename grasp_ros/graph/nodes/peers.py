@@ -21,7 +21,7 @@ from grasp_ros.scene.files import TEXT_BYTES
 from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
 
 LOOK_SECONDS = 0.25
-STILL_SECONDS = 1.0  # between two looks: this process itself stood still
+STILL_SECONDS = 1.0  # between two looks: this thread was busy
 SWEEPS = 4  # looks without progress that sweep, each of them at first and then one of as many
 GONE_SECONDS = 0.7  # without a source: its last messages are on the way
 START_SECONDS = 60.0
@@ -75,11 +75,9 @@ class PeerNode(GraspNode):
     def __init__(self, name: str, **options: Any) -> None:
         self._inputs: list[Topic] = []
         super().__init__(name, **options)
-        self.patience = self.read_only("peer_timeout_s", PEER_SECONDS, "wall time without a sign of life or an answer")
-        self.start_patience = self.read_only(
-            "start_timeout_s", START_SECONDS, "wall time for peers to come and to answer first; 0: any"
-        ) or math.inf
-        reaction = self.read_only("on_silence", "wait", "what is done when a peer is gone or silent: end or wait")
+        self.patience = self.read_only("peer_timeout_s", PEER_SECONDS)
+        self.start_patience = self.read_only("start_timeout_s", START_SECONDS) or math.inf
+        reaction = self.read_only("on_silence", "wait")
         if not 0.0 < self.patience <= self.start_patience:
             raise Refused(f"peer_timeout_s: {self.patience:g} is not allowed; allowed: a number > 0, not above"
                           " start_timeout_s")
@@ -101,7 +99,8 @@ class PeerNode(GraspNode):
             self.get_name(), self.patience, self.start_patience, self._ends, lambda: self.beats.frozen()
         )
         self.beats = Beats(self, self.heard, self._watchdog.beat)
-        self._created = self._looked = self._excused = time.monotonic()
+        self._looked = self._excused = time.monotonic()
+        self._created = 0.0  # wall time of the first look: all that may take long is done
         self._before: object = None
         self._still = 0  # looks in a row without progress
         self.wall_timer(LOOK_SECONDS, self.look)
@@ -135,12 +134,18 @@ class PeerNode(GraspNode):
 
     def look(self) -> None:
         """See to it that everybody is there."""
+        if self._watchdog.stopped:  # its thread looks first
+            return
         now = time.monotonic()
-        if now - self._looked > STILL_SECONDS:
-            if self._before is not None:
-                words = f"was stopped, or busy, for {now - self._looked:.1f} s"
-                self.get_logger().warning(f"this process {words}", throttle_duration_sec=PATIENCE_SECONDS)
-            self._excused = now  # what others did meanwhile is not known yet
+        if self._watchdog.resumed > self._excused:
+            self._excused = self._watchdog.resumed
+            if self.begun:
+                self.get_logger().warning(f"this process was stopped for {self._watchdog.stood:.1f} s")
+        if not self._created:
+            self._created = now
+            self.beats.own.ready = True
+        elif now - self._looked > STILL_SECONDS:  # this thread was busy: what others did meanwhile waits here
+            self.sweep()
         self._looked = now
         self._watchdog.seen(self.begun)
         self._offer()
@@ -160,7 +165,7 @@ class PeerNode(GraspNode):
                 return
 
     def _wait_for_start(self, now: float) -> None:
-        waited = now - self._created
+        waited = now - max(self._created, self.beats.prepared)
         self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
         if waited > self.start_patience and self._ends:
             self.fail(f"{self.state}: nobody has come for {self.start_patience:g} s")

@@ -42,6 +42,10 @@ class _Terminal(io.TextIOBase):
 
     encoding = sys.stderr.encoding
 
+    def isatty(self) -> bool:
+        """Whether it is one: a file or a journal gets no bar."""
+        return sys.stderr.isatty()
+
     def write(self, text: str) -> int:
         with suppress(OSError):
             sys.stderr.write(text)
@@ -65,11 +69,11 @@ class Plant(SteppedNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("plant", **options)
-        name = self.read_only("scene", "case_01", "name of a scene of the package, or path of a .yaml file")
-        self._accuracy = self.read_only("accuracy", ACCURACY, "relative size of the first neglected term of a contact")
-        self.monitored = self.read_only("wait_for_monitor", False, "start with a monitor and never outrun it")
-        progress = self.read_only("progress", False, "show a progress bar on the terminal")
-        free = self.read_only("free_running", False, "follow the wall clock instead of waiting for the commands")
+        name = self.read_only("scene", "case_01")
+        self._accuracy = self.read_only("accuracy", ACCURACY)
+        self.monitored = self.read_only("wait_for_monitor", False)
+        progress = self.read_only("progress", False)
+        free = self.read_only("free_running", False)
         self._priority = Priority(self) if free else None
         steering = Steering(self)
         scene = scenes.load(name)
@@ -84,7 +88,8 @@ class Plant(SteppedNode):
         self._begin = math.nan  # wall time of the first state
         self.counters.update(tick=0, resets=0)
         self._bar = tqdm(
-            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=not progress, file=_Terminal()
+            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True,
+            file=_Terminal(),
         )
         self._states = self.publisher(JOINT_STATES)
         self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
@@ -106,14 +111,14 @@ class Plant(SteppedNode):
         """How it runs, from its parameters; those of the free-running loop exist only there."""
         if not free:
             return Running(self._accuracy)
-        factor = self.read_only("real_time_factor", 1.0, "simulated seconds in a second")
+        factor = self.read_only("real_time_factor", 1.0)
         if not factor:
             raise Refused("real_time_factor: 0.0 is not allowed; allowed: a number > 0, or free_running:=false")
         timeouts, reactions = {}, {}
         for topic in topics:
             side = topic.name.split("/")[0]
-            timeouts[side] = self.read_only(f"{side}_timeout_s", 0.1, "simulated time without a command, s")
-            reactions[side] = self.read_only(f"{side}_on_timeout", "zero", "what then acts: hold, zero or stop")
+            timeouts[side] = self.read_only(f"{side}_timeout_s", 0.1)
+            reactions[side] = self.read_only(f"{side}_on_timeout", "zero")
         return Running(self._accuracy, factor, timeouts, reactions)
 
     def _new_plant(self) -> SampledPlant:

@@ -32,8 +32,8 @@ class Player(GraspNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("player", **options)
-        path = Path(self.read_only("bag", "", "directory of the bag"))
-        self._rate = self.read_only("rate", 1.0, "seconds of the bag in a second")
+        path = Path(self.read_only("bag", ""))
+        self._rate = self.read_only("rate", 1.0)
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
         self._rows = bag.raw(path)

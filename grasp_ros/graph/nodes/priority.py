@@ -32,7 +32,7 @@ class Priority:
 
     def __init__(self, node: GraspNode) -> None:
         self._node = node
-        self._wanted = node.read_only(PARAMETER, 0, "SCHED_RR, 1 to 99, once it runs with the wall clock; 0: none")
+        self._wanted = node.read_only(PARAMETER, 0)
         if not 0 <= self._wanted <= MOST:
             raise Refused(f"{PARAMETER}: {self._wanted} is not allowed; allowed: 0 to {MOST}")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
 from collections.abc import Sequence
@@ -12,6 +13,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
+from grasp_ros.graph.host import place
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.node import GraspNode
 
@@ -30,16 +32,17 @@ class Remote(GraspNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("remote", **options)
-        self._action = self.read_only("action", "status", "pause, resume, step, reset or status")
-        self._steps = self.read_only("steps", 1, "control periods of step")
-        plant = self.read_only("plant", "plant", "name of the plant's node")
-        self._patience = self.read_only("patience_s", PATIENCE_SECONDS, "without progress")
+        self._action = self.read_only("action", "status")
+        self._steps = self.read_only("steps", 1)
+        plant = self.read_only("plant", "plant")
+        self._patience = self.read_only("patience_s", PATIENCE_SECONDS)
         self._asks = {
             name: self.create_client(Trigger, f"{plant}/{name}") for name in {self._action, "status"}
         }
         self._set = self.create_client(SetParameters, f"{plant}/set_parameters")
         self._goal: dict[str, Any] = {}
         self._seen: Any = None
+        self._nobody = f"no plant answers {place(os.environ, self.get_namespace())}"
         self._progress()
         self._begun = False
         self.wall_timer(LOOK_SECONDS, self._look)
@@ -49,7 +52,7 @@ class Remote(GraspNode):
 
     def _look(self) -> None:
         if time.monotonic() > self._deadline:
-            self._end(1, "no plant answers here" if self._seen is None else f"the plant does not go on: {self._seen}")
+            self._end(1, self._nobody if self._seen is None else f"the plant does not go on: {self._seen}")
         elif not self._begun and all(client.service_is_ready() for client in (*self._asks.values(), self._set)):
             self._begun = True
             if self._action == "step":

@@ -12,9 +12,11 @@ import signal
 import sys
 from importlib import import_module
 
-from grasp_ros.graph.host import this_host
+from grasp_ros.graph.host import check, this_host
+from grasp_ros.graph.parameters import usage
 from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
+from grasp_ros.physics.errors import Refused
 
 NODES = ("plant", "left_controller", "right_controller", "monitor")
 TOOLS = ("together", "watch", "player", "remote")  # which commands of `grasp` become
@@ -25,6 +27,17 @@ def main(name: str, child: bool = False) -> int:
 
     A child ends with the process that holds the other end of its standard input.
     """
+    words = _own_words()
+    if {"-h", "--help"} & set(words):
+        print(usage(name))
+        return 0
+    try:
+        check(os.environ, alone=name == "together")
+        if words and name != "together":
+            raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
+    except Refused as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 2
     received: list[int] = []
     note_signals(received)
     gc.disable()  # until the nodes are there: imports make little garbage and much to look through
@@ -43,6 +56,16 @@ def main(name: str, child: bool = False) -> int:
     return status
 
 
+def _own_words() -> list[str]:
+    """Words of the command line that are not ROS's."""
+    words = sys.argv[1:]
+    if "--ros-args" not in words:
+        return words
+    begin = words.index("--ros-args")
+    end = words.index("--", begin) + 1 if "--" in words[begin:] else len(words)
+    return words[:begin] + words[end:]
+
+
 def _spare_the_plant() -> None:
     """Let numba not find what it would import beside itself, which takes half as long as all the rest of the plant.
 
@@ -55,9 +78,8 @@ def _spare_the_plant() -> None:
 def start() -> int:
     """Start the node that the first word names; `child` before it marks a child of `grasp run`."""
     is_child = sys.argv[1:2] == ["child"]
-    if is_child:
-        del sys.argv[1]
-    name = [*sys.argv[1:], ""][0]
+    del sys.argv[1 : 1 + is_child]
+    name = sys.argv.pop(1) if len(sys.argv) > 1 else ""
     if name not in (*NODES, *TOOLS):
         print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
         return 2

@@ -33,7 +33,7 @@ class Steering:
 
     def __init__(self, plant: SteppedNode) -> None:
         self._plant = plant
-        self._paused = plant.read_only("paused", False, "begin paused, at the first state")
+        self._paused = plant.read_only("paused", False)
         self.steps = 0
         self.reset_due = False
         plant.declare_parameter("steps", 1, ParameterDescriptor(

@@ -21,6 +21,8 @@ class Timing:
         Who has a controller.
     period : float, s
         Control period in wall time.
+    factor : float
+        Simulated seconds in a second that are asked for.
 
     Attributes
     ----------
@@ -28,8 +30,9 @@ class Timing:
         Wall time given up since the start, because the plant was too far behind.
     """
 
-    def __init__(self, sides: Sequence[str], period: float) -> None:
-        self._sides, self._period = sides, period
+    def __init__(self, sides: Sequence[str], period: float, factor: float) -> None:
+        self._sides, self._period, self._factor = sides, period, factor
+        self._spent, self._counted = 0.0, 0  # wall time of all intervals, and their number
         self.lost = 0.0
         self._overruns = 0
         self._before = math.nan
@@ -45,9 +48,14 @@ class Timing:
         """One control period, computed at a wall time in s, late by so much."""
         if not math.isnan(self._before):
             self._intervals.append(now - self._before)
+            self._spent, self._counted = self._spent + now - self._before, self._counted + 1
         self._before = now
         self._lateness.append(late)
         self._overruns += late > self._period
+
+    def pause(self) -> None:
+        """The plant stands, as it was told to."""
+        self._before = math.nan
 
     def age(self, side: str, periods: int) -> None:
         """Age of the command that acts, in control periods: how much older the state is that it answers."""
@@ -57,21 +65,23 @@ class Timing:
     def take(self) -> dict[str, float]:
         """What was collected since the last call, by name; nothing where there was no period.
 
-        `period_s` is the mean interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were
-        computed, `overruns` how many were later than a whole period since the start, and `left_age_p99` and so on the
-        age of the commands in periods; `left_age_p99_all` is that since the start.
+        `reached` are the simulated seconds in a second since the start, without pauses; `period_s` is the mean
+        interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were computed, `overruns` how
+        many were later than a whole period since the start, and `left_age_p99` and so on the age of the commands in
+        periods; `left_age_p99_all` and `left_age_max_all` are those since the start.
         """
         if not self._lateness or not self._intervals:
             return {}
         values = {
             "period_s": float(np.mean(self._intervals)), "jitter_s": float(np.std(self._intervals)),
             "late_p99_s": float(np.percentile(self._lateness, PERCENTILE)), "overruns": float(self._overruns),
-            "lost_s": self.lost,
+            "lost_s": self.lost, "reached": self._factor * self._period * self._counted / self._spent,
         }
         for side, ages in self._ages.items():
             values[f"{side}_age_p99"] = float(np.percentile(ages, PERCENTILE))
             values[f"{side}_age_max"] = float(np.max(ages))
             values[f"{side}_age_p99_all"] = _percentile(self._all[side])
+            values[f"{side}_age_max_all"] = float(max(self._all[side]))
         self._clear()
         return values
 

@@ -21,5 +21,5 @@ NODES: dict[str, Callable[[], GraspNode]] = {
 
 def main(_: str, received: Sequence[int]) -> int:
     """Run the nodes that stand on the command line before `--ros-args`; their parameters as `-p node:name:=value`."""
-    words = sys.argv[2 : sys.argv.index("--ros-args")]
+    words = sys.argv[1 : sys.argv.index("--ros-args")]
     return run([NODES[word] for word in words], received)

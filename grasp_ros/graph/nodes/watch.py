@@ -2,27 +2,67 @@
 
 from __future__ import annotations
 
+import os
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
+from rclpy.serialization import deserialize_message
 from rich.live import Live
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph import running as runnings
+from grasp_ros.graph.host import place
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.graph.view import Moment, View, named
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, SCENE, state_of
+from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of
 
 FRAME_SECONDS = 0.1
+PATIENCE_SECONDS = 10.0  # for a plant to come
+STALE_SECONDS = 1.0  # after a reset: what waits here may still be of the time before it
+MOST_OPEN = WINDOW + 500  # states of which not all has come; a monitor may be WINDOW behind
+
+
+class Newest:
+    """The newest state of which all messages have come; a state that lacks one is left out.
+
+    Attributes
+    ----------
+    found : dict of Topic to bytes
+        Its serialized messages; empty before the first.
+    """
+
+    def __init__(self) -> None:
+        self.found: dict[Topic, bytes] = {}
+        self._open: dict[int, dict[Topic, bytes]] = {}
+        self._state, self._stale = -1, 0.0  # stamp of the last one, and until when others are not taken
+
+    def put(self, topic: Topic, cdr: bytes, needed: Collection[Topic]) -> None:
+        """Take a message; `needed` is what belongs to a state."""
+        stamp = messages.raw_stamp_ns(cdr)
+        if topic == JOINT_STATES:
+            if stamp < self._state:
+                self._open.clear()
+                self._stale = time.monotonic() + STALE_SECONDS
+            self._state = stamp
+        elif time.monotonic() < self._stale:
+            return
+        there = self._open.setdefault(stamp, {})
+        there[topic] = cdr
+        if len(there) >= len(needed) and there.keys() >= set(needed):
+            self.found = there
+            for older in [other for other in self._open if other <= stamp]:
+                del self._open[older]
+        elif len(self._open) > MOST_OPEN:
+            del self._open[next(iter(self._open))]
 
 
 class Watch(GraspNode):
-    """Node `watch`: draws the last state some times a second.
+    """Node `watch`: draws the newest whole state some times a second. No plant waits for it.
 
     Parameters
     ----------
@@ -33,50 +73,68 @@ class Watch(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("watch", **options)
         self._view: View | None = None
-        self._state, self._time_ns, self._count = np.full(6, np.nan), 0, 0
-        self._commands: dict[str, float] = {}
-        self._impacts: dict[str, float] = {}
-        self._level: dict[str, float] = {}
-        self._before = time.monotonic(), 0
-        self._rate = 0.0
-        self._live = Live("waiting for a plant", auto_refresh=False)
-        self._live.start()
+        self._newest, self._lockstep = Newest(), True
+        self._needed: set[Topic] = set()
+        self._created, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0
+        where = place(os.environ, self.get_namespace())
+        self._nobody = f"no plant has come for {PATIENCE_SECONDS:g} s {where}"
+        self._live = Live(f"waiting for a plant {where}", auto_refresh=False)
+        self._live.start(refresh=True)
         self.subscribe(SCENE, self._on_scene)
-        self.subscribe(JOINT_STATES, self._on_state)
-        self.subscribe(LYAPUNOV, self._on_lyapunov)
-        for topics, forces in ((COMMANDS, self._commands), (CONTACTS, self._impacts)):
-            for side, topic in topics.items():
-                self.subscribe(topic, partial(self._on_force, forces, side))
+        self.subscribe(RUN, self._on_run)
+        for topic in (JOINT_STATES, LYAPUNOV, *COMMANDS.values(), *CONTACTS.values()):
+            self.create_subscription(
+                messages.TYPES[topic.type], topic.name, partial(self._on_message, topic), messages.glance_qos(topic),
+                raw=True,
+            )
         self.wall_timer(FRAME_SECONDS, self._draw)
 
     def _on_scene(self, message: Any) -> None:
         self._view = View(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
-        self._commands.clear()
-        self._impacts.clear()
+        self._newest = Newest()
 
-    def _on_state(self, message: Any) -> None:
-        self._state, _ = state_of(message)
-        self._time_ns, self._count = messages.to_ns(message.header.stamp), self._count + 1
+    def _on_run(self, message: Any) -> None:
+        self._lockstep = runnings.parse(message.data).lockstep
 
-    def _on_lyapunov(self, message: Any) -> None:
-        self._level = named(np.asarray(message.position))
-
-    def _on_force(self, forces: dict[str, float], side: str, message: Any) -> None:
-        forces[side] = message.wrench.force.x
+    def _on_message(self, topic: Topic, cdr: bytes) -> None:
+        if messages.SHORTEST <= len(cdr) <= messages.MOST_BYTES and (topic in self._needed or topic == JOINT_STATES):
+            self.guarded(self._newest.put, topic, cdr, self._needed)
 
     def _draw(self) -> None:
-        now, (before, count) = time.monotonic(), self._before
+        there = {topic for topic in (LYAPUNOV, *CONTACTS.values()) if self.count_publishers(topic.name)}
+        held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
+        self._needed = {JOINT_STATES, *there, *(topic for topic in held if self.count_publishers(topic.name))}
+        alone = not self.count_publishers(JOINT_STATES.name)
+        if self._view is not None and self._newest.found:
+            self._live.update(self._view.draw(self._moment(self._newest.found, alone)), refresh=True)
+        elif alone and time.monotonic() > self._created + PATIENCE_SECONDS:
+            self.fail(self._nobody)
+
+    def _moment(self, found: dict[Topic, bytes], alone: bool) -> Moment:
+        """One state and all that belongs to it."""
+        assert self._view is not None
+        now, (before, earlier), stamp = time.monotonic(), self._before, messages.raw_stamp_ns(found[JOINT_STATES])
         if now - before > 1.0:
-            self._rate, self._before = (self._count - count) / (now - before), (now, self._count)
-        if self._view is not None and self._count:
-            alone = not self.count_publishers(JOINT_STATES.name)
-            words = "the plant has ended" if alone else f"{self._rate:.0f} ticks/s"
-            moment = Moment(self._time_ns / NANOSECONDS, self._state, self._commands, self._impacts, self._level, words)
-            self._live.update(self._view.draw(moment), refresh=True)
+            self._rate = max(stamp - earlier, 0) / self._view.scene.period_ns / (now - before)
+            self._before = now, stamp
+        state, inputs = state_of(_read(JOINT_STATES, found))
+        commands, impacts = (
+            {side: messages.raw_force(found[topic]) for side, topic in topics.items() if topic in found}
+            for topics in (COMMANDS, CONTACTS)
+        )
+        if not self._lockstep:
+            commands = {side: inputs[body] for side, body in self._view.controlled.items()}
+        level = named(_read(LYAPUNOV, found).position) if LYAPUNOV in found else {}
+        words = "the plant has ended" if alone else f"{self._rate:.0f} ticks/s"
+        return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)
 
     def close(self) -> None:
         """Leave the last picture on the terminal."""
         self._live.stop()
+
+
+def _read(topic: Topic, found: dict[Topic, bytes]) -> Any:
+    return deserialize_message(found[topic], messages.TYPES[topic.type])
 
 
 def main(_: str, received: Sequence[int]) -> int:

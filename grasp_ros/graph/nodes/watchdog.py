@@ -10,6 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from grasp_ros.graph.nodes.beats import BEAT_SECONDS
+from grasp_ros.graph.stopping import tell_parent
 
 EVERY_SECONDS = 5.0  # from one sentence to the next
 PAUSE_SECONDS = 2.0 * BEAT_SECONDS  # between two beats, if the process was stopped itself
@@ -31,6 +32,11 @@ class Watchdog:
         Whether the process ends then.
     frozen : callable
         Names of the nodes of this machine that were stopped.
+
+    Attributes
+    ----------
+    resumed, stood : float, s
+        Wall time at which this process last went on after it had been stopped itself, and for how long it was.
     """
 
     def __init__(
@@ -38,17 +44,24 @@ class Watchdog:
     ) -> None:
         self._name, self._patience, self._law_patience, self._ends = name, patience, law_patience, ends
         self._frozen, self._beaten = frozen, time.monotonic()
+        self.resumed, self.stood = self._beaten, 0.0
         self.seen(False)
 
     def seen(self, armed: bool) -> None:
         """The nodes' thread goes on; armed: what it does from now on must not last."""
         self._since, self._said, self._armed = time.monotonic(), -math.inf, armed
 
+    @property
+    def stopped(self) -> bool:
+        """Whether the process was stopped until just now, so that nobody here knows what others have done."""
+        return time.monotonic() - self._beaten > PAUSE_SECONDS
+
     def beat(self) -> None:
         """Look; called every BEAT_SECONDS."""
         before, self._beaten = self._beaten, time.monotonic()
         if self._beaten - before > PAUSE_SECONDS:  # nobody stood meanwhile
-            self._since = self._beaten
+            self._since = self.resumed = self._beaten
+            self.stood = self._beaten - before
         seconds = self._beaten - self._since
         if not self._armed or seconds <= self._patience:
             return
@@ -61,4 +74,5 @@ class Watchdog:
             with suppress(OSError):
                 print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
+            tell_parent(self._name, f"stands: {' and '.join(self._frozen()) or 'a law'}")
             os._exit(1)

@@ -56,6 +56,8 @@ class Drill(NamedTuple):
         Whether it is no accident, but how a user ends a run.
     quick : bool
         Whether `--quick` plays it.
+    culprit : str
+        Whose name the last sentence has to have; empty: nobody's.
     play : callable, optional
         In place of the common course of a drill.
     """
@@ -72,6 +74,7 @@ class Drill(NamedTuple):
     seen: Topic = JOINT_STATES
     asked: bool = False
     quick: bool = False
+    culprit: str = ""
     play: Callable[[Stage], Evidence] | None = None
 
 
@@ -100,7 +103,7 @@ def play(drill: Drill, stage: Stage) -> Evidence:
     left = _close(stage, wait=not (went_on or hung))
     evidence = Evidence(went_on=went_on, hung=hung, left=len(left), mute=drill.mute, asked=drill.asked,
                         nothing_to_keep=drill.nothing_to_keep)
-    _read_words(evidence, stage, called, asked if went_on or hung else math.inf)
+    _read_words(evidence, stage, drill.culprit, called, asked if went_on or hung else math.inf)
     evidence.noticed = max(evidence.noticed - (begin - called), 0.0)
     evidence.exits = {name: process.returncode for name, process in stage.started.items()
                       if name.split()[-1] in TERMINALS and process.returncode is not None}
@@ -155,7 +158,7 @@ def _close(stage: Stage, wait: bool) -> list[int]:
     return left
 
 
-def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> None:
+def _read_words(evidence: Evidence, stage: Stage, culprit: str, begin: float, end: float) -> None:
     """What the user sees, and when the first sentence or report came."""
     news = stage.output.news(begin, end)
     concerns = stage.companion.ask("concerns")["concerns"]
@@ -166,6 +169,7 @@ def _read_words(evidence: Evidence, stage: Stage, begin: float, end: float) -> N
     spoken = [text for text in words if SENTENCE.match(text)] or words
     said = spoken[-1] if spoken else f"/diagnostics: {reports[-1][1]}" if reports else ""
     evidence.said = plain(said, [stage.place])
+    evidence.blames_another = bool(culprit) and culprit not in evidence.said
     evidence.traceback = plain(stage.output.traceback, [stage.place])
 
 

@@ -46,7 +46,9 @@ def _one(group: str, start: object, number: str, name: str) -> Drill:
     strike = partial(freeze, name=name) if number == "SIGSTOP" else partial(send, name=name, number=Signals[number])
     asked = name == "grasp run" and number in ASKING
     seen = LYAPUNOV if name == "monitor" else JOINT_STATES
-    return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK)  # type: ignore[arg-type]
+    culprit = "" if name == "grasp run" or group == PATIENT else name
+    return Drill(key, group, words, start, strike, seen=seen, asked=asked, quick=key in QUICK,  # type: ignore[arg-type]
+                 culprit=culprit)
 
 
 def replace(stage: Stage, name: str) -> None:

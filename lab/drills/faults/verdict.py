@@ -20,6 +20,7 @@ class Verdict(Enum):
     LOST = "lost data"
     WRONG = "wrong result"
     SILENT = "no sentence"
+    NAME = "blames another"
     LATE = "noticed late"
     SURVIVED = "survived"
     SENTENCE = "ended with a sentence"
@@ -47,6 +48,8 @@ class Evidence:
     went_on, hung : bool
     left, shared : int
         Processes, and files in /dev/shm, that are still there.
+    blames_another : bool
+        Whether the last sentence does not name the process that was hit.
     traceback : str
         Its last line.
     wrong : str
@@ -67,6 +70,7 @@ class Evidence:
     hung: bool = False
     left: int = 0
     shared: int = 0
+    blames_another: bool = False
     traceback: str = ""
     wrong: str = ""
     mute: bool = False
@@ -83,6 +87,7 @@ class Evidence:
             Verdict.LEFT: self.left > 0, Verdict.HUNG: self.hung,
             Verdict.LOST: not self.nothing_to_keep and self.lost > LOST_SECONDS,
             Verdict.WRONG: bool(self.wrong), Verdict.SURVIVED: self.went_on, Verdict.SILENT: silent,
+            Verdict.NAME: self.blames_another,
             Verdict.LATE: not (self.mute or self.asked) and not self.noticed <= NOTICE_SECONDS + SLACK_SECONDS,
         }
         return next((verdict for verdict, holds in found.items() if holds), Verdict.SENTENCE)

@@ -1,0 +1,47 @@
+"""What can be set at the start of a node with `-p NAME:=VALUE`, in words: for `--help` and `ros2 param describe`."""
+
+from __future__ import annotations
+
+PEERS = {
+    "peer_timeout_s": "wall time without a sign of life or an answer (1.5)",
+    "start_timeout_s": "wall time for peers to come and to answer first; 0: any (60)",
+    "on_silence": "what is done when a peer is gone or silent: end or wait (wait)",
+}
+MONITORED = {"wait_for_monitor": "start only when a monitor listens; a plant never outruns it (false)"}
+PRIORITY = {"real_time_priority": "SCHED_RR, 1 to 99, once it runs with the wall clock; 0: none (0)"}
+TIMEOUTS = {
+    name: text for side in ("left", "right") for name, text in (
+        (f"{side}_timeout_s", "age of the state that the last command answers, s of simulated time (0.1)"),
+        (f"{side}_on_timeout", "what then acts: hold, zero or stop (zero)"),
+    )
+}
+FREE = {**PRIORITY, "real_time_factor": "simulated seconds in a second (1)", **TIMEOUTS}  # exist with the wall clock
+PLANT = {
+    "scene": "name of a scene of the package, or path of a .yaml file (case_01)",
+    "accuracy": "relative size of the first neglected term of a contact (1e-16)", **MONITORED,
+    "paused": "begin paused, at the first state (false)",
+    "progress": "show a progress bar on a terminal (false)",
+    "free_running": "follow the wall clock instead of waiting for the commands (false)", **FREE, **PEERS,
+}
+CONTROLLER = {
+    **MONITORED, "law": "a law of your own in place of the scene's, module:object", **PRIORITY, **PEERS,
+}
+NODES = {
+    "plant": PLANT, "left_controller": CONTROLLER, "right_controller": CONTROLLER,
+    "monitor": {"bag": "directory of the bag; it must not exist (grasp_ and the time)", **PEERS},
+    "player": {"bag": "directory of the bag", "rate": "seconds of the bag in a second (1)"},
+    "remote": {
+        "action": "pause, resume, step, reset or status", "steps": "control periods of step",
+        "plant": "name of the plant's node", "patience_s": "without progress",
+    },
+    "watch": {},
+}
+TEXTS = {name: text for parameters in NODES.values() for name, text in parameters.items()}
+
+
+def usage(node: str) -> str:
+    """What a node prints when it is asked for help."""
+    rows = [f"  {name:<20} {text}" for name, text in NODES[node].items()]
+    numbers = "" if node == "monitor" else "Numbers of the scene are parameters, too: -p left_arm.position_m:=-0.4\n"
+    return "\n".join([f"usage: {node} [--ros-args [-p NAME:=VALUE] ...]", "", *rows, "", numbers])
+

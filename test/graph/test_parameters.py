@@ -1,0 +1,175 @@
+"""Parameters of the nodes: what may be set, and when it acts."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from processes import DEADLINE, START, wait_for
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+
+from grasp_ros import scene
+from grasp_ros.graph import bag, rosbag2
+from grasp_ros.graph.nodes.controller import Controller
+from grasp_ros.graph.nodes.monitor import Monitor
+from grasp_ros.graph.nodes.plant import Plant
+from grasp_ros.graph.parameters import FREE, NODES
+from grasp_ros.graph.verify import laws_of
+from grasp_ros.scene.topics import CHANGES
+from grasp_ros.simulation import simulate
+from grasp_ros.studies import recorder
+
+pytestmark = pytest.mark.slow  # real nodes
+GAIN = "left_feedback.position_gain_N_per_m"
+
+
+@pytest.fixture
+def loop() -> Iterator[tuple[Plant, Controller, SingleThreadedExecutor]]:
+    """A plant and its controller in this process."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    plant = Plant(context=context, parameter_overrides=[Parameter("scene", value="arm_alone")])
+    controller = Controller("left_controller", context=context)
+    executor = SingleThreadedExecutor(context=context)
+    for node in (plant, controller):
+        executor.add_node(node)
+    wait_for(lambda: executor.spin_once(timeout_sec=0.1) or plant.tick > 10, "some ticks")
+    yield plant, controller, executor
+    executor.shutdown()
+    plant.end()
+    controller.end()
+    context.shutdown()
+
+
+def test_a_node_takes_what_it_dumps(loop: tuple[Any, ...]) -> None:
+    for node in loop[:2]:
+        present = list(node.get_parameters(list(node._parameters)))
+        assert len(present) > 8
+        for parameter in present:
+            assert node.set_parameters_atomically([parameter]).successful, parameter.name
+        fixed = node.set_parameters_atomically([Parameter("peer_timeout_s", value=3.0)])
+        assert not fixed.successful
+
+
+def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> None:
+    plant, controller, executor = loop
+    refusing = [True]
+
+    def refuse(_: Any) -> SetParametersResult:
+        return SetParametersResult(successful=not refusing[0], reason="not now")
+
+    controller._on_set_parameters_callbacks.append(refuse)  # the door of rclpy lets a later one be asked first
+    tick = plant.tick
+    assert controller.set_parameters([Parameter(GAIN, value=9.0)])[0].reason == "not now"
+    wait_for(lambda: executor.spin_once(timeout_sec=0.1) or plant.tick > tick + 10, "some ticks")
+    assert controller._law.position_gain == controller.get_parameter(GAIN).value == 5.0
+    refusing.clear()
+    refusing.append(False)
+    assert controller.set_parameters([Parameter(GAIN, value=9.0)])[0].successful
+    wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller._law.position_gain == 9.0, "the new gain")
+
+
+def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: Path) -> None:
+    """One for each state that the plant may be ahead of it."""
+    context = rclpy.Context()
+    rclpy.init(context=context)
+    (tmp_path / "scene.yaml").write_text(scene.load("arm_alone", ["time.duration_s=0.6"]).to_yaml())
+    watched = Parameter("wait_for_monitor", value=True)
+    given = [Parameter("scene", value=str(tmp_path / "scene.yaml")), watched]
+    plant = Plant(context=context, parameter_overrides=given)
+    controller = Controller("left_controller", context=context, parameter_overrides=[watched])
+    monitor = Monitor(context=context, parameter_overrides=[Parameter("bag", value=str(tmp_path / "bag"))])
+    loop, behind = (SingleThreadedExecutor(context=context) for _ in range(2))
+    for executor, node in ((loop, plant), (loop, controller), (behind, monitor)):
+        executor.add_node(node)
+    wait_for(lambda: [executor.spin_once(timeout_sec=0.01) for executor in (loop, behind)] and plant.tick > 2, "ticks")
+    while plant.tick < 490:
+        assert controller.set_parameters([Parameter(GAIN, value=1.0 + plant.tick)])[0].successful
+        loop.spin_once(timeout_sec=0.1)
+    wait_for(lambda: [executor.spin_once(timeout_sec=0.001) for executor in (loop, behind)] and monitor.finished, "end")
+    for node in (plant, controller, monitor):
+        node.end()
+    context.shutdown()
+    recording = bag.read(tmp_path / "bag")
+    assert len(recording.changes) > 400
+    assert laws_of(recording) == {"left": "the scene's law"}
+    assert not any(recording.missing.values())
+    assert recording.lost["lost announcements"] == recording.lost["refused announcements"] == "0"
+
+
+def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:
+    run = simulate(scene.load("arm_alone", ["time.duration_s=0.004"]), sampled=True)
+    writer = bag.Recorder(tmp_path / "bag", run.scene, {})
+    numbers = run.scene.numbers_of("left_controller")
+    for tick, (time_ns, rows, own) in enumerate(recorder.ticks_of(run)):
+        values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
+        said = rosbag2.list_message(time_ns, list(numbers), values, frame=str(1 + 2 * tick))
+        beside = [(CHANGES["left"], said)] if tick < 3 else []
+        writer.write_tick(time_ns, [*beside, *rows], own)
+    writer.close()
+    recording = bag.read(tmp_path / "bag")
+    assert recording.unheard == {"left/parameters": 2}
+    assert recording.missing["left/parameters"] == 2
+    assert laws_of(recording) == {"left": "not known: the bag lacks 2 announcements of its numbers"}
+
+
+def test_help_names_what_can_be_set(loop: tuple[Any, ...]) -> None:
+    """It starts no node."""
+    plant, controller, _ = loop
+    ros = ("use_sim_time", "start_type_description_service", "qos_overrides", "steps")
+    for name, node, later in (("plant", plant, {*FREE}), ("left_controller", controller, set())):
+        declared = {key for key in node._parameters if not key.startswith(ros) and "." not in key}
+        assert declared | later == {*NODES[name]}
+    for name in ("plant", "left_controller", "right_controller", "monitor"):
+        for words in (["--help"], ["-h", "--ros-args", "-p", "scene:=case_99"]):
+            command = [*START, name, *words]
+            found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+            assert (found.returncode, found.stderr) == (0, "")
+            assert found.stdout.startswith(f"usage: {name} ")
+            assert all(f"  {key} " in found.stdout for key in NODES[name])
+
+
+REFUSED = [
+    ("ROS_DOMAIN_ID", "1.5", "allowed: 0 to 232"), ("ROS_DOMAIN_ID", "-1", "allowed: 0 to 232"),
+    ("ROS_DOMAIN_ID", "233", "allowed: 0 to 232"),
+    ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "no node would find another"),
+    ("ROS_AUTOMATIC_DISCOVERY_RANGE", "local", "allowed: LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "why"), REFUSED, ids=[f"{name}={value}" for name, value, _ in REFUSED])
+def test_where_no_graph_can_be_none_starts(
+    command: Any, monkeypatch: pytest.MonkeyPatch, name: str, value: str, why: str
+) -> None:
+    monkeypatch.setenv(name, value)
+    for words in (["run", "case_01"], ["watch"], ["ctl", "status"]):
+        found = command(*words)
+        assert found.returncode == 2
+        assert f"{name}: {value!r} is not allowed" in found.stderr
+        assert why in found.stderr
+    found = subprocess.run([*START, "monitor"], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert found.returncode == 2
+    assert why in found.stderr
+
+
+def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
+    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    run = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process"]
+    found = subprocess.run(run, capture_output=True, text=True, timeout=DEADLINE, check=False, env=environment,
+                           cwd=tmp_path)
+    assert found.returncode == 0, found.stderr
+
+
+def test_a_word_that_no_node_takes_is_refused() -> None:
+    found = subprocess.run([*START, "plant", "case_03"], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert found.returncode == 2
+    assert found.stderr == "plant: case_03: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...\n"
