@@ -14,7 +14,7 @@ from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation.chunk import STATUSES, Setup
 from grasp_ros.simulation.outcomes import GROUPS
-from grasp_ros.simulation.quantities import SETTLED
+from grasp_ros.simulation.quantities import HORIZONS, SETTLED
 
 PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
 RANGE = "section.key=low:high[:n[:log]]"
@@ -37,6 +37,8 @@ def add_to(commands: Any) -> None:
                      help=f"one of {', '.join(GROUPS)}, or a column of one (default settling_time and touches)")
     sub.add_argument("--settled", type=float, default=SETTLED, metavar="PART", help="part of the largest initial"
                      f" displacement within which a run counts as settled (default {SETTLED:g})")
+    sub.add_argument("--horizons", type=whole(1), default=HORIZONS, metavar="N", help="durations that a run goes on for"
+                     f" until V_c decides whether it has settled (default {HORIZONS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N", help="budget of a row")
     sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N", help="budget of a row")
@@ -67,7 +69,8 @@ def _run(options: argparse.Namespace) -> int:
     if options.vary and not options.sample:
         raise Refused("--vary: allowed: with --sample N; a map has --x and --y")
     outcomes = tuple(options.outcome) or Setup().outcomes
-    setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.max_events, options.max_work)
+    setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.horizons, options.max_events,
+                  options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
     prepare()
     with tqdm(total=plan.rows, unit="run", desc=scene.name, smoothing=0.05, disable=None) as bar:

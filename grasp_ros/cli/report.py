@@ -9,7 +9,7 @@ import numpy as np
 from grasp_ros.exact.integrator import Status
 from grasp_ros.graph.recording import Recording
 from grasp_ros.methods.contract import UNITS
-from grasp_ros.methods.registry import METHODS
+from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import printable
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
@@ -18,14 +18,10 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
-from grasp_ros.simulation.losses import by_output_times, losses
-from grasp_ros.simulation.quantities import (
-    SETTLED,
-    impact_forces_of,
-    rests_at_zero,
-    settled_distance,
-    settling_times,
-)
+from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.ensemble import ensemble
+from grasp_ros.simulation.losses import losses
+from grasp_ros.simulation.quantities import HORIZONS, SETTLED, by_output_times, impact_forces_of, settling_times
 
 Row = tuple[str, str]
 
@@ -56,7 +52,7 @@ def describe_trajectory(trajectory: Trajectory) -> list[Row]:
     ]
     if len(trajectory.t):
         ends = "both ends" if trajectory.status is Status.DONE else "first and last output"
-        rows.append((f"energy of {PLANT_ALONE}" if foreign else f"V_c at {ends}", _ends(level.V_c)))
+        rows.append((f"V_c of {PLANT_ALONE}" if foreign else f"V_c at {ends}", _ends(level.V_c)))
         rows += _amounts(trajectory)
     known = trajectory.scene.certificate_in_words(trajectory.sampled)
     rows.append(("certificate", "none: V_c needs the energy of every controller" if foreign else known))
@@ -78,27 +74,41 @@ def _amounts(trajectory: Trajectory) -> list[Row]:
     """Settling times, largest forces, and the energy lost by cause, as far as the scene has them."""
     system = trajectory.scene.system
     rows = []
-    regulated = not trajectory.controllers and set(system.laws) == {LEFT, RIGHT} and rests_at_zero(system)
-    if regulated and settled_distance(trajectory.scene) > 0.0:
-        times = settling_times(trajectory)
-        shown = [(NAMES[body], times[COLUMN[body] // 2]) for body in system.present]
-        text = ", ".join(f"{name} {'not yet' if np.isinf(time) else f'{time:.2f} s'}" for name, time in shown)
-        rows.append((f"settled to {SETTLED:.0%}", text))
-    largest = [f"{name} {value:.4g} N" for name, value in _largest(trajectory) if value > 0.0]
-    if largest:
-        rows.append(("largest forces seen", ", ".join(largest)))
+    if settled := _settled(trajectory):
+        rows.append((f"settled to {SETTLED:.0%}", settled))
+    exact, largest = _largest(trajectory)
+    shown = [f"{name} {value:.5g} N" for name, value in largest.items() if value > 0.0]
+    if shown:
+        rows.append(("largest forces" if exact else "largest at the outputs", ", ".join(shown)))
     if len(trajectory.t) > 1 and not system.external:
         lost = losses(trajectory)
         parts = [f"{name} {float(value):.4g}" for name, value in lost._asdict().items() if float(value) != 0.0]
         how = "; trapezoidal rule at the output times" if parts and by_output_times(trajectory) else ""
-        rows.append(("energy lost, J of V", (", ".join(parts) or "none") + how))
+        rows.append(("energy lost, J", (", ".join(parts) or "none") + how))
     return rows
 
 
-def _largest(trajectory: Trajectory) -> list[tuple[str, float]]:
-    """Largest inputs and impact forces at the output times."""
+def _settled(trajectory: Trajectory) -> str:
+    """When each mass settled for good; nothing where V_c does not prove it, because it can rise or bounds no place."""
+    times, scene = settling_times(trajectory), trajectory.scene
+    if np.isnan(times).any():
+        return ""
+    if np.isinf(times).any():
+        looked = trajectory.t[-1] if by_output_times(trajectory) else HORIZONS * scene.duration
+        return f"not within {looked:g} s"
+    return ", ".join(f"{NAMES[body]} {times[COLUMN[body] // 2]:.2f} s" for body in scene.system.present)
+
+
+def _largest(trajectory: Trajectory) -> tuple[bool, dict[str, float]]:
+    """Largest inputs and impact forces in N: of the motion itself if it can be watched once more, or at the outputs."""
+    names = ("f_l", "f_r", "fw_l", "fw_r")
+    exact = trajectory.method == EXACT and trajectory.status is Status.DONE and not trajectory.controllers
+    if exact:
+        setup = Setup(accuracy=trajectory.setting, sampled=trajectory.sampled)
+        columns = ensemble(trajectory.scene, {}, ("peak_input", "peak_impact"), setup=setup, threads=1).columns
+        return True, dict(zip(names, (float(column[0]) for column in columns.values()), strict=True))
     inputs, impacts = np.abs(trajectory.command).max(axis=0), impact_forces_of(trajectory).max(axis=0)
-    return [("f_l", inputs[0]), ("f_r", inputs[1]), ("fw_l", impacts[0]), ("fw_r", impacts[1])]
+    return False, dict(zip(names, [*inputs.tolist(), *impacts.tolist()], strict=True))
 
 
 def _touches(trajectory: Trajectory) -> str:
@@ -166,7 +176,7 @@ def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
 
 
 def _ends(values: Array) -> str:
-    return f"{values[0]:.6g} J, {values[-1]:.6g} J"
+    return f"{values[0]:.6g} J, {values[-1]:.6g} J (twice the energy)"
 
 
 def _beginnings(mode: Array, flag: Mode) -> int:

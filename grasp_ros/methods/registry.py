@@ -133,8 +133,8 @@ def check(
         raise Refused(f"{name}: has no budget of work; allowed with one: {_able('work_budget')}")
     if not method.effects and (odd := _beside_the_paper(scene)):
         raise Refused(
-            f"{scene.name}: {', '.join(odd)}: {name} knows two arms, an object and their contacts, no more and no less;"
-            f" allowed here: {_able('effects')}"
+            f"{scene.name}: {'; '.join(odd)}: {name} knows the paper's grasp alone: two arms with feedback to 0, an"
+            f" object and both contacts; allowed here: {_able('effects')}"
         )
     if method.package is not None and importlib.util.find_spec(method.package) is None:
         raise Refused(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
@@ -147,9 +147,10 @@ def _able(capability: str) -> str:
 
 
 def _beside_the_paper(scene: Scene) -> list[str]:
-    """What a scene has more, or less, than the paper's grasp and its feedback."""
+    """In words: what a scene lacks of the paper's grasp and its feedback, and what it has beside."""
     forces = [
         f"{section}.{key}" for section in ("left_feedback", "right_feedback")
         for key in ("set_point_m", "feed_forward_N") if scene.values.get(section, {}).get(key)
     ]
-    return sorted([*set(scene.values) ^ PAPER, *forces])
+    lacking, beside = sorted(PAPER - set(scene.values)), sorted([*set(scene.values) - PAPER, *forces])
+    return [f"{word} {', '.join(found)}" for word, found in (("lacks", lacking), ("has", beside)) if found]

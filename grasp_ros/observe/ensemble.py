@@ -7,6 +7,7 @@ its horizon is only marked.
 
 from __future__ import annotations
 
+import math
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -35,7 +36,8 @@ from grasp_ros.exact.records import (
 )
 from grasp_ros.observe.observe import BEGIN, FINISH
 from grasp_ros.observe.observer import Watcher
-from grasp_ros.observe.sight import Wanted
+from grasp_ros.observe.settling import takes_energy
+from grasp_ros.observe.sight import UNDECIDED, Context, Seen, Wanted
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
 
 
@@ -80,6 +82,7 @@ class Watch(NamedTuple):
     gains: Array
     seen: Array
     bound: Array  # (1,)
+    context: Integers
 
 
 class Limits(NamedTuple):
@@ -89,6 +92,7 @@ class Limits(NamedTuple):
     max_events: int
     max_work: int
     stop: Integers  # (1,) not 0: return after the row
+    horizons: int  # that a row may go on until V_c decides whether it has settled
 
 
 def _takes_own_arrays(result: Any) -> bool:
@@ -152,6 +156,39 @@ def count_events(rows: Rows, i: int, room: Room) -> int:
     return int(count)
 
 
+@kernel
+def run_row(door: Any, loop: Loop, rows: Rows, i: int, room: Room, limits: Limits) -> int:
+    """Integrate a row over the interval of the loop; why it ended."""
+    loop.place[Place.INTERVAL] = loop.place[Place.BEGUN] = 0
+    outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
+    while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
+        outcome = door(
+            room.block, room.order, room.plant_block, room.state_block, room.mode, limits.tolerance, limits.max_work,
+            room.times, room.rows, room.events, room.filled, room.work, room.observer, loop)
+        events += count_events(rows, i, room)
+    return int(outcome)
+
+
+@kernel
+def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, watch: Watch, limits: Limits) -> int:
+    """Go on with a row as `observer.settle` does, until V_c decides; why it ended."""
+    seen, outcome, done = watch.seen, Outcome.DONE.value, 1
+    wanted, losses = watch.context[Context.WANTED], watch.context[Context.LOSSES]
+    watch.context[Context.WANTED], watch.context[Context.LOSSES] = Wanted.SETTLING.value, 0
+    losing = takes_energy(watch.loop, room.plant.pairs, room.plant_block[COULOMB])
+    left, right = rows.touches[i, 0], rows.touches[i, 1]
+    while seen[Seen.SETTLED] == UNDECIDED and losing and done < limits.horizons and outcome == Outcome.DONE:
+        loop.begins[0] = done * loop.lengths[0]
+        outcome = run_row(door, loop, rows, i, room, limits)
+        call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
+        done += 1
+    loop.begins[0] = 0.0
+    rows.touches[i, 0], rows.touches[i, 1] = left, right
+    rows.seen[i, Seen.SETTLED] = seen[Seen.SETTLED] if seen[Seen.SETTLED] != UNDECIDED else math.inf
+    watch.context[Context.WANTED], watch.context[Context.LOSSES] = wanted, losses
+    return int(outcome)
+
+
 @machine_door
 def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, watch: Watch, limits: Limits) -> int:
     """Integrate the rows; returns how many, fewer only if a stop was asked for."""
@@ -160,47 +197,43 @@ def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, watch: Watch, limits
         if limits.stop[0] != 0:
             return i
         load_row(rows, i, room, watch)
-        loop.place[Place.INTERVAL] = loop.place[Place.BEGUN] = 0
         if room.observer[ADDRESS] != 0:
             call(room.observer[ADDRESS], room.observer[CONTEXT], BEGIN, watch.bound[0], 0.0, 0)
-        outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
-        while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
-            outcome = door(
-                room.block, room.order, room.plant_block, room.state_block, room.mode, limits.tolerance,
-                limits.max_work, room.times, room.rows, room.events, room.filled, room.work, room.observer, loop)
-            events += count_events(rows, i, room)
-        rows.outcome[i] = outcome
+        outcome = run_row(door, loop, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
         if room.observer[ADDRESS] != 0:
             call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
             for place in range(watch.seen.shape[0]):
                 rows.seen[i, place] = watch.seen[place]
+            if outcome == Outcome.DONE and watch.context[Context.WANTED] & Wanted.SETTLING.value:
+                outcome = go_on(door, loop, rows, i, room, watch, limits)
+        rows.outcome[i] = outcome
     return n
 
 
-def integrate_rows(rows: Rows, duration: float, accuracy: float, wanted: Wanted, settled: float, stop: Integers,
-                   max_events: int, max_work: int) -> int:
+def integrate_rows(rows: Rows, duration: float, wanted: Wanted, settled: float, limits: Limits) -> int:
     """Integrate rows of one length under continuous feedback; returns how many.
 
     Parameters
     ----------
     rows : Rows
         Updated in place.
-    duration, accuracy, wanted, settled
+    duration, wanted, settled
         As for an `Integrator` and `observer.watch`.
-    stop : array (1,)
-        Another thread may set it, to have the rows stop.
-    max_events, max_work : int
-        Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too.
+    limits : Limits
+        Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too. Another thread may set
+        `stop`, to have the rows stop.
     """
     plant_block, state_block, mode = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64)
     plant, state = plant_of(plant_block), state_of(state_block, mode)
     watcher = Watcher(plant, state, wanted)
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
-    watch = Watch(watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]))
-    limits = Limits(accuracy, max_events, min(max_work, BREATH), stop)
-    with workspace(accuracy) as (block, order, tables, events):
+    watcher.context[Context.CERTAIN] = 1
+    watch = Watch(
+        watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]), watcher.context)
+    limits = limits._replace(max_work=min(limits.max_work, BREATH))
+    with workspace(limits.tolerance) as (block, order, tables, events):
         observer = watcher.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
         room = Room(block, order, plant_block, state_block, mode, plant, state, np.zeros(0), np.zeros((0, 6)), events,
                     np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)

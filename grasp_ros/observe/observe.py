@@ -9,13 +9,13 @@ from numba import carray
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import allocating, inlined, kernel
 from grasp_ros.exact.driver.callback import call, floats_at, integers_at
+from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.observe.flight_extremes import flight_ranges, state_of, weights
 from grasp_ros.observe.losses import add_losses
-from grasp_ros.observe.settling import kept_sight, last_outside, watch_bound
+from grasp_ros.observe.settling import kept_sight, last_outside, settled_from, watch_bound
 from grasp_ros.observe.sight import (
-    KEPT,
     LOWER,
     NONE,
     QUANTITIES,
@@ -23,18 +23,20 @@ from grasp_ros.observe.sight import (
     STATES,
     UPPER,
     Context,
+    Kept,
     Quantity,
     Seen,
     Sight,
     Wanted,
     bodies_at,
+    kept_at,
     seen_at,
     sight_of,
 )
 from grasp_ros.observe.step_extremes import extremes_of, step_ranges
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Kind, Law, Of, Pair, U, X
 
-PLACES, CLOCK = len(Context), 3
+PLACES, CLOCK, RESTS = len(Context), 3, 3
 BEGIN, FINISH = -2, -1  # in place of a kind of segment
 
 
@@ -115,20 +117,28 @@ def begin(context: Integers, bound: float) -> None:
         seen[Seen.STATE + place] = y[place]
     pairs = carray(floats_at(context[Context.PAIRS]), (2, 2))
     seen[Seen.LEVEL] = seen[Seen.LEAST] = level(bodies_at(context, Context.LOOP), pairs, y)
-    seen[Seen.BOUND], seen[Seen.KEPT] = bound * max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])), NONE
+    seen[Seen.BOUND], seen[Seen.SETTLED] = bound * max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])), math.nan
+    kept = kept_at(context)
+    for body in (LEFT, OBJECT, RIGHT):
+        kept[body, Kept.KIND] = NONE
+        if abs(y[velocity_lane(body) - 1]) > seen[Seen.BOUND]:
+            seen[Seen.OUTSIDE + body] = math.inf
 
 
 @allocating
 def finish(context: Integers) -> None:
-    """What follows at the end of a run: the last time outside the bound."""
-    seen = seen_at(context)
-    if seen[Seen.KEPT] != NONE:
-        kept = carray(floats_at(context[Context.KEPT]), (KEPT,))
-        last = sight_of(context, int(seen[Seen.KEPT]), seen[Seen.KEPT_TIME], seen[Seen.KEPT_STEP],
-                        int(seen[Seen.KEPT_DEGREE]))
-        sight = kept_sight(last, kept)
-        seen[Seen.OUTSIDE] = seen[Seen.KEPT_BEGIN] + last_outside(sight, seen[Seen.BOUND])
-        seen[Seen.KEPT] = NONE
+    """What follows at the end of a run: the last times outside the bound, and whether they are the last for good."""
+    seen, kept = seen_at(context), kept_at(context)
+    for body in (LEFT, OBJECT, RIGHT):
+        if kept[body, Kept.KIND] != NONE:
+            sight = kept_sight(sight_of(context, 0, 0.0, 0.0, 0), kept[body])
+            seen[Seen.OUTSIDE + body] = kept[body, Kept.BEGIN] + last_outside(sight, body, seen[Seen.BOUND])
+            kept[body, Kept.KIND] = NONE
+    pairs, y = carray(floats_at(context[Context.PAIRS]), (2, 2)), carray(floats_at(context[Context.Y]), (STATES,))
+    loop = bodies_at(context, Context.LOOP)
+    if context[Context.CERTAIN] != 0:
+        rest = carray(floats_at(context[Context.REST]), (RESTS,))
+        seen[Seen.SETTLED] = settled_from(loop, pairs, level(loop, pairs, y), rest[SINCE] < math.inf, seen)
 
 
 @allocating
@@ -155,7 +165,7 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
         write_ranges(sight)
         watch_quantities(sight, seen, wanted)
     if wanted & Wanted.SETTLING.value:
-        watch_bound(sight, seen, carray(floats_at(context[Context.KEPT]), (KEPT,)), now)
+        watch_bound(sight, seen, kept_at(context), now)
     if context[Context.LOSSES] != 0:
         call(context[Context.LOSSES], address, kind, t, s, degree)
     if wanted & Wanted.RISE.value:

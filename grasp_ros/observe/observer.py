@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.exact.compilation.jit import compiled_address
-from grasp_ros.exact.integrator import Integrator
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
 from grasp_ros.observe.observe import BEGIN, FINISH, observe, observe_losses
-from grasp_ros.observe.sight import COUNTS, KEPT, LONGEST, LOOKS, MODES, SEEN, Context, Wanted
+from grasp_ros.observe.settling import takes_energy
+from grasp_ros.observe.sight import COUNTS, KEPT, LONGEST, LOOKS, MODES, SEEN, UNDECIDED, Context, Seen, Wanted
 from grasp_ros.physics.system import System
 
 SIGNATURE = "int64(int64, int64, float64, float64, int64)"
@@ -40,7 +41,7 @@ class Watcher:
     def __init__(self, plant: Plant, state: State, wanted: Wanted) -> None:
         self.loop, self.own, self.base = np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 4))
         self.gains, self.seen = np.zeros((2, 2)), np.zeros(SEEN)
-        self._kept, self._rows = np.zeros(KEPT), np.zeros((LOOKS, LONGEST))
+        self._kept, self._rows = np.zeros((3, KEPT)), np.zeros((LOOKS, LONGEST))
         self._counts = np.zeros(COUNTS + MODES, dtype=np.int64)
         self._run = plant, state  # kept alive
         self.context: Integers = np.zeros(len(Context), dtype=np.int64)
@@ -48,7 +49,7 @@ class Watcher:
             Context.Y: state.y, Context.MODE: state.mode, Context.CLOCK: state.clock, Context.BODIES: plant.bodies,
             Context.GIVEN: plant.given, Context.PAIRS: plant.pairs, Context.LOOP: self.loop, Context.OWN: self.own,
             Context.BASE: self.base, Context.GAINS: self.gains, Context.SEEN: self.seen, Context.KEPT: self._kept,
-            Context.ROWS: self._rows, Context.COUNTS: self._counts,
+            Context.ROWS: self._rows, Context.COUNTS: self._counts, Context.REST: state.rest,
         }
         for place, array in places.items():
             self.context[place] = array.ctypes.data
@@ -65,6 +66,7 @@ class Watcher:
         """Say whose energies and inputs are watched, and whether its feedback acts all the time."""
         self.loop[:], self.own[:] = system.closed_loop, system.bodies
         self.base[:] = self.loop if continuous else self.own
+        self.context[Context.CERTAIN] = continuous and not system.caveats
         self.gains[:] = 0.0
         for side, law in system.laws.items():
             if continuous:
@@ -77,6 +79,34 @@ class Watcher:
     def finish(self) -> None:
         """After a run."""
         observe(self.context.ctypes.data, FINISH, 0.0, 0.0, 0)
+
+    def only(self, wanted: Wanted) -> None:
+        """Watch less from here on."""
+        self.context[Context.WANTED], self.context[Context.LOSSES] = wanted, 0
+
+
+def settle(integrator: Integrator, watcher: Watcher, stretch: float, horizons: int) -> Array:
+    """Go on with a watched run, in stretches of s, until V_c decides whether it has settled.
+
+    Returns
+    -------
+    array (3,)
+        Last times outside the bound of left arm, right arm and object in s, if nothing leaves it any more; infinite: it
+        has not settled for good within so many horizons; nan: V_c proves nothing here.
+    """
+    watcher.finish()
+    watcher.only(Wanted.SETTLING)
+    system, seen = integrator.system, watcher.seen
+    losing, done = takes_energy(watcher.loop, system.pairs, system.coulomb), 1
+    while seen[Seen.SETTLED] == UNDECIDED and losing and done < horizons:
+        integrator.advance(stretch, start=done * stretch)
+        if integrator.status is not Status.DONE:
+            break
+        watcher.finish()
+        done += 1
+    if seen[Seen.SETTLED] == UNDECIDED:
+        return np.full(3, np.inf)
+    return np.where(np.isnan(seen[Seen.SETTLED]), np.nan, seen[Seen.OUTSIDE : Seen.OUTSIDE + 3])
 
 
 def watch(integrator: Integrator, wanted: Wanted, bound: float) -> Watcher:

@@ -1,6 +1,7 @@
-"""The last time at which a body was outside a bound.
+"""The last time at which each body was outside a bound.
 
-Only the last segment that leaves the bound matters, so it is kept as it is, and searched when the run is over.
+Only the last segment in which a body leaves the bound matters, so it is kept as it is, and searched when the run is
+over.
 """
 
 from __future__ import annotations
@@ -8,83 +9,103 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import allocating, inlined, kernel
+from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import own_acceleration
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.flight_extremes import first_zero
-from grasp_ros.observe.sight import COUNTS, LOWER, MODES, NONE, STATES, UPPER, Seen, Sight
+from grasp_ros.observe.sight import COUNTS, LOWER, MODES, NONE, STATES, UNDECIDED, UPPER, Kept, Seen, Sight
 from grasp_ros.observe.step_extremes import FIRST, ROW, SQUARE, WORK, expand_quantity, extremes_of
-from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, U, X
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of
+from grasp_ros.physics.reach import reach as physics_reach
 
 BISECTIONS = 60
+reach = kernel(physics_reach)
 
+@kernel
+def settled_from(loop: Array, pairs: Array, V_c: float, at_rest: bool, seen: Array) -> float:
+    """The time in s from which on no body leaves the bound for good; inf: one rests outside; see `Seen.SETTLED`.
 
-@inlined
-def is_outside(y: Array, bound: float) -> bool:
-    """Whether a body of a state is outside."""
-    return abs(y[X.L]) > bound or abs(y[X.O]) > bound or abs(y[X.R]) > bound
+    V_c never rises: once its level holds every body inside, nothing that follows leaves the bound.
+    """
+    left, middle, right, _, _ = reach(loop, pairs, V_c)
+    most, bound = max(left, middle, right), seen[Seen.BOUND]
+    if not (most < math.inf and bound > 0.0):
+        return math.nan
+    if most <= bound or at_rest:
+        return max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
+    return UNDECIDED
 
 
 @kernel
-def leaves(sight: Sight, bound: float) -> bool:
-    """Whether a body leaves the bound within a segment; the ranges stand in scratch."""
-    for q in range(X.L, U.L, 2):
-        if sight.rows[LOWER, q] < -bound or sight.rows[UPPER, q] > bound:
-            low, high = extremes_of(sight, q)
-            if low < -bound or high > bound:
-                return True
-    return False
+def takes_energy(loop: Array, pairs: Array, coulomb: float) -> bool:
+    """Whether anything takes energy; what loses none comes back to near its start (Poincare) and never settles."""
+    total = coulomb
+    for body in (LEFT, OBJECT, RIGHT):
+        total += loop[body, Of.DAMPING]
+    for side in (LEFT, RIGHT):
+        total += pairs[side, Law.DISSIPATION]
+    return total > 0.0
+
+
+@kernel
+def leaves(sight: Sight, x: int, bound: float) -> bool:
+    """Whether a position leaves the bound within a segment; the ranges stand in scratch."""
+    if sight.rows[LOWER, x] >= -bound and sight.rows[UPPER, x] <= bound:
+        return False
+    low, high = extremes_of(sight, x)
+    return bool(low < -bound or high > bound)
 
 
 @kernel
 def watch_bound(sight: Sight, seen: Array, kept: Array, now: float) -> None:
-    """Remember when a body was outside, or the segment in which it was."""
+    """Remember when each body was outside, or the segment in which it was."""
     bound = seen[Seen.BOUND]
-    seen[Seen.INSIDE] = 1.0
-    if is_outside(sight.y, bound):
-        seen[Seen.OUTSIDE], seen[Seen.KEPT], seen[Seen.INSIDE] = now, NONE, 0.0
-    elif is_outside(sight.before, bound) or leaves(sight, bound):
-        seen[Seen.KEPT], seen[Seen.KEPT_TIME] = float(sight.kind), sight.t
-        seen[Seen.KEPT_BEGIN], seen[Seen.KEPT_STEP], seen[Seen.KEPT_DEGREE] = now - sight.t, sight.s, sight.degree
-        keep(sight, kept)
+    for body in (LEFT, OBJECT, RIGHT):
+        x = int(velocity_lane(body) - 1)
+        if abs(sight.y[x]) > bound:
+            seen[Seen.OUTSIDE + body], kept[body, Kept.KIND] = math.inf, NONE
+        elif abs(sight.before[x]) > bound or leaves(sight, x, bound):
+            seen[Seen.OUTSIDE + body] = 0.0
+            keep(sight, kept[body], now)
 
 
 @kernel
-def keep(sight: Sight, kept: Array) -> None:
-    """Copy all that the search needs."""
+def keep(sight: Sight, kept: Array, now: float) -> None:
+    """Copy all that the search needs of a segment that has just ended."""
+    kept[Kept.KIND], kept[Kept.TIME], kept[Kept.BEGIN] = float(sight.kind), sight.t, now - sight.t
+    kept[Kept.STEP], kept[Kept.DEGREE] = sight.s, sight.degree
     for place in range(STATES):
-        kept[place] = sight.before[place]
+        kept[Kept.STATE + place] = sight.before[place]
     for body in range(3):
+        kept[Kept.MODES + body] = sight.mode[body]
         for column in range(4):
-            kept[STATES + 4 * body + column] = sight.bodies[body, column]
-        sight.counts[COUNTS + body] = sight.mode[body]
+            kept[Kept.BODIES + 4 * body + column] = sight.bodies[body, column]
     if sight.kind != Kind.FLIGHT:
         for i in range(LANES * (sight.degree + 1)):
-            kept[STATES + 12 + i] = sight.c[i]
+            kept[Kept.TABLE + i] = sight.c[i]
 
 
 @allocating
 def kept_sight(sight: Sight, kept: Array) -> Sight:
     """The segment that was kept, in place of the last one."""
+    for body in range(3):
+        sight.counts[COUNTS + body] = int(kept[Kept.MODES + body])
     return Sight(
-        sight.kind, sight.t, sight.s, sight.degree, kept[STATES + 12 :], sight.size, kept[:STATES], sight.y,
-        sight.counts[COUNTS : COUNTS + MODES], kept[STATES : STATES + 12].reshape((3, 4)), sight.pairs, sight.given,
-        sight.own, sight.gains, sight.rows, sight.counts,
+        int(kept[Kept.KIND]), kept[Kept.TIME], kept[Kept.STEP], int(kept[Kept.DEGREE]), kept[Kept.TABLE :], sight.size,
+        kept[Kept.STATE : Kept.BODIES], sight.y, sight.counts[COUNTS : COUNTS + MODES],
+        kept[Kept.BODIES : Kept.TABLE].reshape((3, 4)), sight.pairs, sight.given, sight.own, sight.gains, sight.rows,
+        sight.counts,
     )
 
 
 @kernel
-def last_outside(sight: Sight, bound: float) -> float:
-    """Time since the begin of a segment, which ends inside, at which the last body comes inside, s."""
-    last = 0.0
-    for body in (LEFT, OBJECT, RIGHT):
-        if sight.kind == Kind.FLIGHT:
-            last = max(last, last_in_flight(sight, body, bound))
-        else:
-            last = max(last, last_in_step(sight, int(velocity_lane(body) - 1), bound))
-    return last
+def last_outside(sight: Sight, body: Body, bound: float) -> float:
+    """Time since the begin of a segment, which ends inside, at which a body comes inside, s."""
+    if sight.kind == Kind.FLIGHT:
+        return last_in_flight(sight, body, bound)
+    return last_in_step(sight, int(velocity_lane(body) - 1), bound)
 
 
 @kernel

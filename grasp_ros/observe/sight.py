@@ -39,7 +39,7 @@ class Wanted(IntFlag):
     IMPACTS = 2  # of penetrations and impact forces
     INPUTS = 4  # of the forces of the controllers
     LOSSES = 8  # energy by cause
-    SETTLING = 16  # the last time outside a bound
+    SETTLING = 16  # when every body stays within a bound for good
     RISE = 32  # of V_c
 
 
@@ -56,21 +56,33 @@ class Seen(IntEnum):
     LEVEL = 29  # V_c, J
     LEAST = 30  # of V_c so far
     RISE = 31  # largest V_c less the least before it
-    OUTSIDE = 32  # last time at which a body was outside the bound, s
-    BOUND = 33  # m
-    SEGMENTS = 34
-    KEPT = 35  # kind of the segment that is kept, for the last time outside; NONE: it is known
-    KEPT_TIME = 36  # its length, s
-    KEPT_BEGIN = 37
-    KEPT_STEP = 38  # its end in the variable of its polynomials
-    KEPT_DEGREE = 39
-    INSIDE = 40  # 1: no body was outside when the last segment ended
-    STATE = 41  # at the begin of the next segment
+    OUTSIDE = 32  # of each body: last time outside the bound, s; inf: when the last segment ended
+    BOUND = 35  # m
+    SETTLED = 36  # time from which on no body leaves the bound, s; inf: not within the run; nan: V_c cannot tell
+    SEGMENTS = 37
+    STATE = 38  # at the begin of the next segment
 
 
 SEEN = Seen.STATE + STATES
+UNDECIDED = -1.0  # in place of SETTLED: V_c is not low enough yet
+
+
+class Kept(IntEnum):
+    """Places of the segment that is kept for a body, to be searched for the last time outside."""
+
+    KIND = 0  # NONE: there is none, the time is known
+    TIME = 1  # its length, s
+    BEGIN = 2  # s
+    STEP = 3  # its end in the variable of its polynomials
+    DEGREE = 4
+    MODES = 5
+    STATE = 8  # at its begin
+    BODIES = 16
+    TABLE = 28
+
+
 NONE = -1.0
-KEPT = STATES + 12 + LANES * LONGEST  # numbers of a segment that is kept
+KEPT = Kept.TABLE + LANES * LONGEST
 
 
 class Context(IntEnum):
@@ -89,11 +101,13 @@ class Context(IntEnum):
     BASE = 10  # (3, 4) those of them that the motion has without held commands and external forces
     GAINS = 11  # (2, 2) Kp and Kv of the feedback that acts all the time; 0 where commands are held
     SEEN = 12
-    KEPT = 13  # state (8,), bodies (3, 4) and table of the segment that is kept
+    KEPT = 13  # (3, KEPT) see `Kept`, by body
     ROWS = 14  # scratch
-    COUNTS = 15  # scratch, and the modes of the segment that is kept
+    COUNTS = 15  # scratch, and the modes of a segment that was kept
     WANTED = 16
     LOSSES = 17  # address of `observe.observe_losses`, 0: they are not wanted
+    REST = 18  # records.State
+    CERTAIN = 19  # 1: V_c cannot rise
 
 
 class Sight(NamedTuple):
@@ -121,6 +135,12 @@ class Sight(NamedTuple):
 def seen_at(context: Integers) -> Array:
     """What is remembered."""
     return carray(floats_at(context[Context.SEEN]), (SEEN,))
+
+
+@allocating
+def kept_at(context: Integers) -> Array:
+    """The segments that are kept."""
+    return carray(floats_at(context[Context.KEPT]), (3, KEPT))
 
 
 @allocating

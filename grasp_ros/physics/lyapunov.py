@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import elastic_level, mechanical_level, pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, in_contact, penetration
+from grasp_ros.physics.reach import reach
 from grasp_ros.physics.system import COLUMN, System
 
 A = 0.8  # a = b of (19), (24)
@@ -92,20 +93,10 @@ def largest_deformation(system: System, state: Array) -> Array:
 
 
 def deformation_bound(system: System, V_c: float) -> Array:
-    """What no deformation can exceed at a level of V_c in J: (5 V_c / (4 H))^(2/5), (2,) in m.
-
-    It follows from V_c >= (4/5) H u^(5/2); infinite for a pair that cannot push.
-    """
-    with np.errstate(divide="ignore"):
-        return np.asarray((1.25 * V_c / system.pairs[:, Law.HERTZIAN]) ** 0.4)
+    """What no deformation can exceed at a level of V_c in J, (2,) in m; see `reach`."""
+    return np.array(reach(system.closed_loop, system.pairs, V_c)[3:])
 
 
 def displacement_bound(system: System, V_c: float) -> Array:
-    """What no displacement can exceed at a level of V_c in J: left, object, right, (3,) in m.
-
-    V_c >= K x^2 bounds an arm; the object is enclosed by the arms and the deformation, (37). V_c never rises under
-    continuous feedback to 0, so that it bounds all that follows.
-    """
-    with np.errstate(divide="ignore"):
-        arms = np.sqrt(V_c / system.closed_loop[[LEFT, RIGHT], Of.STIFFNESS])
-    return np.array([arms[0], (arms + deformation_bound(system, V_c)).max(), arms[1]])
+    """What no displacement can exceed at a level of V_c in J: left, object, right, (3,) in m; see `reach`."""
+    return np.array(reach(system.closed_loop, system.pairs, V_c)[:3])

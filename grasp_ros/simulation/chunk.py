@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from grasp_ros.exact.compilation.jit import COMPILED
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
-from grasp_ros.observe.ensemble import Rows, integrate_rows
-from grasp_ros.observe.observer import watch
+from grasp_ros.observe.ensemble import Limits, Rows, integrate_rows
+from grasp_ros.observe.observer import settle, watch
 from grasp_ros.observe.sight import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
@@ -29,7 +29,7 @@ from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
 from grasp_ros.simulation.lyapunov import check as check_lyapunov
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
-from grasp_ros.simulation.quantities import SETTLED
+from grasp_ros.simulation.quantities import HORIZONS, SETTLED
 from grasp_ros.simulation.variants import SET_POINT, Variants
 
 REFUSED = "REFUSED"
@@ -53,6 +53,8 @@ class Setup(NamedTuple):
         See `simulate`.
     settled : float
         Part of the largest initial displacement within which a run counts as settled.
+    horizons : int
+        A run whose settling time is wanted goes on until V_c decides, for so many horizons at most.
     max_events, max_work : int
         Budgets of each row.
     """
@@ -61,6 +63,7 @@ class Setup(NamedTuple):
     accuracy: float = ACCURACY
     sampled: bool = False
     settled: float = SETTLED
+    horizons: int = HORIZONS
     max_events: int = MAX_EVENTS
     max_work: int = MAX_WORK
 
@@ -104,6 +107,8 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
     Integrator(scene.system, continuous=True, accuracy=setup.accuracy)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
+    if not setup.horizons >= 1:
+        raise Refused(f"horizons: {setup.horizons!r} is not allowed; allowed: a whole number >= 1")
     if any(column.name == LYAPUNOV for column in columns):
         check_lyapunov(scene, setup.sampled or scene.sampled)
     return columns
@@ -154,8 +159,9 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
         loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
         np.full(n, LEFT_OUT),
     )
-    integrate_rows(rows, variants.scene.duration, float(setup.accuracy), wanted, float(setup.settled), stop,
-                   int(setup.max_events), int(setup.max_work))
+    limits = Limits(
+        float(setup.accuracy), int(setup.max_events), int(setup.max_work), stop, int(setup.horizons))
+    integrate_rows(rows, variants.scene.duration, wanted, float(setup.settled), limits)
     done = rows.outcome == Ended.DONE
     runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
     runs.touches[which[done]] = rows.touches[done]
@@ -176,15 +182,16 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
         drive_external(scene, NO_GRID, integrator)
     else:
         integrator.advance(scene.duration)
-    seen = np.full(SEEN, np.nan)
-    if watcher is not None:
-        watcher.finish()
-        seen = watcher.seen.copy()
-    growth = np.nan
-    if integrator.status is Status.DONE and any(column.name == LYAPUNOV for column in columns):
-        growth = exponent(system, scene.duration, setup.accuracy)
     touched = integrator.event_table[integrator.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     touches = np.array([(touched == side).sum() for side in (LEFT, RIGHT)], dtype=float)
-    return _Row(seen, integrator.state, touches, growth, integrator.status, integrator.stop)
+    row = _Row(np.full(SEEN, np.nan), integrator.state, touches, np.nan, integrator.status, integrator.stop)
+    if row.status is Status.DONE and any(column.name == LYAPUNOV for column in columns):
+        row = row._replace(growth=exponent(system, scene.duration, setup.accuracy))
+    if watcher is not None:
+        watcher.finish()
+        row.seen[:] = watcher.seen
+        if row.status is Status.DONE and wanted & Wanted.SETTLING:
+            row.seen[Seen.SETTLED] = settle(integrator, watcher, scene.duration, setup.horizons).max()
+    return row
 
 

@@ -1,4 +1,4 @@
-"""The energy that a motion lost, by cause, in J of V, which is twice the energy.
+"""The energy that a motion lost, by cause, in J; V counts it twice.
 
 Of an exact run it is what an observer sees while the run is integrated again, from closed forms and polynomials; of any
 other motion what its output times tell.
@@ -10,23 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.methods.registry import EXACT
-from grasp_ros.observe.observer import watch
 from grasp_ros.observe.sight import Seen, Wanted
 from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.simulation.quantities import SETTLED
+from grasp_ros.simulation.quantities import again, by_output_times
 from grasp_ros.simulation.trajectory import Trajectory
 
 CAUSES = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
-UNLIMITED = 2**62  # budgets of a run that has reached its end before
 
 
 class Losses(NamedTuple):
-    """Energy lost by each cause in J of V; arrays (n,) if they are running sums. Negative is gained."""
+    """Energy lost by each cause in J; arrays (n,) if they are running sums. Negative is gained."""
 
     dampers: Array  # c of the arms
     feedback: Array  # Kv of the controllers; held commands: all their work
@@ -40,30 +36,25 @@ class Losses(NamedTuple):
 
 
 def power_lost(system: System, state: Array) -> Losses:
-    """Rates of the losses in W of V at states (n, 6), under continuous feedback; (18), and what effects add."""
+    """Rates of the losses in W at states (n, 6), under continuous feedback; half of (18), and what effects add."""
     zero: Array = np.zeros(len(state))
     speed = {body: state[:, COLUMN[body] + 1] for body in system.present}
     arms = [body for body in system.present if body != OBJECT]
     damping, loop = system.bodies[:, Of.DAMPING], system.closed_loop[:, Of.DAMPING]
-    dampers = sum((2.0 * damping[body] * speed[body] ** 2 for body in arms), zero)
-    feedback = sum((2.0 * (loop - damping)[body] * speed[body] ** 2 for body in arms), zero)
+    dampers = sum((damping[body] * speed[body] ** 2 for body in arms), zero)
+    feedback = sum(((loop - damping)[body] * speed[body] ** 2 for body in arms), zero)
     impacts = zero
     for side, u, d in pairs_of(system, state):
         contact = Contact(*system.pairs[side])
-        impacts = impacts + 2.0 * (impact_force(contact, u, d) - hertzian_force(contact, u)) * d
+        impacts = impacts + (impact_force(contact, u, d) - hertzian_force(contact, u)) * d
     friction = zero
     if OBJECT in system.present:
-        friction = 2.0 * (damping[OBJECT] * speed[OBJECT] ** 2 + system.coulomb * np.abs(speed[OBJECT]))
+        friction = damping[OBJECT] * speed[OBJECT] ** 2 + system.coulomb * np.abs(speed[OBJECT])
     return Losses(dampers, feedback, impacts, friction)
 
 
-def by_output_times(run: Trajectory) -> bool:
-    """Whether `losses` are no more exact than the output times are dense."""
-    return run.method != EXACT or run.status is not Status.DONE or run.sampled or bool(run.scene.system.external)
-
-
 def running_losses(run: Trajectory) -> tuple[Array, Losses]:
-    """Energy lost so far by each cause: times (n,) in s, and arrays (n,) in J of V; see `by_output_times`.
+    """Energy lost so far by each cause: times (n,) in s, and arrays (n,) in J; see `quantities.by_output_times`.
 
     The times are those of outputs and events of an exact run, and its begin and end; those of outputs of any other,
     whose sums follow the trapezoidal rule.
@@ -78,18 +69,16 @@ def running_losses(run: Trajectory) -> tuple[Array, Losses]:
 
 def observed_losses(run: Trajectory, times: Array) -> Losses:
     """Energy lost until each of the times (n,) in s, from 0 on: arrays (n,). An exact run is integrated again."""
-    again = Integrator(
-        run.scene.system, continuous=True, accuracy=run.setting, max_events=UNLIMITED, max_work=UNLIMITED)
-    seen = watch(again, Wanted.LOSSES, SETTLED).seen
+    integrator, watcher = again(run, Wanted.LOSSES)
     lost = np.zeros((len(CAUSES), len(times)))
     for k, length in enumerate(np.diff(times).tolist(), 1):
-        again.advance(length)
-        lost[:, k] = seen[CAUSES]
-    return Losses(*(2.0 * lost))
+        integrator.advance(length)
+        lost[:, k] = watcher.seen[CAUSES]
+    return Losses(*lost)
 
 
 def losses(run: Trajectory) -> Losses:
-    """Energy lost by each cause over the whole run, in J of V; see `by_output_times`.
+    """Energy lost by each cause over the whole run, in J; see `quantities.by_output_times`.
 
     What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
     out of the arms, beside what they have stored in V_c, from the positions at the output times.
@@ -106,7 +95,7 @@ def losses(run: Trajectory) -> Losses:
         if side not in system.present:
             continue
         x = run.state[:, COLUMN[side]]
-        work = 2.0 * float((run.inputs[:-1, side] * np.diff(x)).sum())
-        stored = virtual[side, Of.STIFFNESS] * (x**2)[[0, -1]] - 2.0 * virtual[side, Of.FORCE] * x[[0, -1]]
+        work = float((run.inputs[:-1, side] * np.diff(x)).sum())
+        stored = 0.5 * virtual[side, Of.STIFFNESS] * (x**2)[[0, -1]] - virtual[side, Of.FORCE] * x[[0, -1]]
         taken -= work + float(stored[1] - stored[0])
     return found._replace(feedback=np.asarray(taken))

@@ -38,10 +38,6 @@ class Outcome(NamedTuple):
     read: Callable[[Runs], Array]
 
 
-def _settling(runs: Runs) -> Array:
-    return np.where(runs.seen[:, Seen.INSIDE] > 0.0, runs.seen[:, Seen.OUTSIDE], np.inf)
-
-
 def _seen(place: int, factor: float = 1.0) -> Callable[[Runs], Array]:
     return lambda runs: factor * runs.seen[:, place]
 
@@ -78,8 +74,9 @@ _PLACES = {"left": (X.L, V.L), "object": (X.O, V.O), "right": (X.R, V.R)}
 _SIDES = ("left", "right")
 _GROUPS: dict[str, tuple[Outcome, ...]] = {
     "settling_time": (Outcome(
-        "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, any"
-        " more; inf: it does at the end", Wanted.SETTLING, _settling),),
+        "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, for"
+        " good: V_c proves it, for which the run goes on; inf: not within so many horizons; nan: V_c proves nothing"
+        " where it can rise, or where a mass is not driven to 0", Wanted.SETTLING, _seen(Seen.SETTLED)),),
     "touches": tuple(
         Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _touch(side))
         for side, name in enumerate(_SIDES)),

@@ -1,32 +1,34 @@
 """What a motion amounts to in a few numbers: settling times, contacts and impact forces.
 
-Settled is one definition for the whole package: no mass leaves 2 % of the largest initial displacement any more.
-These numbers come from a motion that is there, whatever method or controller made it; `outcomes` has those of runs that
-are watched while they are integrated, and agrees.
+Settled is one definition for the whole package: no mass leaves 2 % of the largest initial displacement any more, for
+good, which V_c proves: it never rises, and its level bounds what follows, see `physics.reach`. A run goes on past its
+horizon until that is decided. What V_c does not prove within HORIZONS horizons is not settled.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.methods.registry import EXACT
+from grasp_ros.observe.observer import Watcher, settle, watch
+from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import Of, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
+from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array, Contact, impact_force
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.trajectory import Trajectory
 
 SETTLED = 0.02  # of the largest initial displacement
+HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
+UNLIMITED = 2**62  # budgets of a run that has reached its end before
 
 
 def settled_distance(scene: Scene, part: float = SETTLED) -> float:
     """What a mass must not leave any more to be settled, in m: a part of the largest initial displacement."""
     return part * float(np.abs(scene.initial_state[[COLUMN[body] for body in scene.system.present]]).max())
-
-
-def rests_at_zero(system: System) -> bool:
-    """Whether the arms are regulated to 0 and nothing pushes from outside: where `settled` has a meaning."""
-    return not (system.closed_loop[:, Of.FORCE].any() or system.external)
 
 
 def last_outside(t: Array, position: Array, distance: float) -> Array:
@@ -48,9 +50,35 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
     return found
 
 
-def settling_times(run: Trajectory, part: float = SETTLED) -> Array:
-    """When left arm, object and right arm settled, (3,) in s, as far as the output times go; infinite: not yet."""
-    return last_outside(run.t, run.state[:, 0::2], settled_distance(run.scene, part))
+def by_output_times(run: Trajectory) -> bool:
+    """Whether what is said of a run is no more exact than its output times are dense; others are integrated again."""
+    return run.method != EXACT or run.status is not Status.DONE or run.sampled or bool(run.scene.system.external)
+
+
+def again(run: Trajectory, wanted: Wanted, part: float = SETTLED) -> tuple[Integrator, Watcher]:
+    """An exact run from its begin, and what watches it."""
+    integrator = Integrator(
+        run.scene.system, continuous=True, accuracy=run.setting, max_events=UNLIMITED, max_work=UNLIMITED)
+    return integrator, watch(integrator, wanted, part)
+
+
+def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZONS) -> Array:
+    """When left arm, object and right arm settled for good, (3,) in s.
+
+    Infinite: V_c does not prove it within so many horizons, for which an exact run goes on, or within the output times
+    of any other. nan: V_c proves nothing, because it can rise here, or bounds no mass that is not driven to 0.
+    """
+    system, distance = run.scene.system, settled_distance(run.scene, part)
+    if run.sampled or run.controllers or system.caveats or not distance > 0.0:
+        return np.full(3, np.nan)
+    if not by_output_times(run):
+        integrator, watcher = again(run, Wanted.SETTLING, part)
+        integrator.advance(run.scene.duration)
+        return settle(integrator, watcher, run.scene.duration, horizons)[[LEFT, OBJECT, RIGHT]]
+    ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
+    if not np.isfinite(ahead).all():
+        return np.full(3, np.nan)
+    return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
 
 
 def contact_intervals(run: Trajectory, side: int) -> Array:

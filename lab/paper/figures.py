@@ -144,7 +144,7 @@ def _behind(axes: Axes, draw: object, run: Trajectory) -> None:
 def _losses(axes: Axes, run: Trajectory) -> None:
     """Energy lost so far by each cause, one above the other, in percent of V_c(0)."""
     t, lost = running_losses(run)
-    whole = float(run.energy.V_c[0])
+    whole = 0.5 * float(run.energy.V_c[0])
     shown = [
         (name, color, getattr(lost, name) / whole * 100.0) for name, color in CAUSES if getattr(lost, name)[-1] > 0.0
     ]

@@ -61,7 +61,7 @@ def _column(scene: Scene) -> list[str]:
         f"{lengths.min():.0f} to {lengths.max():.0f}",
         *_peaks(scene),
         f"{whole:.3g}, {_plain(float(level[-1]))}",
-        *(f"{100.0 * float(part) / whole:.1f}" for part in (lost.dampers, lost.feedback, lost.impacts)),
+        *(f"{200.0 * float(part) / whole:.1f}" for part in (lost.dampers, lost.feedback, lost.impacts)),
         f"{100.0 * float(level[-1]) / whole:.1f}",
         f"{round(-slope, 3) + 0.0:.3f}",
         f"{impact_forces_of(run)[-1].min():.2g}",

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from documents import scene_of
 from oracles import flight_array
 
 from grasp_ros import scene as scenes
@@ -136,6 +137,18 @@ def test_8_and_9_what_a_method_does_not_declare_is_refused(name: str) -> None:
         else:
             with pytest.raises(Refused, match=f"{name}.*allowed.*: {EXACT}$"):
                 simulate(asked, method=name, **options)
+
+
+@pytest.mark.parametrize(
+    ("sections", "words"),
+    [(("left_feedback", "right_feedback"), "lacks left_feedback, right_feedback"), (("object", "left_contact",
+      "right_contact"), "lacks left_contact, object, right_contact")],
+)
+def test_9_the_refusal_names_what_is_lacking(sections: tuple[str, ...], words: str) -> None:
+    with pytest.raises(Refused, match=rf"case_01: {words}: dop853 knows the paper's grasp alone"):
+        check("dop853", scene_of("case_01", without=sections), None)
+    with pytest.raises(Refused, match=r"everything: has .*left_sensor.*: dop853"):
+        check("dop853", scenes.load("everything"), None)
 
 
 @pytest.mark.parametrize("name", [name for name in METHODS if METHODS[name].sampled])

@@ -27,6 +27,8 @@ DENSE = (  # continuous feedback
     "v_jump_symmetric", "pulse",
 )
 
+SETTLES = ("case_01", "case_04", "case_05", "v_jump_symmetric")  # V_c proves it
+
 
 def outcomes_of(scene: Scene, **settings: object) -> dict[str, float]:
     table: Table = ensemble(scene, {}, EVERY, setup=Setup(**settings))  # type: ignore[arg-type]
@@ -68,13 +70,15 @@ def check_forces(found: dict[str, float], run: Trajectory) -> None:
         assert found[f"touches_{SIDES[side]}"] == len(run.times(Transition.TOUCH, side))
 
 
-def check_settling(found: float, run: Trajectory) -> None:
+def check_settling(found: float, scene: Scene) -> None:
+    """Beside a grid that goes on four times as long as the motion was said to need, and much further than V_c asks."""
+    if not np.isfinite(found):
+        return
+    end = max(float(math.ceil(4.0 * found)), scene.duration)
+    run = simulate(scene.changed({"time.duration_s": end}), grid=np.linspace(0.0, end, FINE))
     places = np.nan_to_num(run.state[:, 0::2])
     outside = np.flatnonzero((np.abs(places) > SETTLED * np.abs(places[0]).max()).any(axis=1))
-    if outside[-1] == len(run.t) - 1:
-        assert found == np.inf
-    else:
-        assert run.t[outside[-1]] <= found <= run.t[outside[-1] + 1]
+    assert run.t[outside[-1]] <= found <= run.t[outside[-1] + 1]
 
 
 def check_balance(found: dict[str, float], run: Trajectory) -> None:
@@ -91,8 +95,9 @@ def test_outcomes_are_those_of_a_fine_grid(name: str) -> None:
     run = simulate(scene, grid=np.linspace(0.0, scene.duration, FINE))
     check_extremes(found, run)
     check_forces(found, run)
-    check_settling(found["settling_time"], run)
+    check_settling(found["settling_time"], scene)
     check_balance(found, run)
+    assert math.isfinite(found["settling_time"]) == (name in SETTLES)
 
 
 @pytest.mark.parametrize("name", ["case_01", "noise", "delay", "saturation", "everything"])
@@ -102,7 +107,7 @@ def test_outcomes_of_a_sampled_loop_are_those_of_its_ticks(name: str) -> None:
     run = simulate(scene, sampled=True, grid=np.linspace(0.0, scene.duration, FINE))
     check_extremes(found, run)
     check_forces(found, run)
-    check_settling(found["settling_time"], run)
+    assert math.isnan(found["settling_time"])  # a held command may bring energy: nobody knows what follows
 
 
 def test_the_last_state_is_that_of_a_simulation_to_the_last_bit() -> None:

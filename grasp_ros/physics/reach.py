@@ -1,0 +1,35 @@
+"""How far a level of V_c lets the bodies go: what proves that a motion has settled for good.
+
+V_c >= K x^2 bounds an arm, V_c >= (4/5) H u^(5/2) a deformation, and the arms enclose the object, (35) to (37). Where
+V_c never rises, under continuous feedback to 0, that bounds all that follows. `observe.settling` compiles the same
+source for its kernels.
+"""
+
+from typing import Any
+
+import numpy as np
+
+
+def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
+    """Largest displacements of left arm, object and right arm, and largest deformations of both pairs, in m.
+
+    An arm that is not driven to 0, an object that the arms do not enclose or that a force pushes, and a pair that
+    cannot push have no bound: infinite. What is not there stays at 0.
+
+    Parameters
+    ----------
+    bodies, pairs : arrays (3, 4) and (2, 2)
+        See `layout`; with the feedback in them.
+    V_c : float, J
+    """
+    left = middle = right = 0.0
+    if bodies[0, 0] > 0.0:
+        left = np.sqrt(V_c / bodies[0, 1]) if bodies[0, 1] > 0.0 and bodies[0, 3] == 0.0 else np.inf
+    if bodies[1, 0] > 0.0:
+        right = np.sqrt(V_c / bodies[1, 1]) if bodies[1, 1] > 0.0 and bodies[1, 3] == 0.0 else np.inf
+    u_l = (1.25 * V_c / pairs[0, 0]) ** 0.4 if pairs[0, 0] > 0.0 else np.inf
+    u_r = (1.25 * V_c / pairs[1, 0]) ** 0.4 if pairs[1, 0] > 0.0 else np.inf
+    if bodies[2, 0] > 0.0:
+        enclosed = bodies[0, 0] > 0.0 and bodies[1, 0] > 0.0 and bodies[2, 3] == 0.0
+        middle = max(left + u_l, right + u_r) if enclosed else np.inf
+    return left, middle, right, u_l, u_r
