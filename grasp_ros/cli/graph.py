@@ -13,7 +13,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn, whole
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check, network
@@ -73,9 +73,9 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     _add_network(sub)
-    sub = add_command(commands, "ctl", _ctl, "pause, resume, step or reset a running graph, or ask for its status")
-    sub.add_argument("action", choices=("pause", "resume", "step", "reset", "status"))
-    sub.add_argument("steps", type=whole(1), nargs="?", default=1, metavar="N", help="control periods of step")
+    sub = add_command(commands, "ctl", _ctl, "steer a running graph, ask it, set its numbers; or a shell that does")
+    sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
+                     " [NAME ...], set NODE NAME VALUE, echo TOPIC [N]; none: a shell that stays connected")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     _add_network(sub)
     sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
@@ -257,7 +257,7 @@ def _watch(options: argparse.Namespace) -> int:
 
 def _ctl(options: argparse.Namespace) -> int:
     _reach(options)
-    become("remote", {"action": options.action, "steps": str(options.steps)}, options.namespace)
+    become("remote", {"words": json.dumps(json.dumps(options.words))}, options.namespace)
 
 
 def _verify(options: argparse.Namespace) -> int:

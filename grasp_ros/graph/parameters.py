@@ -30,10 +30,7 @@ NODES = {
     "plant": PLANT, "left_controller": CONTROLLER, "right_controller": CONTROLLER,
     "monitor": {"bag": "directory of the bag; it must not exist (grasp_ and the time)", **PEERS},
     "player": {"bag": "directory of the bag", "rate": "seconds of the bag in a second (1)"},
-    "remote": {
-        "action": "pause, resume, step, reset or status", "steps": "control periods of step",
-        "plant": "name of the plant's node", "patience_s": "without progress",
-    },
+    "remote": {"words": "what to ask, a JSON list; empty: what the lines of the standard input say"},
     "watch": {},
 }
 TEXTS = {name: text for parameters in NODES.values() for name, text in parameters.items()}

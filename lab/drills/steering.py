@@ -91,13 +91,14 @@ class Plant:
         found: dict[str, Any] = json.loads(self.call("status")[1])
         return found
 
-    def expect(self, service: str, success: bool, part: str, **words: Any) -> str:
-        """Call a service that must succeed, or must not, with this in its words; returns them."""
-        found, said = self.call(service, **words)
-        if found is not success or part not in said:
-            raise Wrong(f"{service} {words or ''}: {'done' if found else 'refused'}, {said!r}; expected: "
-                        f"{'done' if success else 'refused'}, {part!r}")
-        return said
+    def expect(self, service: str, why: str = "", **words: Any) -> dict[str, Any]:
+        """Call a service that must succeed, or must not for some reason; returns its answer."""
+        done, said = self.call(service, **words)
+        found: dict[str, Any] = json.loads(said) if said.startswith("{") else {"why": said}
+        if done is bool(why) or why not in found.get("why", ""):
+            expected = f"refused, {why!r}" if why else "done"
+            raise Wrong(f"{service} {words or ''}: {'done' if done else 'refused'}, {said!r}; expected: {expected}")
+        return found
 
     def settle(self) -> None:
         """Wait until it stands where it should, or runs; it must stay there."""
@@ -143,10 +144,10 @@ def _act(plant: Plant, action: str, draw: random.Random) -> bool:
     if action in ("pause", "resume"):
         refused = plant.paused is (action == "pause")
         word = "paused" if action == "pause" else "running"
-        said = plant.expect(action, not refused, f"already {word}" if refused else f"{word} at tick")
+        said = plant.expect(action, f"already {word}" if refused else "")
         plant.paused = action == "pause"
         if plant.paused:
-            plant.tick = _number_in(said)
+            plant.tick = said["tick"]
         elif not refused:
             plant.let_go_on(draw.randint(1, MOST_STEPS))
     elif action == "reset":
@@ -160,10 +161,10 @@ def _act(plant: Plant, action: str, draw: random.Random) -> bool:
 def _reset(plant: Plant) -> None:
     """A reset ends a run with the tick that it names."""
     plant.resets += 1
-    said = plant.expect("reset", True, f"reset number {plant.resets}, as soon as tick")
-    last = _number_in(said.removesuffix(" is answered"))
-    if plant.paused and last != plant.tick:
-        raise Wrong(f"{said!r}; expected: tick {plant.tick}")
+    said = plant.expect("reset")
+    last = said["last_tick"]
+    if said["goal"]["resets"] != plant.resets or (plant.paused and last != plant.tick):
+        raise Wrong(f"{said!r}; expected: reset {plant.resets}, tick {plant.tick}")
     plant.lengths.append(last + 1)
     plant.tick = 0
 
@@ -171,30 +172,27 @@ def _reset(plant: Plant) -> None:
 def _step(plant: Plant, action: str, draw: random.Random) -> bool:
     number = draw.randint(1, MOST_STEPS)
     if action == "step none":
-        plant.expect("step", False, "steps", steps=draw.randint(-3, 0))
+        plant.expect("step", "steps", steps=draw.randint(-3, 0))
         return True
     if not plant.paused:
-        plant.expect("step", False, "not paused; allowed: step of a paused plant", steps=number)
+        plant.expect("step", "not paused; allowed: step of a paused plant", steps=number)
         return True
     left = plant.ticks - plant.tick
     if action == "step too far":
-        plant.expect("step", False, f"allowed: at most {left}", steps=left + number)
+        plant.expect("step", f"allowed: at most {left}", steps=left + number)
         return True
     plant.tick += number
-    plant.expect("step", True, f"steps to tick {plant.tick}", steps=number)
+    said = plant.expect("step", steps=number)
+    if said["goal"]["tick"] != plant.tick:
+        raise Wrong(f"{said!r}; expected: tick {plant.tick}")
     if action == "step and at once":  # what may come before the steps are done, or after them
-        success, said = plant.call("step")
+        success, answer = plant.call("step")
         if success:
             plant.tick += number
-        elif "allowed: one at a time" not in said:
-            raise Wrong(f"step while stepping: refused, {said!r}")
-        plant.expect("pause", False, "already paused")
+        elif "allowed: one at a time" not in answer:
+            raise Wrong(f"step while stepping: refused, {answer!r}")
+        plant.expect("pause", "already paused")
     return False
-
-
-def _number_in(words: str) -> int:
-    """The tick that ends an answer."""
-    return int(words.split()[-1])
 
 
 @contextmanager

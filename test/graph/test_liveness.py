@@ -235,7 +235,7 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not() -> None:
     assert not controller.finished
     other.end()
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.finished, "its end")
-    assert "nobody has come for 1.6 s" in controller.state
+    assert "nobody has come for 1.6 s" in controller.words
     executor.shutdown()
     controller.end()
     context.shutdown()

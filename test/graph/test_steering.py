@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import time
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 from conftest import grasp
 from flipped import with_a_flipped_bit
-from processes import DEADLINE
+from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rosgraph_msgs.msg import Clock
@@ -42,11 +43,11 @@ def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
         plant.tick += 7
         assert f"case_01: paused at tick {plant.tick} of 100000" in said.stdout
         plant.settle()
-        plant.expect("resume", True, "running at tick")
+        plant.expect("resume")
         refused = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
         assert (refused.returncode, refused.stdout) == (1, "")
         assert "not paused; allowed: step of a paused plant" in refused.stderr
-        plant.tick = int(plant.expect("pause", True, "paused at tick").split()[-1])
+        plant.tick = plant.expect("pause")["tick"]
         plant.settle()  # it is paused as soon as this tick is answered
     return directory, [*plant.lengths, plant.tick + 1]
 
@@ -106,6 +107,37 @@ def test_a_bag_is_published_again_with_its_clock(
         assert len(rows) > 100, name
         assert 2_000_000_000 < rows[-1] <= 3_000_000_000
         assert {stamp % 1_000_000 for stamp in rows} == {0}
+
+
+def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
+    """Over one node, so that discovery is paid for once."""
+    plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true"]
+    launch(*plant, stderr=subprocess.DEVNULL)
+    launch(*START, "left_controller", stderr=subprocess.DEVNULL)
+    shell = launch(sys.executable, "-m", "grasp_ros.cli", "ctl", stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                   stderr=subprocess.PIPE)
+
+    def ask(words: str) -> str:
+        shell.stdin.write(f"{words}\n")
+        shell.stdin.flush()
+        return str(shell.stdout.readline())
+
+    wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
+    assert ask("step 7").startswith("arm_alone: paused at tick 7 of")
+    gain = "left_feedback.position_gain_N_per_m"
+    assert ask(f"set left_controller {gain} 9") == ask(f"get left_controller {gain}") == f"{gain}: 9.0\n"
+    assert ask("reset").startswith("arm_alone: paused at tick 0 of")
+    assert ask("resume").startswith("arm_alone: running at tick")
+    message = json.loads(ask("echo joint_states 1"))
+    assert message["name"] == ["left"]
+    refused = ["set plant steps 0", "step", "pause now", "echo nothing", "nonsense", "step x", "get nobody steps",
+               f"set left_controller {gain} -100"]
+    _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
+    for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
+                  "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number",
+                  "no nobody answers in ROS domain", "allowed: a sum >= 0"):
+        assert words in err
+    assert shell.returncode == 1
 
 
 def test_without_a_plant_ctl_says_so(tmp_path: Path) -> None:

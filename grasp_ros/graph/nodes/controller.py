@@ -17,6 +17,7 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes.node import Phase
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.priority import Priority
 from grasp_ros.graph.nodes.states import State, StateReader
@@ -100,9 +101,9 @@ class Controller(PeerNode):
         except Refused as error:
             if first:
                 raise
-            self.state = f"waits for another scene: {error}"
+            self.phase, self.words = Phase.LEFT, f"waits for another scene: {error}"
             self.concern = "this scene is not answered"
-            self.get_logger().error(self.state)
+            self.get_logger().error(self.words)
             return
         if self._ready_to_answer:  # this node stays; those that listen may be new
             self._ready_to_answer = False
@@ -139,7 +140,8 @@ class Controller(PeerNode):
         return self._scene is not None and informed and self.linked(self._commands, listeners)
 
     def _start(self) -> None:
-        self.state = f"running with {self._own.words}" if self._own else "running"
+        self.phase = Phase.RUNNING
+        self.words = f"running with {self._own.words}" if self._own else "running"
         self.begun, self.concern = True, ""
         self._priority.take()
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last

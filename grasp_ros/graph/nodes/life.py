@@ -32,7 +32,7 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
     """
     nodes: list[GraspNode] = []
     try:
-        _init()
+        init()
         for make in makes:
             nodes.append(make())
         gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
@@ -101,7 +101,7 @@ def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:
             executor.spin_once(timeout_sec=QUIET_SECONDS)
 
 
-def _init() -> None:
+def init() -> None:
     """Start rclpy with the arguments of the process."""
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

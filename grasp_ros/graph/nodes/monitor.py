@@ -22,7 +22,7 @@ from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.limits import Limits
-from grasp_ros.graph.nodes.node import PATIENCE_SECONDS
+from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, Phase
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.nodes.sources import Sources
@@ -166,8 +166,9 @@ class Monitor(PeerNode):
         self._soon = self.wall_timer(MOST_SECONDS, self._complete)
         self._soon.cancel()
         self.begun, self.concern = True, ""
-        self.state = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
-        self.get_logger().info(self.state)
+        self.phase = Phase.RUNNING
+        self.words = f"recording {running.words}; {scene.certificate_in_words(sampled=True)}"
+        self.get_logger().info(self.words)
         for side, command in COMMANDS.items():
             if command in scene.topics:
                 self.subscribe(CHANGES[side], partial(self._on_announcement, side), raw=True)

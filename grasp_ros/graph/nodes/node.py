@@ -7,6 +7,7 @@ import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from enum import Enum
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -41,6 +42,16 @@ SWEEP = 100  # messages of one topic at a time
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 
 
+class Phase(Enum):
+    """What a node is about; its words say more."""
+
+    WAITING = "waiting"  # for those without whom it does not begin
+    RUNNING = "running"
+    LEFT = "left"  # without a plant; it waits for the next one
+    FINISHED = "finished"
+    FAILED = "failed"
+
+
 class GraspNode(Node):
     """A node with parameters, counters on /diagnostics and an end.
 
@@ -56,8 +67,9 @@ class GraspNode(Node):
         Whether there is nothing left to do; `run` and `spin` end then.
     exit_code : int
         0, or 1 after a failure, 2 after a refusal.
-    state : str
-        What it does or waits for, in words; the message of its /diagnostics.
+    phase : Phase
+    words : str
+        What it does or waits for; the message of its /diagnostics.
     counters : dict of str to number or text
         The values of its /diagnostics.
     """
@@ -76,7 +88,8 @@ class GraspNode(Node):
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.strangers = ""  # who publishes what somebody else does
-        self.state = f"waiting for peers {place(os.environ, self.get_namespace())}"
+        self.phase = Phase.WAITING
+        self.words = f"waiting for peers {place(os.environ, self.get_namespace())}"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
         self.wall_timer(REPORT_SECONDS, self.report)
@@ -202,7 +215,7 @@ class GraspNode(Node):
                 timer.cancel()
                 action()
             else:
-                self.get_logger().info(self.state, throttle_duration_sec=PATIENCE_SECONDS, skip_first=True)
+                self.get_logger().info(self.words, throttle_duration_sec=PATIENCE_SECONDS, skip_first=True)
 
         timer = self.wall_timer(PEER_SECONDS, poll)
 
@@ -249,14 +262,15 @@ class GraspNode(Node):
         lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
         failed, doubtful = self.exit_code or self.trouble, lost or self.concern or self.strangers
         level = Level.ERROR if failed else Level.WARN if doubtful else Level.OK
-        summary = "; ".join(words for words in (self.state, self.trouble, self.concern, self.strangers) if words)
+        summary = "; ".join(words for words in (self.words, self.trouble, self.concern, self.strangers) if words)
+        values = {"phase": self.phase.value, **self.counters}
         self._diagnostics.publish(
-            messages.diagnostics(stamp, self.get_fully_qualified_name(), summary, level, self.counters)
+            messages.diagnostics(stamp, self.get_fully_qualified_name(), summary, level, values)
         )
 
     def fail(self, reason: str) -> None:
         """End with a sentence, and with the exit status 1."""
-        self.state = reason
+        self.phase, self.words = Phase.FAILED, reason
         tell_parent(self.get_name(), reason)
         self.get_logger().fatal(reason)
         self.exit_code = 1

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.nodes.beats import ENDED, Beats, digest
-from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode
+from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
 from grasp_ros.graph.nodes.watchdog import Watchdog
 from grasp_ros.graph.processes import PEER_SECONDS
 from grasp_ros.physics.errors import Refused
@@ -87,7 +87,7 @@ class PeerNode(GraspNode):
         self.begun = False
         self._silent: dict[str, float] = {}  # by topic: since when
         self._said = 0.0  # when that was last said
-        self._left = ""  # what it did before a peer ended without which it stays
+        self._left: tuple[Phase, str] | None = None  # what it did before a peer ended without which it stays
         self._gone: dict[Topic, float] = {}
         self._last: dict[Topic, list[str]] = {}  # names of the last sources
         self._cached: dict[Topic, tuple[float, int, list[str]]] = {}
@@ -168,7 +168,7 @@ class PeerNode(GraspNode):
         waited = now - max(self._created, self.beats.prepared)
         self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
         if waited > self.start_patience and self._ends:
-            self.fail(f"{self.state}: nobody has come for {self.start_patience:g} s")
+            self.fail(f"{self.words}: nobody has come for {self.start_patience:g} s")
 
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""
@@ -234,15 +234,16 @@ class PeerNode(GraspNode):
 
     def _leave(self, words: str) -> None:
         """A peer without which this node stays has ended."""
-        if not self._left:
-            self._left, self.state = self.state, f"waiting for another one: {words}"
-            self.get_logger().info(self.state)
+        if self._left is None:
+            self._left = self.phase, self.words
+            self.phase, self.words = Phase.LEFT, f"waiting for another one: {words}"
+            self.get_logger().info(self.words)
 
     def _come_back(self) -> None:
         """It is there, or another one in its place."""
-        if self._left and self.state.startswith("waiting for another one"):
-            self.state = self._left
-        self._left = ""
+        if self._left is not None and self.phase is Phase.LEFT:
+            self.phase, self.words = self._left
+        self._left = None
 
     def living(self, topic: Topic) -> list[str]:
         """Sources of a topic without processes that are known to be dead."""
@@ -292,4 +293,4 @@ class PeerNode(GraspNode):
 
     def part(self) -> None:
         """Say last words."""
-        self.beats.end(self.state if self.exit_code else "")
+        self.beats.end(self.words if self.exit_code else "")

@@ -23,6 +23,7 @@ from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.free_running import FreeRunning
 from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.lockstep import Lockstep
+from grasp_ros.graph.nodes.node import Phase
 from grasp_ros.graph.nodes.peers import Need
 from grasp_ros.graph.nodes.priority import Priority
 from grasp_ros.graph.nodes.steering import Steering
@@ -168,7 +169,7 @@ class Plant(SteppedNode):
         missing += self.loop.missing()
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
-        self.state = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
+        self.words = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
         # Who has been here with another plant must have this scene before its first state.
         known = all(publisher.get_subscription_count() >= self.count_subscribers(publisher.topic_name)
                     and self.delivered(publisher) for publisher in (*self._descriptions, self.beats.publisher))
@@ -177,7 +178,7 @@ class Plant(SteppedNode):
         )
 
     def _start(self) -> None:
-        self.state = "running"
+        self.phase, self.words = Phase.RUNNING, "running"
         self.begun, self.concern = True, ""
         self.beats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
@@ -229,7 +230,7 @@ class Plant(SteppedNode):
 
     def finish(self) -> None:
         """End: the horizon has been reached and answered."""
-        self.state = "finished"
+        self.phase, self.words = Phase.FINISHED, "finished"
         self.finished = True
         speed = self.scene.ticks / (time.monotonic() - self._begin)
         self.get_logger().info(f"finished {self.scene.ticks} ticks at {speed:.1f} ticks/s")

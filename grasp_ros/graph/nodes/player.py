@@ -11,7 +11,7 @@ from typing import Any
 from grasp_ros.graph import bag
 from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.nodes.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 
@@ -54,7 +54,7 @@ class Player(GraspNode):
         return waited > DISCOVERY_SECONDS and (matched or waited > MATCH_SECONDS)
 
     def _start(self) -> None:
-        self.state, self._begin = "playing", time.monotonic()
+        self.phase, self.words, self._begin = Phase.RUNNING, "playing", time.monotonic()
         self.wall_timer(LOOK_SECONDS, self._play)
 
     def _play(self) -> None:

@@ -1,4 +1,4 @@
-"""`grasp ctl`: asks the services of a running plant, and waits for what they promise."""
+"""`grasp ctl`: asks a running graph, one call or a shell of them, and waits for what the plant promises."""
 
 from __future__ import annotations
 
@@ -6,103 +6,214 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from array import array
+from collections.abc import Callable, Sequence
+from functools import partial
+from inspect import signature
 from typing import Any
 
-from rcl_interfaces.srv import SetParameters
-from rclpy.parameter import Parameter
+from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph.host import place
-from grasp_ros.graph.nodes.life import run
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.life import init
 from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import strict_yaml
+from grasp_ros.scene.topics import Topic
 
-PATIENCE_SECONDS = 5.0
-LOOK_SECONDS = 0.005
+PATIENCE_SECONDS = 5.0  # without an answer, or without progress
+SPIN_SECONDS = 0.1
+FAREWELL = ("quit", "exit", "q")
+HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
+
+
+class Stopped(Exception):  # noqa: N818 - no error
+    """A signal has come."""
 
 
 class Remote(GraspNode):
-    """Node `remote`; parameters action, steps, plant and patience_s.
+    """Node `remote`; parameter words, a JSON list: what to ask; empty: what the lines of the standard input say.
 
     Parameters
     ----------
-    options
-        As in `rclpy.node.Node`.
+    received : sequence of int
+        Ends when something is in it, say a signal.
     """
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__("remote", **options)
-        self._action = self.read_only("action", "status")
-        self._steps = self.read_only("steps", 1)
-        plant = self.read_only("plant", "plant")
-        self._patience = self.read_only("patience_s", PATIENCE_SECONDS)
-        self._asks = {
-            name: self.create_client(Trigger, f"{plant}/{name}") for name in {self._action, "status"}
+    def __init__(self, received: Sequence[int]) -> None:
+        super().__init__("remote")
+        self.wanted: list[str] = json.loads(self.read_only("words", "[]"))
+        self._received, self._known = received, dict[str, Any]()
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self)
+        self._actions: dict[str, Callable[..., str]] = {
+            **{name: partial(self.plant, name) for name in ("pause", "resume", "reset", "status")},
+            "step": self.step, "get": self.get, "set": self.put, "echo": self.echo, "help": lambda: HELP,
         }
-        self._set = self.create_client(SetParameters, f"{plant}/set_parameters")
-        self._goal: dict[str, Any] = {}
-        self._seen: Any = None
-        self._nobody = f"no plant answers {place(os.environ, self.get_namespace())}"
-        self._progress()
-        self._begun = False
-        self.wall_timer(LOOK_SECONDS, self._look)
 
-    def _progress(self) -> None:
-        self._deadline = time.monotonic() + self._patience
+    def do(self, words: Sequence[str]) -> str:
+        """Do what some words ask for; returns what there is to say.
 
-    def _look(self) -> None:
-        if time.monotonic() > self._deadline:
-            self._end(1, self._nobody if self._seen is None else f"the plant does not go on: {self._seen}")
-        elif not self._begun and all(client.service_is_ready() for client in (*self._asks.values(), self._set)):
-            self._begun = True
-            if self._action == "step":
-                request = SetParameters.Request()
-                request.parameters = [Parameter("steps", value=self._steps).to_parameter_msg()]
-                self._set.call_async(request).add_done_callback(self._on_set)
-            else:
-                self._ask(self._action)
+        Raises
+        ------
+        Refused
+            If it is not allowed, or nobody answers.
+        """
+        action = self._actions.get(words[0])
+        wrong = f"{' '.join(words)}: not allowed; allowed: {HELP}"
+        if action is None:
+            raise Refused(wrong)
+        try:
+            signature(action).bind(*words[1:])
+        except TypeError:
+            raise Refused(wrong) from None
+        return action(*words[1:])
 
-    def _on_set(self, future: Any) -> None:
-        [result] = future.result().results
-        if result.successful:
-            self._ask("step")
-        else:
-            self._end(1, result.reason)
+    def step(self, number: str = "1") -> str:
+        """Let a paused plant do some periods."""
+        self._set("plant", Parameter("steps", value=_whole(number)))
+        return self.plant("step")
 
-    def _ask(self, name: str) -> None:
-        self._asks[name].call_async(Trigger.Request()).add_done_callback(
-            self._on_status if name == "status" else self._on_answer
-        )
+    def plant(self, name: str) -> str:
+        """Call a service of the plant, and wait for what it promises."""
+        found, goal, deadline = self._status(name), {}, time.monotonic() + PATIENCE_SECONDS
+        goal = found.get("goal", {})
+        while not goal.items() <= found.items():
+            before, found = found, self._status("status")
+            if found != before:
+                deadline = time.monotonic() + PATIENCE_SECONDS
+            elif time.monotonic() > deadline:
+                raise Refused(f"the plant does not go on: {_line(found)}")
+        return _line(found)
 
-    def _on_answer(self, future: Any) -> None:
-        answer = future.result()
-        if not answer.success or self._action in ("pause", "resume"):
-            self._end(0 if answer.success else 1, answer.message)
-            return
-        self._seen = answer.message
-        if self._action == "step":
-            self._goal = {"tick": int(answer.message.split()[-1]), "state": "paused"}
-        else:
-            self._goal = {"resets": int(answer.message.split()[2].rstrip(",")), "resetting": False}
-        self._ask("status")
+    def _status(self, service: str) -> dict[str, Any]:
+        answer = self._ask(Trigger, f"plant/{service}", Trigger.Request())
+        found: dict[str, Any] = json.loads(answer.message)
+        if not answer.success:
+            raise Refused(found["why"])
+        return found
 
-    def _on_status(self, future: Any) -> None:
-        status = json.loads(future.result().message)
-        if status != self._seen:
-            self._progress()
-        self._seen = status
-        if all(status[key] == value for key, value in self._goal.items()):
-            self._end(0, f"{status['scene']}: {status['state']} at tick {status['tick']} of {status['ticks']},"
-                         f" t = {status['time_s']:g} s, {status['resets']} resets")
-        else:
-            self._ask("status")
+    def get(self, node: str, *names: str) -> str:
+        """Parameters of a node; all of them without names."""
+        if not names:
+            listed = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request())
+            names = tuple(sorted(listed.result.names))
+        found = self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=list(names))).values
+        values = [_plain(parameter_value_to_python(value)) for value in found]
+        return "\n".join(f"{name}: {json.dumps(value)}" for name, value in zip(names, values, strict=False))
 
-    def _end(self, code: int, words: str) -> None:
-        if not self.finished:
-            print(words, file=sys.stderr if code else sys.stdout)
-        self.exit_code, self.finished = code, True
+    def put(self, node: str, name: str, value: str) -> str:
+        """Set a parameter of a node."""
+        self._set(node, Parameter(name, value=strict_yaml.load(value)))
+        return self.get(node, name)
+
+    def _set(self, node: str, parameter: Parameter) -> None:
+        request = SetParameters.Request(parameters=[parameter.to_parameter_msg()])
+        [result] = self._ask(SetParameters, f"{node}/set_parameters", request).results
+        if not result.successful:
+            raise Refused(result.reason)
+
+    def echo(self, topic: str, number: str = "0") -> str:
+        """Print messages of a topic as they come, a line each; so many, or until a signal."""
+        name, left = self.resolve_topic_name(topic), _whole(number) or -1
+        self._wait(lambda: bool(self.count_publishers(name)), f"nobody publishes {name}")
+        [kind, *_] = dict(self.get_topic_names_and_types())[name]
+        if kind not in messages.TYPES:
+            raise Refused(f"{name}: {kind} cannot be shown; allowed: {', '.join(messages.TYPES)}")
+        found: list[Any] = []
+        qos = messages.glance_qos(Topic(name, kind))
+        subscription = self.create_subscription(messages.TYPES[kind], name, found.append, qos)
+        try:
+            while left:
+                self._spin()
+                shown, found[:] = found[: left if left > 0 else None], []
+                for message in shown:
+                    print(json.dumps(_plain(message)), flush=True)
+                left -= len(shown) if left > 0 else 0
+        finally:
+            self.destroy_subscription(subscription)
+        return ""
+
+    def _ask(self, kind: Any, name: str, request: Any) -> Any:
+        """Answer of a service."""
+        if name not in self._known:
+            self._known[name] = self.create_client(kind, name)
+        client = self._known[name]
+        nobody = f"no {name.split('/')[0]} answers {place(os.environ, self.get_namespace())}"
+        self._wait(client.service_is_ready, nobody)
+        future = client.call_async(request)
+        self._wait(future.done, nobody)
+        return future.result()
+
+    def _wait(self, condition: Callable[[], bool], otherwise: str) -> None:
+        deadline = time.monotonic() + PATIENCE_SECONDS
+        while not condition():
+            self._spin()
+            if time.monotonic() > deadline:
+                raise Refused(otherwise)
+
+    def _spin(self) -> None:
+        self._executor.spin_once(timeout_sec=SPIN_SECONDS)
+        if self._received:
+            raise Stopped
+
+
+def _whole(word: str) -> int:
+    if not word.isdecimal():
+        raise Refused(f"{word}: not allowed; allowed: a whole number")
+    return int(word)
+
+
+def _line(status: dict[str, Any]) -> str:
+    """A status for a reader."""
+    if status["state"] == "waiting":
+        return f"{status['scene']}: {status['words']}"
+    return (f"{status['scene']}: {status['state']} at tick {status['tick']} of {status['ticks']},"
+            f" t = {status['time_s']:g} s, {status['resets']} resets")
+
+
+def _plain(value: Any) -> Any:
+    """A message, or what is in one, as JSON has it."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: _plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if isinstance(value, (list, tuple, array)):
+        return [_plain(part) for part in value]
+    return value.hex() if isinstance(value, bytes) else value
+
+
+def _shell(remote: Remote) -> int:
+    """Do what the lines of the standard input ask for, until it ends; the status of the last one."""
+    status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
+    while True:
+        print(prompt, end="", flush=True)
+        words = sys.stdin.readline()
+        if not words or words.strip() in FAREWELL:
+            return status
+        if words.strip():
+            status = _say(remote, words.split())
+
+
+def _say(remote: Remote, words: Sequence[str]) -> int:
+    try:
+        if answer := remote.do(words):
+            print(answer, flush=True)
+    except Refused as error:
+        print(error, file=sys.stderr, flush=True)
+        return 1
+    return 0
 
 
 def main(_: str, received: Sequence[int]) -> int:
-    """Run one action."""
-    return run([Remote], received)
+    """Ask once, or be a shell."""
+    init()
+    remote = Remote(received)
+    try:
+        return _say(remote, remote.wanted) if remote.wanted else _shell(remote)
+    except Stopped:
+        return 0
+    finally:
+        remote.end()

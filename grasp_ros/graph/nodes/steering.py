@@ -1,19 +1,23 @@
 """Steering a plant: pause, resume, step, reset and status, as services.
 
 The meaning is that of the standard `simulation_interfaces`, whose package is not among the wheels; the types are those
-of std_srvs. A service that finds the plant in the wrong state does nothing and says why.
+of std_srvs. Each answers with what the plant is then, as JSON: `state`, `tick` and others; with `goal`, what `status`
+will say when it is done; and if it does nothing, with `why`.
 """
 
 from __future__ import annotations
 
 import json
+from typing import Any
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from std_srvs.srv import Trigger
 
+from grasp_ros.graph.nodes.node import Phase
 from grasp_ros.graph.nodes.stepped import SteppedNode
 
 MOST_STEPS = 10**9
+PAUSED, STEPPING = "paused", "stepping"  # beside the phases of a node
 
 
 class Steering:
@@ -71,44 +75,45 @@ class Steering:
         return self._change(response, paused=False)
 
     def _change(self, response: Trigger.Response, paused: bool) -> Trigger.Response:
-        word = "paused" if paused else "running"
         if self._paused is paused:
-            return _answer(response, False, f"already {word} at tick {self._plant.tick}")
+            return self._answer(response, f"already {'paused' if paused else 'running'} at tick {self._plant.tick}")
         self._paused, self.steps = paused, 0
         self._plant.advance()
-        return _answer(response, True, f"{word} at tick {self._plant.tick}")
+        return self._answer(response)
 
     def _step(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         plant, wanted = self._plant, int(self._plant.get_parameter("steps").value)
         left = plant.scene.ticks - plant.tick
         if not self._paused:
-            return _answer(response, False, "not paused; allowed: step of a paused plant")
+            return self._answer(response, "not paused; allowed: step of a paused plant")
         if self.steps or self.reset_due:
-            return _answer(response, False, f"{self.steps} steps are still to go, or a reset; allowed: one at a time")
+            return self._answer(response, f"{self.steps} steps are still to go, or a reset; allowed: one at a time")
         if wanted > left:
-            return _answer(response, False, f"steps: {wanted} is not allowed; allowed: at most {left}")
+            return self._answer(response, f"steps: {wanted} is not allowed; allowed: at most {left}")
         self.steps, goal = wanted, plant.tick + wanted
         plant.advance()
-        return _answer(response, True, f"steps to tick {goal}")
+        return self._answer(response, goal={"tick": goal, "state": PAUSED})
 
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.reset_due:
-            return _answer(response, False, "a reset is already on its way")
+            return self._answer(response, "a reset is already on its way")
         self.reset_due = True
         number, tick = self._plant.resets + 1, self._plant.tick  # which may be over when `advance` returns
         self._plant.advance()
-        return _answer(response, True, f"reset number {number}, as soon as tick {tick} is answered")
+        return self._answer(response, goal={"resets": number, "resetting": False}, last_tick=tick)
 
     def _status(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        plant = self._plant
-        waiting = not plant.state.startswith("running")
-        return _answer(response, True, json.dumps({
-            "state": plant.state if waiting else "paused" if self.stands else "stepping" if self._paused else "running",
-            "tick": plant.tick, "ticks": plant.scene.ticks, "time_s": plant.scene.time_of(plant.tick),
-            "steps": self.steps, "resets": plant.resets, "resetting": self.reset_due, "scene": plant.scene.name,
-        }))
+        return self._answer(response)
 
-
-def _answer(response: Trigger.Response, success: bool, text: str) -> Trigger.Response:
-    response.success, response.message = success, text
-    return response
+    def _answer(self, response: Trigger.Response, why: str = "", **more: Any) -> Trigger.Response:
+        """What the plant is now, as JSON; with what it will be, or why it is not."""
+        plant, state = self._plant, self._plant.phase.value
+        if plant.phase is Phase.RUNNING and self._paused:
+            state = STEPPING if self.steps else PAUSED
+        response.success = not why
+        response.message = json.dumps({
+            "state": state, "words": plant.words, "tick": plant.tick, "ticks": plant.scene.ticks,
+            "time_s": plant.scene.time_of(plant.tick), "steps": self.steps, "resets": plant.resets,
+            "resetting": self.reset_due, "scene": plant.scene.name, **({"why": why} if why else {}), **more,
+        })
+        return response
