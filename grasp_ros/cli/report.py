@@ -79,7 +79,7 @@ def _amounts(trajectory: Trajectory) -> list[Row]:
     exact, largest = _largest(trajectory)
     shown = [f"{name} {value:.5g} N" for name, value in largest.items() if value > 0.0]
     if shown:
-        rows.append(("largest forces" if exact else "largest at the outputs", ", ".join(shown)))
+        rows.append(("largest forces" if exact else "largest at outputs", ", ".join(shown)))
     if len(trajectory.t) > 1 and not system.external:
         lost = losses(trajectory)
         parts = [f"{name} {float(value):.4g}" for name, value in lost._asdict().items() if float(value) != 0.0]

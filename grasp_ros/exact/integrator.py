@@ -26,9 +26,11 @@ from grasp_ros.exact.records import (
     plant_of,
     state_of,
 )
+from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.layout import Filled, Of, Outcome, Pair, U, Work
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
@@ -104,14 +106,14 @@ class Integrator:
     Raises
     ------
     Refused
-        If the accuracy is outside its range or the state is not finite.
+        If the accuracy is outside its range, a budget no whole number, or the state is not finite.
     """
 
     def __init__(
         self, system: System, *, continuous: bool, accuracy: float = ACCURACY, max_events: int = MAX_EVENTS,
         max_work: int = MAX_WORK,
     ) -> None:
-        check_accuracy(accuracy)
+        self._accuracy = check_accuracy(accuracy)
         state = np.asarray(system.state, dtype=float)
         if state.shape != (6,) or not all(map(math.isfinite, state.tolist())):
             raise Refused(f"state: {state!r} is not an array of six finite numbers")
@@ -119,8 +121,8 @@ class Integrator:
         self.progress: Callable[[float], object] | None = None  # told the time in s every BREATH units of work
         self.work = np.zeros(len(Work), dtype=np.int64)
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
-        self.system, self.continuous, self._accuracy = system, continuous, float(accuracy)
-        self._max_events, self._max_work = int(max_events), int(max_work)
+        self.system, self.continuous = system, continuous
+        self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
         self._plant_block, self._state_block = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS)
         self._mode = np.array(_UNKNOWN)
         self.plant, self.records = plant_of(self._plant_block), state_of(self._state_block, self._mode)
@@ -208,9 +210,10 @@ class Integrator:
         Refused
             If the duration is negative or not finite.
         """
+        duration, start = number("duration", duration), number("start", start)
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
-        times = _NO_TIMES if grid is None else np.array(grid, dtype=float)
+        times = _NO_TIMES if grid is None else given.times("grid", grid)
         loop = Loop(np.array([float(duration)]), np.array([float(start)]), np.array([0, len(times)]), new_place())
         return self.run(loop, times)
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
@@ -44,7 +45,7 @@ MOST_NS = 2**63 - 1
 WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
-def names(path: Path) -> dict[str, Topic]:
+def names(path: str | os.PathLike[str]) -> dict[str, Topic]:
     """Topics of a bag by their full names in the graph that it was recorded from.
 
     Raises
@@ -52,6 +53,7 @@ def names(path: Path) -> dict[str, Topic]:
     BagError
         If the path is not such a bag.
     """
+    path = Path(path)
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError,)):
         next(begin(storage, path), None)
@@ -59,7 +61,7 @@ def names(path: Path) -> dict[str, Topic]:
         return {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
 
 
-def raw(path: Path) -> Iterator[Stored]:
+def raw(path: str | os.PathLike[str]) -> Iterator[Stored]:
     """Everything in a bag, in the order of time, as it lies in the file.
 
     Raises
@@ -71,7 +73,7 @@ def raw(path: Path) -> Iterator[Stored]:
         yield from open_storage(path).messages()
 
 
-def read(path: Path) -> Recording:
+def read(path: str | os.PathLike[str]) -> Recording:
     """Read a bag that the monitor recorded, also one that was not closed.
 
     Raises
@@ -79,6 +81,7 @@ def read(path: Path) -> Recording:
     BagError
         If the path is not such a bag, or if it is damaged.
     """
+    path = Path(path)
     storage = open_storage(path)
     with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
         content = None

@@ -13,6 +13,7 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
+from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import SIDES
@@ -21,7 +22,7 @@ from grasp_ros.scene.topics import EXTERNAL_FORCES, LYAPUNOV_NAMES
 
 
 @dataclass(frozen=True)
-class Recording:
+class Recording(Frozen):
     """What is in a bag.
 
     Attributes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from itertools import chain, groupby
 from pathlib import Path
@@ -26,7 +27,7 @@ class Recovery(NamedTuple):
     left_out: list[tuple[int, int, str]]  # offset, size in bytes, and reason
 
 
-def recover(path: Path, new: Path) -> Recovery:
+def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recovery:
     """Write all complete ticks of a bag into a new one; the old one is only read.
 
     Parameters
@@ -41,6 +42,7 @@ def recover(path: Path, new: Path) -> Recovery:
     BagError
         If nothing can be saved, or if the new bag cannot be written.
     """
+    path, new = Path(path), Path(new)
     storage = opening.open_storage(path, salvage=True)
     with decoding(path, opening.KIND, BagError, (SerdeError,)):
         messages = opening.begin(storage, path)

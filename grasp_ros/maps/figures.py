@@ -5,15 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
 
 from grasp_ros.maps.plan import Plan
+from grasp_ros.simulation import canvas
+from grasp_ros.simulation.canvas import Axes, LogNorm, Normalize, colormaps
 from grasp_ros.simulation.plots import save
 
 BINS, SCATTERED, DOT, MOST_COLUMNS = 60, 20_000, 2.0, 4
@@ -22,6 +18,7 @@ MISSING = "#c8c8c8"  # what was refused, stopped, or never settles
 LOG_FROM = 1e3  # ratio of values from which on colours are those of their logarithms
 
 
+@canvas.style()
 def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     """Draw one outcome: a heat map over two axes, a curve over one, a histogram and scatter of a sample.
 
@@ -35,7 +32,7 @@ def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     if plan.sample:
         _sample(data, plan, values, label, path)
         return
-    figure, axes = plt.subplots(figsize=(8.0, 6.0), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(8.0, 6.0), layout="constrained")
     figure.suptitle(plan.scene.title, fontsize="medium")
     if len(plan.axes) == 1:
         axes.plot(plan.axes[0].values, values, ".", markersize=DOT)
@@ -49,7 +46,7 @@ def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
 def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
     """A heat map over two axes: one pixel for each run."""
     shown = np.ma.masked_invalid(values)
-    colors = matplotlib.colormaps[COLORS].with_extremes(bad=MISSING)
+    colors = colormaps[COLORS].with_extremes(bad=MISSING)
     y, x = plan.axes
     if x.log or y.log:
         mesh: Any = axes.pcolormesh(x.values, y.values, shown, cmap=colors, norm=_norm(shown), rasterized=True)
@@ -81,7 +78,7 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
     """The histogram, and the outcome over the numbers with which it goes most."""
     finite = np.isfinite(values)
     strongest = [name for name, _ in correlations(data, plan, values)][: MOST_COLUMNS - 1]
-    figure, columns = plt.subplots(1, len(strongest) + 1, figsize=(3.6 * (len(strongest) + 1), 3.8), squeeze=False,
+    figure, columns = canvas.subplots(1, len(strongest) + 1, figsize=(3.6 * (len(strongest) + 1), 3.8), squeeze=False,
                                    layout="constrained")
     figure.suptitle(f"{plan.scene.title}: {plan.sample} runs", fontsize="medium")
     first, *others = columns[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -20,8 +21,10 @@ from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
 Progress = Callable[[int, int], object]
 
 
-def run(plan: Plan, path: Path, *, workers: int = 0, scheduler: str = "", progress: Progress = lambda _, __: None
-        ) -> Store:
+def run(
+    plan: Plan, path: str | os.PathLike[str], *, workers: int = 0, scheduler: str = "",
+    progress: Progress = lambda _, __: None,
+) -> Store:
     """Compute what a file does not have yet.
 
     Parameters
@@ -44,7 +47,7 @@ def run(plan: Plan, path: Path, *, workers: int = 0, scheduler: str = "", progre
     """
     check(plan.scene, plan.setup)
     check_plan(plan)
-    store = Store(path, plan, chunk_rows(plan.scene, plan.setup))
+    store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
     spans = store.spans
     done = plan.rows - sum(last - first for first, last in spans)
     progress(done, plan.rows)

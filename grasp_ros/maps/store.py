@@ -8,6 +8,7 @@ had marked; the same command goes on with the rest. A NetCDF file would be damag
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -150,7 +151,7 @@ def open_group(path: Path, mode: str = "r") -> Any:
     return group
 
 
-def read(path: Path) -> Any:
+def read(path: str | os.PathLike[str]) -> Any:
     """A map as an `xarray.Dataset`, with what is not done as nan.
 
     Raises
@@ -160,6 +161,7 @@ def read(path: Path) -> Any:
     """
     import xarray
 
+    path = Path(path)
     group = open_group(path)
     data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
     data = data.drop_vars(MARKS)

@@ -12,6 +12,7 @@ from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import number
 from grasp_ros.scene import PAPER, Scene
 
 EXACT = "exact"
@@ -120,7 +121,7 @@ def check(
         does not declare.
     """
     method = find(name)
-    value = method.default if setting is None else float(setting)  # as all kernels take it
+    value = method.default if setting is None else number(f"{name}: {method.knob}", setting)
     low, high = method.low, method.high
     if method.knob == STEP:
         low, high = scene.duration / MOST_STEPS, scene.duration

@@ -1,12 +1,21 @@
 """How accurately contacts are integrated: their first neglected Taylor term, relative to the impact."""
 
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import number
 
 ACCURACY = 1e-16  # default: costs a fifth more than 1e-11, and some scenes amplify an error by 1e7
 FINEST, COARSEST = 1e-16, 1e-3
 
 
-def check_accuracy(accuracy: float) -> None:
-    """Raise `Refused` if an accuracy is outside its range."""
-    if not FINEST <= accuracy <= COARSEST:
+def check_accuracy(accuracy: float) -> float:
+    """An accuracy as the kernels take it.
+
+    Raises
+    ------
+    Refused
+        If it is no number, or outside its range.
+    """
+    found = number("accuracy", accuracy)
+    if not FINEST <= found <= COARSEST:
         raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+    return found

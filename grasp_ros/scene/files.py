@@ -73,7 +73,7 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
 
 
 @contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
+def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     """A file to write that takes the place of what was there only when it is whole.
 
     Raises
@@ -81,6 +81,7 @@ def replacing(path: Path) -> Iterator[BinaryIO]:
     Refused
         If it cannot be written; what was there is still there.
     """
+    path = Path(path)
     with writing(path):
         if path.exists() and not path.is_file():  # a device, a pipe; a directory refuses by itself
             with path.open("wb") as file:

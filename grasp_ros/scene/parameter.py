@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from grasp_ros.physics.domain import SMALLEST
+from grasp_ros.physics.given import plain
 
 UNITS = {  # endings of keys; the longest that fits counts
     "_kg": "kg", "_m": "m", "_s": "s", "_N": "N", "_Hz": "Hz", "_rad": "rad", "_m_per_s": "m/s", "_m_per_s2": "m/s^2",
@@ -53,10 +54,11 @@ class Parameter(NamedTuple):
         return not self.whole and self.smallest > max(self.low, 0.0)
 
     def accepts(self, value: Any) -> bool:
-        """Whether a value from a file is of the right kind and in the range; NaN is in no range."""
+        """Whether a value from a file, or from Python, is of the right kind and in the range; NaN is in no range."""
         if self.several:
-            return isinstance(value, (list, tuple)) and bool(value) and all(self._accepts_one(v) for v in value)
-        return self._accepts_one(value)
+            row = isinstance(value, (list, tuple)) or (hasattr(value, "__array__") and getattr(value, "ndim", 0) == 1)
+            return row and len(value) > 0 and all(self._accepts_one(plain(entry)) for entry in value)
+        return self._accepts_one(plain(value))
 
     def read(self, value: Any) -> Any:
         """An accepted value as float, int or tuple of floats."""
@@ -64,8 +66,8 @@ class Parameter(NamedTuple):
             return tuple(float(entry) for entry in value)
         return int(value) if self.whole else float(value)
 
-    def _accepts_one(self, value: Any) -> bool:
-        if not isinstance(value, (int, float)) or isinstance(value, bool):
+    def _accepts_one(self, value: int | float | None) -> bool:
+        if value is None:
             return False
         if self.whole and value != value // 1:  # 7.0 is whole: messages carry nothing else
             return False

@@ -6,6 +6,7 @@ simulated. Every key carries its unit. Nothing is repaired: a file that is not e
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ from typing import Any
 
 from grasp_ros import CONFIG
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, Grasp
 from grasp_ros.physics.system import System
@@ -34,7 +36,7 @@ PAPER = frozenset(  # the sections of the paper's grasp
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Frozen):
     """A validated scene; `load`, `parse`, `compose` and `changed` make one.
 
     Attributes
@@ -67,6 +69,8 @@ class Scene:
         system = System()
         for effect in self.effects:
             effect.build(self.values, system)
+        for array in (system.bodies, system.pairs, system.state):
+            array.setflags(write=False)
         return system
 
     @cached_property
@@ -200,12 +204,12 @@ def names() -> list[str]:
     return sorted(found, key=lambda name: (not name.startswith("case_"), name))
 
 
-def load(reference: str, settings: Sequence[str] = ()) -> Scene:
+def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:
     """Read a scene of the package by its name, or a file by its path.
 
     Parameters
     ----------
-    reference : str
+    reference : str or path
     settings : sequence of str
         "section.key=value": numbers that replace those of the file, or name what it does not. "section={}" names a
         section without numbers; if it is there, it stays as it is.
@@ -215,6 +219,7 @@ def load(reference: str, settings: Sequence[str] = ()) -> Scene:
     SceneError
         If there is no such scene, or if it cannot be run as written.
     """
+    reference, settings = os.fspath(reference), [settings] if isinstance(settings, str) else settings
     path = Path(reference)
     if path.suffix in (".yaml", ".yml"):
         with reading(reference, SceneError):

@@ -18,8 +18,9 @@ from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
 from grasp_ros.observe.ensemble import Limits, Rows, integrate_rows
 from grasp_ros.observe.observer import settle, watch
 from grasp_ros.observe.sight import SEEN, Seen, Wanted
-from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
@@ -95,6 +96,20 @@ class _Row(NamedTuple):
     stop: str
 
 
+def taken(setup: Setup) -> Setup:
+    """A setup with numbers of Python's own.
+
+    Raises
+    ------
+    Refused
+        If one is none, or outside its range.
+    """
+    outcomes = (setup.outcomes,) if isinstance(setup.outcomes, str) else tuple(setup.outcomes)
+    return Setup(
+        outcomes, check_accuracy(setup.accuracy), bool(setup.sampled), number("settled", setup.settled),
+        *(whole(name, getattr(setup, name), 1) for name in ("horizons", "max_events", "max_work")))
+
+
 def check(scene: Scene, setup: Setup) -> list[Outcome]:
     """The columns that are asked for.
 
@@ -104,11 +119,8 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
         If an outcome is unknown or not to be had, or a setting is outside its range.
     """
     columns = find(setup.outcomes)
-    Integrator(scene.system, continuous=True, accuracy=setup.accuracy)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
-    if not setup.horizons >= 1:
-        raise Refused(f"horizons: {setup.horizons!r} is not allowed; allowed: a whole number >= 1")
     if any(column.name == LYAPUNOV for column in columns):
         check_lyapunov(scene, setup.sampled or scene.sampled)
     return columns
@@ -159,9 +171,8 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
         loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
         np.full(n, LEFT_OUT),
     )
-    limits = Limits(
-        float(setup.accuracy), int(setup.max_events), int(setup.max_work), stop, int(setup.horizons))
-    integrate_rows(rows, variants.scene.duration, wanted, float(setup.settled), limits)
+    limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.horizons)
+    integrate_rows(rows, variants.scene.duration, wanted, setup.settled, limits)
     done = rows.outcome == Ended.DONE
     runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
     runs.touches[which[done]] = rows.touches[done]

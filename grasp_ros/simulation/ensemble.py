@@ -20,9 +20,11 @@ from itertools import islice
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_ros.physics.frozen import Frozen
+from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import Chunk, Setup, check, compute
+from grasp_ros.simulation.chunk import Chunk, Setup, check, compute, taken
 from grasp_ros.simulation.variants import Variants
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
@@ -30,7 +32,7 @@ Span = tuple[int, int]
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(Frozen):
     """An ensemble: its numbers and its outcomes, a row for each run.
 
     Attributes
@@ -90,12 +92,10 @@ def ensemble(
     Refused
         If a key or an outcome is not known, or a setting is outside its range.
     """
-    setup = (setup or Setup())._replace(outcomes=tuple(outcomes))
+    setup = taken((setup or Setup())._replace(outcomes=tuple([outcomes] if isinstance(outcomes, str) else outcomes)))
     columns, variants = check(scene, setup), Variants(scene, changes)
-    table = Table(
-        scene, setup, variants.changes, {column.name: np.full(variants.rows, np.nan) for column in columns},
-        np.zeros(variants.rows, dtype=np.int8), {},
-    )
+    found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}
+    status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()
     spans = chunks(variants.rows, chunk_rows(scene, setup))
 
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
@@ -103,12 +103,12 @@ def ensemble(
 
     for (first, last), chunk in in_threads(work, spans, threads):
         for name, values in chunk.columns.items():
-            table.columns[name][first:last] = values
-        table.status[first:last] = chunk.status
-        table.stops.update({first + i: stop for i, stop in chunk.stops.items()})
+            found[name][first:last] = values
+        status[first:last] = chunk.status
+        stops.update({first + i: stop for i, stop in chunk.stops.items()})
         if progress is not None:
             progress(last - first)
-    return table
+    return Table(scene, setup, variants.changes, found, status, stops)
 
 
 def chunk_rows(scene: Scene, setup: Setup) -> int:
@@ -128,7 +128,7 @@ def in_threads(work: Callable[[Span, NDArray[np.int64]], Chunk], spans: Iterable
 
     The work is handed what it is to look at now and then: not 0 asks it to stop, after a Ctrl-C say.
     """
-    workers = threads or os.cpu_count() or 1
+    workers = whole("threads", threads, 1) if threads is not None else os.cpu_count() or 1
     waiting: dict[Future[Chunk], Span] = {}
     following, stop = iter(spans), np.zeros(1, dtype=np.int64)
     with ThreadPoolExecutor(workers) as pool:

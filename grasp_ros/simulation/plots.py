@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Protocol
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from grasp_ros.physics.energy import PLANT_ALONE, Energy, pairs_of
 from grasp_ros.physics.errors import Refused
@@ -21,6 +16,8 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, Mode, impact_force
 from grasp_ros.scene import PAPER, Scene
 from grasp_ros.scene.files import replacing
+from grasp_ros.simulation import canvas
+from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.quantities import contact_intervals
 from grasp_ros.simulation.trajectory import Trajectory
 
@@ -65,7 +62,7 @@ class Motion(Protocol):
         """V, V_c, V' and the contact mode."""
 
 
-def draw(motion: Motion, path: Path, caption: str) -> None:
+def draw(motion: Motion, path: str | os.PathLike[str], caption: str) -> None:
     """Draw a motion into an image file.
 
     Parameters
@@ -85,7 +82,7 @@ def draw(motion: Motion, path: Path, caption: str) -> None:
 
 
 def draw_several(
-    motions: Sequence[Motion], captions: Sequence[str], path: Path, *, width_mm: float | None = None,
+    motions: Sequence[Motion], captions: Sequence[str], path: str | os.PathLike[str], *, width_mm: float | None = None,
     span: tuple[float, float] | None = None,
 ) -> None:
     """Draw motions side by side into an image file, with common axes; see `compose`.
@@ -127,9 +124,8 @@ def compose(
         raise Refused(f"--width {width_mm!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
     height = 0.6 * WIDTH_MM if small else 0.9 * WIDTH_MM
-    with plt.rc_context({"font.size": SMALL_LETTERS if small else LETTERS}):
-        figure: Figure
-        figure, panels = plt.subplots(
+    with canvas.style({"font.size": SMALL_LETTERS if small else LETTERS}):
+        figure, panels = canvas.subplots(
             len(PANELS), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=(3, 2, 2, 3),
             figsize=(width / MM, height / MM), layout="constrained",
         )
@@ -233,26 +229,25 @@ def shade_contacts(axes: Axes, motion: Motion) -> None:
         )
 
 
-def save(figure: Figure, path: Path, dpi: int = 150) -> None:
-    """Write a figure into a file, and close it.
+def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> None:
+    """Write a figure into a file.
 
     Raises
     ------
     Refused
         If the path has no ending, matplotlib does not know the format, or the file cannot be written.
     """
+    path = Path(path)
     known, ending = figure.canvas.get_supported_filetypes(), path.suffix.removeprefix(".").lower()
     try:
         if not ending:
             raise Refused(f"{path}: no ending; allowed: one of {', '.join(sorted(known))}")
         if ending not in known:
             raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
-        with replacing(path) as file:
+        with replacing(path) as file, canvas.style():
             figure.savefig(file, format=ending, dpi=dpi)
     except RuntimeError as error:  # a .pgf where there is no TeX
         raise Refused(f"{path}: {error}") from None
-    finally:
-        plt.close(figure)
 
 
 def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:

@@ -17,6 +17,7 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
@@ -53,8 +54,8 @@ def simulate(
     ----------
     scene : Scene
     grid : array (n,), s, optional
-        Ascending output times within the horizon. Default: 2001 equidistant ones, or every control period if the
-        feedback is sampled.
+        Ascending output times within the horizon: numbers, one number, or lengths of time of numpy or pandas. Default:
+        2001 equidistant ones, or every control period if the feedback is sampled.
     sampled : bool
         False: feedback acts continuously, as in the paper, unless the scene itself has a `loop`. True: as in the
         graph, each command is computed from the state at the beginning of a control period and held over it.
@@ -88,14 +89,15 @@ def simulate(
         cannot do what is asked, see `methods.registry.check`, or a controller cannot be called or answers what is no
         finite number. What a controller raises passes through, with a note of the tick.
     """
-    sampled = sampled or scene.sampled or bool(controllers)
+    sampled = bool(sampled or scene.sampled or controllers)
+    max_events, max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
     check_changes(scene, sampled, changes, controllers)
     if setting is None and registry.find(method).knob == ACCURACY_KNOB:
         setting = accuracy
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
-    grid = np.array(grid, dtype=float)  # kernels are compiled anew for arrays that nobody may write to
+    grid = times("grid", grid)  # new: kernels are compiled anew for arrays that nobody may write to
     _check_grid(scene, grid)
     _check_ticks(scene, sampled, max_work)
     foreign = foreign_controllers(scene, controllers)

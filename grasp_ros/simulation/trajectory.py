@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,7 @@ from grasp_ros.methods.registry import EXACT, METHODS, find
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array
@@ -48,7 +50,7 @@ class Loop(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Trajectory:
+class Trajectory(Frozen):
     """A simulated or recorded motion.
 
     Attributes
@@ -163,7 +165,7 @@ class Trajectory:
         chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
         return chosen
 
-    def save(self, path: Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write everything to a .npz file.
 
         Raises
@@ -181,7 +183,7 @@ class Trajectory:
                 release_left=self.times(Transition.RELEASE, LEFT), release_right=self.times(Transition.RELEASE, RIGHT),
                 events=self.event_table, work=self.work,
                 work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
-                method=self.method, setting=self.setting, sampled=self.sampled, stop=self.stop,
+                method=self.method, setting=float(self.setting), sampled=self.sampled, stop=self.stop,
                 scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
                 controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
                 at_rest=np.inf if self.at_rest is None else self.at_rest,
@@ -203,7 +205,7 @@ FIELDS = {
 }
 
 
-def load(path: Path) -> Trajectory:
+def load(path: str | os.PathLike[str]) -> Trajectory:
     """Read what `Trajectory.save` wrote.
 
     Raises
@@ -211,6 +213,7 @@ def load(path: Path) -> Trajectory:
     Refused
         If the file is not such a file.
     """
+    path = Path(path)
     with decoding(path, "a file of `grasp simulate`"):
         data = read_npz(path, FIELDS)
         words = {name: str(data[name]) for name in _WORDS}

@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from grasp_ros.physics import given
 from grasp_ros.physics.domain import Systems, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, V, X
@@ -86,12 +87,12 @@ class Variants:
 
     def __init__(self, scene: Scene, changes: Mapping[str, ArrayLike]) -> None:
         self.scene = scene
-        self.changes = {name: np.asarray(column, dtype=float) for name, column in changes.items()}
+        self.changes = {str(name): given.column(f"changes: {name}", values) for name, values in changes.items()}
         self._parameters = {name: parameter_of(scene, name) for name in self.changes}
-        lengths = {name: column.shape for name, column in self.changes.items()}
-        if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
-            raise Refused(f"changes: shapes {lengths} are not allowed; allowed: arrays (n,) of one length")
-        self.rows = next(iter(lengths.values()))[0] if lengths else 1
+        lengths = {name: len(values) for name, values in self.changes.items()}
+        if len(set(lengths.values())) > 1:
+            raise Refused(f"changes: lengths {lengths} are not allowed; allowed: arrays (n,) of one length")
+        self.rows = next(iter(lengths.values()), 1)
 
     def part(self, first: int, last: int) -> Variants:
         """Rows from the first to before the last one."""

@@ -9,26 +9,26 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import simulate
+from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.losses import losses
-from lab.paper.cases import STANDARD, Cases, Start, started, with_values
-from lab.paper.measures import measure
-from lab.paper.motion import alone_settling, contacts_found, first_contact_error, run_of
+from lab.paper.cases import STANDARD, Cases, Start, columns_of, started, with_values
+from lab.paper.measures import over
+from lab.paper.motion import contacts_found, first_contact_error, without_object
+from lab.paper.scatter import Median, median
 
-STIFFNESSES = (5.0, 10.0, 20.0, 40.0, 70.0, 100.0, 200.0, 400.0)  # N/m
+STIFFNESSES = (5.0, 10.0, 20.0, 40.0, 100.0, 200.0, 400.0, 700.0, 1000.0, 1500.0)  # N/m
 DAMPINGS = (0.0, 0.05, 0.1, 0.2, 0.35, 0.7, 1.2, 2.0, 3.5, 5.0)  # C = c + Kv, N s/m
-FEW = 15  # random starts of each damping
-MANY = 30  # of each stiffness, whose effect is smaller
+MANY = 30  # random starts whose touches are looked at one by one
 STEPS = (1e-3, 1e-2)  # s, plausible for 1990
 
 
 class Stiffer(NamedTuple):
-    """One stiffness: medians over some random starts."""
+    """One stiffness: medians over random starts."""
 
     k: float  # N/m
-    settling: float  # s
-    alone: float  # s, arms without an object
-    rate: float  # touches per s, up to the settling time or 20 s
+    settling: Median  # s
+    alone: Median  # s, arms without an object
+    rate: float  # touches per s, up to the settling time or 20 s; of the first MANY starts, as what follows
     speed: float  # m/s, root mean square speed of approach at a touch
     share: float  # of the energy lost within 20 s: by impacts
     starts: int
@@ -38,43 +38,55 @@ def stiffer(cases: Cases, starts: Sequence[Start]) -> list[Stiffer]:
     """Settling time and what makes it, over the stiffness of the arms."""
     found = []
     for k in STIFFNESSES:
-        scenes = [started(with_values(cases[STANDARD], {"k": k}), start) for start in starts[:MANY]]
-        rows = [_row(scene) for scene in scenes]
-        settling, alone, rate, speed, share = np.median(rows, axis=0).tolist()
-        found.append(Stiffer(k, settling, alone, rate, speed, share, len(rows)))
+        scene = with_values(cases[STANDARD], {"k": k})
+        times = over(scene, starts, "settling")
+        few = zip(starts[:MANY], times, strict=False)
+        rate, speed, share = np.median([_causes(started(scene, start), time) for start, time in few], axis=0).tolist()
+        found.append(Stiffer(k, median(times), median(_alone(scene, starts)), rate, speed, share, len(starts)))
     return found
 
 
-def _row(scene: Scene) -> tuple[float, float, float, float, float]:
-    run = run_of(scene)
-    settling = measure(scene).settling
-    touches = run.event_table[(run.event_table[:, 2] == 0) & (run.event_table[:, 0] <= min(settling, scene.duration))]
+def _alone(scene: Scene, starts: Sequence[Start]) -> list[float]:
+    """Settling times without an object."""
+    places = [start._replace(x_o=0.0) for start in starts]
+    changes = {key: values for key, values in columns_of(places).items() if not key.startswith("object")}
+    found = ensemble(without_object(scene), changes, ("settling_time",), threads=1)
+    return [float(time) for time in found.columns["settling_time"]]
+
+
+def _causes(scene: Scene, settling: float) -> tuple[float, float, float]:
+    """Touches per s, speed of approach, and the part of the lost energy that impacts took."""
+    run = simulate(scene, grid=np.zeros(0))
     span = min(settling, scene.duration)
+    touches = run.event_table[(run.event_table[:, 2] == 0) & (run.event_table[:, 0] <= span)]
     lost = losses(run)
     speed = float(np.sqrt(np.mean(touches[:, 4] ** 2))) if len(touches) else 0.0
-    return settling, alone_settling(scene), len(touches) / span, speed, float(lost.impacts / lost.total)
+    return len(touches) / span, speed, float(lost.impacts / lost.total)
 
 
 class Damped(NamedTuple):
-    """One damping of the arms: medians over some random starts."""
+    """One damping of the arms: medians over random starts."""
 
     C: float  # c + Kv, N s/m
-    together: float  # settling time with the object, s
-    alone: float  # without, s
+    together: Median  # settling time with the object, s
+    alone: Median  # without, s
     later: float  # share of the starts in which the object makes it later
     starts: int
+
+    @property
+    def error(self) -> float:
+        """Standard error of that share."""
+        return float((self.later * (1.0 - self.later) / self.starts) ** 0.5)
 
 
 def damped(cases: Cases, starts: Sequence[Start]) -> list[Damped]:
     """Settling time with and without the object, over the damping of the arms."""
     found = []
     for C in DAMPINGS:
-        numbers = {"c": min(C, 0.2), "Kv": C - min(C, 0.2)}
-        scenes = [started(with_values(cases[STANDARD], numbers), start) for start in starts[:FEW]]
-        together = np.array([measure(scene).settling for scene in scenes])
-        alone = np.array([alone_settling(scene) if C > 0.0 else np.inf for scene in scenes])
-        medians = float(np.median(together)), float(np.median(alone))
-        found.append(Damped(C, *medians, float(np.mean(together > alone)), len(scenes)))
+        scene = with_values(cases[STANDARD], {"c": min(C, 0.2), "Kv": C - min(C, 0.2)})
+        together, alone = over(scene, starts, "settling"), _alone(scene, starts)
+        later = float(np.mean(np.greater(together, alone)))
+        found.append(Damped(C, median(together), median(alone), later, len(starts)))
     return found
 
 

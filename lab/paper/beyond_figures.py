@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
@@ -17,21 +13,21 @@ from matplotlib.ticker import LogLocator
 from grasp_ros.physics.layout import Law
 from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import simulate
+from grasp_ros.simulation import canvas, simulate
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, V_COLOR, shade_contacts
 from lab.paper.arms import STEPS, Damped, Stiffer
 from lab.paper.beyond import Chaos, Gap, Tail
 from lab.paper.figures import PAGE, style
 from lab.paper.knife_edge import MOVED, SMALLEST, Edge
+from lab.paper.scatter import Median
 
 WIDE = (PAGE, 3.0)
 
 
 def gap(found: Gap) -> Drawing:
     """V and V_c of two scenes, and u' in units of -1/p."""
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, panels = plt.subplots(
+    with canvas.style(style()):
+        figure, panels = canvas.subplots(
             2, len(found.runs), sharex="col", sharey="row", figsize=(PAGE, 3.9), layout="constrained"
         )
         for run, (top, bottom) in zip(found.runs, panels.T, strict=True):
@@ -60,9 +56,8 @@ def gap(found: Gap) -> Drawing:
 
 def tail(found: Tail) -> Drawing:
     """V_c beside its law, and the number of contacts."""
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, (left, right) = plt.subplots(1, 2, figsize=WIDE, layout="constrained")
+    with canvas.style(style()):
+        figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, layout="constrained")
         left.loglog(found.t, found.V_c, color="black", label="$V_c$ of No. 1")
         later = found.law < found.V_c[0]
         left.loglog(
@@ -87,9 +82,8 @@ def tail(found: Tail) -> Drawing:
 
 def chaos(found: Chaos) -> Drawing:
     """Growth of a perturbation, and the logarithm of the stretching behind the exponent."""
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, (left, right) = plt.subplots(1, 2, figsize=WIDE, layout="constrained")
+    with canvas.style(style()):
+        figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, layout="constrained")
         t, distance = found.apart
         left.semilogy(t, distance, color="black", linewidth=0.8)
         left.set_xlabel("time, s")
@@ -108,12 +102,11 @@ def chaos(found: Chaos) -> Drawing:
 
 def stiffer(rows: Sequence[Stiffer]) -> Drawing:
     """Settling time over the stiffness, and what makes it."""
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, panels = plt.subplots(2, 2, sharex=True, figsize=(PAGE, 4.2), layout="constrained")
+    with canvas.style(style()):
+        figure, panels = canvas.subplots(2, 2, sharex=True, figsize=(PAGE, 4.2), layout="constrained")
         k = [row.k for row in rows]
-        panels[0, 0].plot(k, [row.settling for row in rows], "o-", color="black", label="with the object")
-        panels[0, 0].plot(k, [row.alone for row in rows], "s--", color=LEFT_COLOR, label="arms alone")
+        _bars(panels[0, 0], k, [row.settling for row in rows], "o-", "black", "with the object")
+        _bars(panels[0, 0], k, [row.alone for row in rows], "s--", LEFT_COLOR, "arms alone")
         panels[0, 0].legend(frameon=False, loc="upper left")
         for axes, values, label in (
             (panels[0, 0], None, "settling time, s"),
@@ -134,16 +127,19 @@ def stiffer(rows: Sequence[Stiffer]) -> Drawing:
 
 def damped(rows: Sequence[Damped]) -> Drawing:
     """Settling times with and without the object, over the damping of the arms."""
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, axes = plt.subplots(figsize=(0.75 * PAGE, 3.0), layout="constrained")
-        C = [row.C for row in rows if row.C > 0.0]
-        axes.loglog(C, [row.together for row in rows if row.C > 0.0], "o-", color="black", label="with the object")
-        axes.loglog(C, [row.alone for row in rows if row.C > 0.0], "s--", color=LEFT_COLOR, label="arms alone")
+    with canvas.style(style()):
+        figure, axes = canvas.subplots(figsize=(0.75 * PAGE, 3.0), layout="constrained")
+        lossy = [row for row in rows if row.C > 0.0]
+        C = [row.C for row in lossy]
+        _bars(axes, C, [row.together for row in lossy], "o-", "black", "with the object")
+        _bars(axes, C, [row.alone for row in lossy], "s--", LEFT_COLOR, "arms alone")
+        axes.set_xscale("log")
+        axes.set_yscale("log")
         for row in rows:
-            if row.C == 0.0 and np.isfinite(row.together):
+            if row.C == 0.0 and np.isfinite(row.together.middle):
                 axes.axhline(
-                    row.together, color=OBJECT_COLOR, linewidth=0.8, linestyle=":", label="with the object, C = 0"
+                    row.together.middle, color=OBJECT_COLOR, linewidth=0.8, linestyle=":",
+                    label="with the object, C = 0",
                 )
         axes.set_xlabel("damping C = c + Kv of both arms, N s/m")
         axes.set_ylabel("settling time, s")
@@ -154,9 +150,8 @@ def damped(rows: Sequence[Damped]) -> Drawing:
 
 def stepped(cases: Mapping[int, Scene], numbers: Sequence[int] = (1, 2)) -> Drawing:
     """The paper's own method at plausible steps beside the exact motion: the object, and V_c."""
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, panels = plt.subplots(2, len(numbers), sharex=True, figsize=(PAGE, 4.0), layout="constrained")
+    with canvas.style(style()):
+        figure, panels = canvas.subplots(2, len(numbers), sharex=True, figsize=(PAGE, 4.0), layout="constrained")
         for number, (top, bottom) in zip(numbers, panels.T, strict=True):
             scene = cases[number]
             runs = [("exact", "black", "-", 2.2, simulate(scene))]
@@ -184,9 +179,8 @@ def stepped(cases: Mapping[int, Scene], numbers: Sequence[int] = (1, 2)) -> Draw
 def edge(rows: Sequence[Edge]) -> Drawing:
     """How an offset grows beside symmetric starts, and the settling times from there."""
     colors = ("black", RIGHT_COLOR, LEFT_COLOR, "#009e73", V_COLOR)
-    with plt.rc_context(style()):
-        figure: Drawing
-        figure, (left, right) = plt.subplots(1, 2, figsize=WIDE, width_ratios=(1.5, 1.0), layout="constrained")
+    with canvas.style(style()):
+        figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, width_ratios=(1.5, 1.0), layout="constrained")
         for row, color, mark in zip(rows, colors, "osD^v", strict=True):
             left.semilogy(row.t, row.apart, color=color, linewidth=0.7, label=f"No. {row.case}")
             if np.isfinite(row.settling).all():
@@ -204,6 +198,14 @@ def edge(rows: Sequence[Edge]) -> Drawing:
         return figure
 
 
+def _bars(axes: Axes, x: Sequence[float], medians: Sequence[Median], mark: str, color: str, label: str) -> None:
+    """Medians with their intervals; an infinite bound leaves the picture."""
+    middle = np.array([found.middle for found in medians])
+    ends = [[found.middle - found.low, found.high - found.middle] for found in medians]
+    axes.errorbar(x, middle, np.nan_to_num(np.transpose(ends), posinf=1e9), fmt=mark, color=color, label=label,
+                  markersize=2.5, capsize=2.0, elinewidth=0.8)
+
+
 class Curve(NamedTuple):
     """One sweep: the ratio of a measure to that of the standard case."""
 
@@ -212,15 +214,14 @@ class Curve(NamedTuple):
     measure: str
     printed: float  # value of the paper's case
     higher: bool
-    points: Sequence[tuple[float, float]]
+    points: Sequence[tuple[float, Median]]
 
 
 def sweeps(curves: Sequence[Curve]) -> Drawing:
     """Ratios over parameters, with the side on which the statement says that they are."""
-    with plt.rc_context(style()):
+    with canvas.style(style()):
         rows = -(-len(curves) // 3)
-        figure: Drawing
-        figure, panels = plt.subplots(rows, 3, figsize=(PAGE, 1.75 * rows), layout="constrained")
+        figure, panels = canvas.subplots(rows, 3, figsize=(PAGE, 1.75 * rows), layout="constrained")
         for axes, each in zip(panels.ravel(), curves, strict=False):
             _sweep(axes, each)
         for axes in panels.ravel()[len(curves) :]:
@@ -229,13 +230,15 @@ def sweeps(curves: Sequence[Curve]) -> Drawing:
 
 
 def _sweep(axes: Axes, each: Curve) -> None:
-    x, y = zip(*each.points, strict=True)
+    x, found = zip(*each.points, strict=True)
+    y = [point.middle for point in found]
     axes.axhspan(1.0, 1e9, color="#009e73" if each.higher else RIGHT_COLOR, alpha=0.10, linewidth=0)
     axes.axhspan(1e-9, 1.0, color=RIGHT_COLOR if each.higher else "#009e73", alpha=0.10, linewidth=0)
     axes.axhline(1.0, color="black", linewidth=0.7)
     axes.axvline(each.printed, color="black", linewidth=0.7, linestyle=":")
     finite = np.clip(y, 1e-3, 1e3)
-    axes.loglog(x, finite, "o-", color="black", markersize=2.5)
+    axes.loglog(x, finite, "-", color="black", linewidth=0.6)
+    _bars(axes, x, [Median(*np.clip(point, 1e-3, 1e3)) for point in found], "o", "black", "")
     axes.set_ylim(min(0.8 * finite.min(), 0.5), max(1.25 * finite.max(), 2.0))
     axes.set_title(each.title, fontsize="small", loc="left")
     axes.set_xlabel(each.label)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -39,7 +39,8 @@ READ_STARTS: Mapping[str, Start] = {  # beside the printed one
     "x_l(0) = +0.3 as printed, inside the object": LITERAL,
 }
 READ_P = (0.2, 0.5, 2.0, 5.0)  # s/m, of No. 4, for which the paper says "larger"
-OFFSETS = (0.0, 1e-12, -1e-9, 1e-6)  # m, added to x_l(0): far below what anybody could read from the paper
+OFFSETS = tuple(sign * size for size in np.geomspace(1e-12, 1e-6, 32).tolist() for sign in (1.0, -1.0))  # m, added to
+# x_l(0): far below what anybody could read from the paper
 SEED = 1990
 NEAREST, FARTHEST = 0.1, 0.5  # m, of random starts
 SIDES = ("left", "right")
@@ -134,6 +135,12 @@ def start_of(scene: Scene) -> Start:
 def moved(scene: Scene, offset: float) -> Scene:
     """A scene whose left arm begins a little farther to the right, by an offset in m."""
     return scene.changed({"left_arm.position_m": start_of(scene).x_l + offset}) if offset else scene
+
+
+def columns_of(starts: Sequence[Start]) -> dict[str, list[float]]:
+    """Starts as rows of an ensemble."""
+    keys = ("left_arm.position_m", "right_arm.position_m", "object.position_m")
+    return {key: [start[place] for start in starts] for place, key in enumerate(keys)}
 
 
 def text_of(scene: Scene) -> str:

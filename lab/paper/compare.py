@@ -10,11 +10,9 @@ import numpy as np
 from grasp_ros.scene import Scene
 from lab.paper.cases import (
     ALIKE,
-    OFFSETS,
     STANDARD,
     Cases,
     Start,
-    moved,
     read_starts,
     start_of,
     started,
@@ -22,10 +20,9 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.claims import HALF, Check, Kind, Part, almost_all
-from lab.paper.measures import MARGIN, NAMES, UNITS, measure, ratio, seconds
+from lab.paper.measures import MARGIN, NAMES, UNITS, measure, over, ratio, seconds, settlings
+from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
-
-SWEPT = 15  # random starts of each value of a sweep; their median counts
 
 
 class Variant(NamedTuple):
@@ -104,19 +101,16 @@ class Comparison(NamedTuple):
         for pair in self.decisive:
             a, b = (each.scene(cases) for each in pair)
             for scene in (a, b):
-                yield from self._moved(scene)
-                for start in (*ALIKE, *read_starts(a, b).values()):
-                    yield from self._moved(started(scene, start))
+                if self.measure != "settling":
+                    yield scene
+                    yield from (started(scene, start) for start in (*ALIKE, *read_starts(a, b).values()))
                 yield from (started(scene, start) for start in starts)
         for scene in (each.scene(cases) for each in self.beside):
             yield from (started(scene, start) for start in starts)
-        swept = self.other.scene(cases)
-        for start in starts[:SWEPT]:
-            yield from (started(with_values(swept, {self.letter: value}), start) for value in self.values)
 
-    def _moved(self, scene: Scene) -> list[Scene]:
-        """A scene, and where times are compared the same from starts that differ beyond what can be read."""
-        return [moved(scene, offset) for offset in (OFFSETS if self.measure.startswith("settling") else OFFSETS[:1])]
+    def _several(self, scene: Scene) -> list[float]:
+        """The measure of a scene; of times that from starts that differ beyond what can be read."""
+        return settlings(scene) if self.measure == "settling" else [self._value(scene, self.measure)]
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Measure and check."""
@@ -135,12 +129,11 @@ class Comparison(NamedTuple):
         return Part(self.statement, self.threshold, self.why, checks, self.reading)
 
     def _check(self, kind: Kind, text: str, changed: Scene, other: Scene) -> Check:
-        pairs = [
-            (self._value(a, self.measure), self._value(b, self.measure))
-            for a, b in zip(self._moved(changed), self._moved(other), strict=True)
-        ]
+        pairs = list(zip(self._several(changed), self._several(other), strict=True))
         found = [ratio(a, b) for a, b in pairs]
         share = sum(map(self.true_of, found)) / len(found)
+        if np.isnan(found).all():  # equal arms from a symmetric start, say: true, or not, whatever the other scene is
+            return Check(Kind.TRIVIAL, text, f"{pairs[0][0]:.4g} against 0: no ratio", 0.0, False)
         unit = UNITS[self.measure]
         a, b = (
             seconds(several) if self.measure.startswith("settling") else f"{several[0]:.4g}{unit}"
@@ -203,35 +196,38 @@ class Comparison(NamedTuple):
         return Check(Kind.WORD, text, f"{_percent(share)} of {len(found)}", share, almost_all(share))
 
     def _sweep(self, cases: Cases, starts: Sequence[Start]) -> list[Check]:
-        """The parameter alone, changed from the other case, at several values: the median over some random starts."""
+        """The parameter alone, changed from the other case, at several values: the median over the random starts.
+
+        A value counts where the whole interval of its median lies on one side.
+        """
         if not self.values:
             return []
         curve = self.curve(cases, starts)
-        share = sum(self.true_of(middle) for _, middle in curve) / len(curve)
+        share = sum(self.true_of(found.low) and self.true_of(found.high) for _, found in curve) / len(curve)
         standard = value_of(self.other.scene(cases), self.letter)
-        text = f"{self.letter} beside {standard:g}, median ratio of {len(starts[:SWEPT])} random starts"
-        opposite = [value for value, middle in curve if self.true_of(1.0 / middle if middle else np.inf)]
-        pairs = ", ".join(f"{value:g}: {middle:.3g}" for value, middle in curve)
-        lowest = min(curve, key=lambda point: point[1])
-        if lowest not in (curve[0], curve[-1]):
-            pairs += f"; lowest at {lowest[0]:g}"
+        text = f"{self.letter} beside {standard:g}, median ratio of {len(starts)} random starts (95 % interval)"
+        opposite = [value for value, found in curve if self._against(found.low) and self._against(found.high)]
+        pairs = ", ".join(f"{value:g}: {found}" for value, found in curve)
+        at, lowest = min(curve, key=lambda point: point[1].middle)
+        if lowest.high < min(curve[0][1].low, curve[-1][1].low):
+            pairs += f"; lowest at {at:g}"
         if opposite:
             pairs += f"; the other way round at {', '.join(f'{value:g}' for value in opposite)}"
         return [Check(Kind.SWEEP, text, pairs, share, share > HALF and not opposite)]
 
-    def curve(self, cases: Cases, starts: Sequence[Start]) -> list[tuple[float, float]]:
+    def _against(self, found: float) -> bool:
+        """Whether a ratio is the other way round."""
+        return found < 1.0 / MARGIN if self.higher else found > MARGIN
+
+    def curve(self, cases: Cases, starts: Sequence[Start]) -> list[tuple[float, Median]]:
         """Value of the parameter and median ratio, over the sweep."""
-        other, few = self.other.scene(cases), starts[:SWEPT]
-        before = [self._value(started(other, start), self.measure) for start in few]
-        found = []
-        for value in self.values:
-            scene = with_values(other, {self.letter: value})
-            ratios = [
-                ratio(self._value(started(scene, start), self.measure), reference)
-                for start, reference in zip(few, before, strict=True)
-            ]
-            found.append((value, float(np.quantile(ratios, 0.5, method="nearest"))))
-        return found
+        other = self.other.scene(cases)
+        before = over(other, starts, self.measure)
+        return [
+            (value, median([ratio(a, b) for a, b in zip(
+                over(with_values(other, {self.letter: value}), starts, self.measure), before, strict=True)]))
+            for value in self.values
+        ]
 
 
 def _range(found: Sequence[float]) -> str:

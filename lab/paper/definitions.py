@@ -5,8 +5,8 @@ from __future__ import annotations
 from grasp_ros.simulation.quantities import SETTLED
 from lab.paper.cases import FARTHEST, NEAREST, OFFSETS, READ_P, SEED
 from lab.paper.claims import ALMOST_ALL, HALF
-from lab.paper.compare import SWEPT
-from lab.paper.measures import BOUNDS, LATER, LIMIT, MARGIN, SAMPLE, STRETCH
+from lab.paper.measures import BOUNDS, LIMIT, MARGIN
+from lab.paper.scatter import CONFIDENCE
 from lab.paper.universal import FEW, FEWER
 
 TITLE = "The paper, reproduced and judged"
@@ -30,8 +30,7 @@ def definitions(starts: int) -> list[tuple[str, str]]:
             "settled",
             (
                 f"no mass leaves {SETTLED:.0%} of the larger initial displacement any more. The settling time is the"
-                f" last time at which one does, from the dense output every {1e3 * SAMPLE:g} ms, after"
-                f" {STRETCH:g} s every {1e3 * LATER:g} ms. A run goes on until"
+                f" last time at which one does, from closed forms and polynomials. A run goes on until"
                 f" V_c, which never rises, proves that nothing leaves any more, at most {LIMIT:g} s; later counts as"
                 f" never. {bounds} are looked at, too."
             ),
@@ -40,18 +39,20 @@ def definitions(starts: int) -> list[tuple[str, str]]:
             "random starts",
             (
                 f"at rest, x_l in [-{FARTHEST:g}, -{NEAREST:g}], x_o = 0, x_r in [{NEAREST:g}, {FARTHEST:g}] m,"
-                f" uniform, {starts} of them from seed {SEED}; the same for both cases of a comparison. Sweeps use the"
-                f" first {min(SWEPT, starts)}; statements about every motion the first {min(FEW, starts)} for each"
-                f" case, and the first {min(FEWER, starts)} for each value of a sweep."
+                f" uniform, {starts} of them from seed {SEED}; the same for both cases of a comparison, and all of"
+                f" them for each value of its sweep. Statements about every motion use the first {min(FEW, starts)} for"
+                f" each case, and the first {min(FEWER, starts)} for each value of a sweep. Behind a median stands the"
+                f" interval that holds the median of all such starts with {CONFIDENCE:.0%} (order statistics), and a"
+                " sweep says something of a value only where the whole interval lies on one side."
             ),
         ),
         (
             "digits of a settling time",
             (
-                "every settling time of one start is computed four times, with x_l(0) moved by"
-                f" {', '.join(f'{offset:g}' for offset in OFFSETS)} m. Where the four differ by more than half a"
-                " percent their range stands in place of a number: collisions magnify differences, and no measurement"
-                " and no other arithmetic can show more digits. A comparison holds from a start if it does in all four."
+                f"every settling time of one start is computed {len(OFFSETS)} times, with x_l(0) moved to both sides"
+                f" by {min(map(abs, OFFSETS)):g} to {max(OFFSETS):g} m. Where these differ by more than half a percent"
+                " their range stands in place of a number: collisions magnify differences, and no measurement and no"
+                " other arithmetic can show more digits. A comparison holds from a start if it does in all of them."
             ),
         ),
         (
@@ -105,8 +106,8 @@ def definitions(starts: int) -> list[tuple[str, str]]:
         (
             "V, V_c",
             (
-                "V is the paper's function (16), twice the energy; V_c keeps its Hertz term whenever u > 0. Energies"
-                " are in J of V."
+                "V is the paper's function (16), twice the energy; V_c keeps its Hertz term whenever u > 0, and is"
+                " twice the energy, too. Losses are energies."
             ),
         ),
     ]

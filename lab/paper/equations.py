@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from grasp_ros import scene as scenes
 from grasp_ros.physics import lyapunov
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, X
 from grasp_ros.physics.model import acceleration, impact_force, in_contact, penetration
@@ -17,7 +18,9 @@ from grasp_ros.scene import SceneError
 from lab.paper import by_hand
 from lab.paper.cases import Cases, with_values
 from lab.paper.conditions import condition_rows
-from lab.paper.sample import Equation, Sample, relative
+from lab.paper.sample import ALGEBRA, Equation, Sample, relative
+
+CROSSING = ("v_jump_one_sided", "v_jump_symmetric")  # scenes that cross the second surface of (10) with u > 0
 
 
 def motion_equations(samples: list[Sample]) -> list[Equation]:
@@ -69,6 +72,7 @@ def force_equations(samples: list[Sample]) -> list[Equation]:
                 "command against -Kp x - Kv x', N",
                 float(inputs[side]),
                 1e-14,
+                by=ALGEBRA,
             )
             for side, name in enumerate(("left", "right"))
         ),
@@ -117,6 +121,7 @@ def condition_equations(samples: list[Sample]) -> list[Equation]:
             "negative H, p that a scene accepts, of 2",
             2.0 - refused,
             0.0,
+            by=ALGEBRA,
         ),
         Equation(
             "(10)",
@@ -153,10 +158,11 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
     return [
         Equation(
             "(11)", "V = x' P(x) x", "physics.lyapunov.quadratic_form",
-            "x' P x, with P by hand and without, against V, relative", form, 1e-13,
+            "x' P x, with P by hand and without, against V, relative", form, 1e-13, by=ALGEBRA,
         ),
         Equation(
-            "(12)", "P(x)", "physics.lyapunov.matrix", "its 36 entries against (12) by hand, relative", entries, 1e-15
+            "(12)", "P(x)", "physics.lyapunov.matrix", "its 36 entries against (12) by hand, relative", entries, 1e-15,
+            by=ALGEBRA,
         ),
         Equation(
             "(13)",
@@ -174,6 +180,7 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
                 "Delta k u^2 against the elastic part of V, relative",
                 float(stiffness[side]),
                 1e-12,
+                by=ALGEBRA,
             )
             for side, name in enumerate(("left", "right"))
         ),
@@ -181,8 +188,12 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
 
 
 def equations(cases: Cases) -> list[Equation]:
-    """All rows, from the eleven cases."""
-    samples = [Sample(scene) for scene in cases.values()]
+    """All rows, from the eleven cases, and from scenes in which a pair separates faster than 1/p, as no case does."""
+    return rows_of([Sample(scene) for scene in (*cases.values(), *map(scenes.load, CROSSING))])
+
+
+def rows_of(samples: list[Sample]) -> list[Equation]:
+    """All rows, from some motions."""
     blocks: tuple[Callable[[list[Sample]], list[Equation]], ...] = (
         motion_equations,
         force_equations,

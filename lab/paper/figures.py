@@ -6,17 +6,13 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import Trajectory, plots, simulate
+from grasp_ros.simulation import Trajectory, canvas, plots, simulate
 from grasp_ros.simulation.losses import losses, running_losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
 from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of
@@ -63,8 +59,8 @@ def style() -> dict[str, object]:
 
 def sheet(several: Sequence[Pictured]) -> Drawing:
     """All eleven in the layout of the paper: displacements above, inputs below."""
-    with plt.rc_context(style()):
-        figure: Drawing = plt.figure(figsize=(PAGE, 8.9), layout="constrained")
+    with canvas.style(style()):
+        figure: Drawing = canvas.figure(figsize=(PAGE, 8.9), layout="constrained")
         cells: Any = figure.subfigures(4, 3, wspace=0.02, hspace=0.02)
         cells = cells.ravel()
         for cell, each in zip(cells, several, strict=False):
@@ -100,8 +96,8 @@ def _key(axes: Axes) -> None:
 
 def large(each: Pictured) -> Drawing:
     """One case: the paper's two panels, and below them what it does not draw; one contact and the losses beside."""
-    with plt.rc_context(style()):
-        figure: Drawing = plt.figure(figsize=(PAGE, 6.9), layout="constrained")
+    with canvas.style(style()):
+        figure: Drawing = canvas.figure(figsize=(PAGE, 6.9), layout="constrained")
         halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
         wide, narrow = halves
         left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
@@ -211,8 +207,3 @@ def _bars(axes: Axes, run: Trajectory) -> None:
     axes.bar_label(bars, fmt="%.1f", padding=2, fontsize="small")
     axes.set_xlim(0.0, 135.0)
     axes.set_xticks([0, 50, 100])
-
-
-def close(drawing: Drawing) -> None:
-    """Forget a figure."""
-    plt.close(drawing)

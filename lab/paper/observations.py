@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
+from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene
 from lab.paper import gains, motion, properties
 from lab.paper.cases import PRINTED, READ_STARTS, Cases, Start, started, with_values
+from lab.paper.claims import Check, Kind, Part
 from lab.paper.compare import Comparison, Variant
 from lab.paper.properties import SETTLING
 from lab.paper.statement import Judged, Statement
@@ -110,7 +113,32 @@ def _two() -> tuple[Comparison, ...]:
     )
 
 
-def _three() -> tuple[Universal, ...]:
+class Gripped(NamedTuple):
+    """That a grasp is possible: whether the arms press the object in the paper's cases, and with another set-point."""
+
+    values: tuple[float, ...] = ()  # nothing is swept
+
+    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
+        """None that can be measured ahead."""
+        return iter(())
+
+    def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
+        """In the cases that settle, as T9, and where the set-points overlap."""
+        own = [motion.holds_on(cases[number]) for number in DAMPED]
+        share = sum(found.holds for found in own) / len(own)
+        held = motion.holds_on(scenes.load("preload"))
+        return Part(
+            "Both arms press the object in the end.",
+            f"both impact forces above 0 N through the last {motion.LAST:g} s",
+            "Both arms are regulated to the same point, so that no deformation is left to press with; set-points that"
+            " overlap leave one.",
+            (Check(Kind.PRINTED, "the cases with dampers", f"{share:.0%} of {len(own)}", share, share == 1.0),
+             Check(Kind.PRINTED, "set-points that overlap by 50 mm, scene preload", f"{held.value:.3g} N",
+                   float(held.holds), held.holds)),
+        )
+
+
+def _three() -> tuple[Judged, ...]:
     return (
         Universal(
             "V_c never rises under the feedback.",
@@ -131,6 +159,7 @@ def _three() -> tuple[Universal, ...]:
             (0.05, 0.2, 2.0, 20.0),
             extra=(("k = c = 0: the feedback alone holds the arms", _without_own_springs),),
         ),
+        Gripped(),
     )
 
 

@@ -9,9 +9,9 @@ from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.losses import losses
-from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of, settled_distance
+from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of, settled_distance, settling_times
 from lab.paper.cases import OFFSETS, Cases, moved, start_of
-from lab.paper.measures import measure, seconds
+from lab.paper.measures import seconds
 
 HEADS = (
     "start x_l, x_r, m",
@@ -71,11 +71,8 @@ def _column(scene: Scene) -> list[str]:
 
 def _times(scene: Scene) -> list[str]:
     """Settling times of the masses, as far as they have digits."""
-    found = [measure(moved(scene, offset)) for offset in OFFSETS]
-    masses = (
-        [each.settling_l for each in found], [each.settling_o for each in found], [each.settling_r for each in found]
-    )
-    return [seconds(times).removesuffix(" s") for times in masses]
+    found = [settling_times(simulate(moved(scene, offset), grid=np.zeros(0))) for offset in OFFSETS]
+    return [seconds(times.tolist()).removesuffix(" s") for times in np.transpose(found)]
 
 
 def _peaks(scene: Scene) -> list[str]:

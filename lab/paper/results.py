@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.system import NAMES
-from lab.paper.arms import STEPS, Damped, Stepped, Stiffer
+from lab.paper.arms import MANY, STEPS, Damped, Stepped, Stiffer
 from lab.paper.beyond import SMALL, WITHIN, Chaos, Gap, Tail
 from lab.paper.cases import PRINTED, SYMMETRIC, Start
 from lab.paper.knife_edge import MOVED, SMALLEST, VISIBLE, Edge
-from lab.paper.measures import MARGIN
 
 Row = tuple[str, ...]
 
@@ -182,31 +181,21 @@ def _edge(rows: Sequence[Edge]) -> Result:
 def _stiffer(rows: Sequence[Stiffer]) -> Result:
     standard = next(row for row in rows if row.k == 10.0)
     printed = next(row for row in rows if row.k == 100.0)
-    best, last = min(rows, key=lambda row: row.settling), rows[-1]
-    flat = [row.k for row in rows if row.settling < MARGIN * best.settling]
+    best, last = min(rows, key=lambda row: row.settling.middle), rows[-1]
+    flat = [row.k for row in rows if row.settling.low <= best.settling.high]
+    end = "more than that" if last.settling.low > best.settling.high else "no more than the scatter"
     text = (
-        f"Medians over the first {standard.starts} random starts. Ten times the stiffness changes the settling time"
-        f" from"
-        f" {standard.settling:.1f} to"
-        f" {printed.settling:.1f} s. The arms alone do not care ({standard.alone:.1f} and {printed.alone:.1f} s: the"
-        " envelope exp(-C t / 2m) does not know k). With the object a stiffer arm comes back sooner"
-        f" ({standard.rate:.2f} and {printed.rate:.2f} touches a second), meets it faster ({standard.speed:.2f} and"
-        f" {printed.speed:.2f} m/s) and so loses more to impacts ({standard.share:.0%} and {printed.share:.0%} of the"
-        " lost energy), since 1 - e = (2/3) p v to first order. It has an end: from k ="
-        f" {min(flat):g} to {max(flat):g} N/m the settling time is the same to 5 %, and at {last.k:g} N/m it is"
-        f" {last.settling:.1f} s, because an arm that hardly gives way takes"
-        " little from the object (kappa of the tail falls with 1/K^2). Other numbers of starts (O6) give ratios that"
-        " differ by some hundredths."
+        f"Medians over {standard.starts} random starts, with the 95 % interval of each. Ten times the stiffness changes"
+        f" the settling time from {standard.settling} to {printed.settling} s. The arms alone do not care"
+        f" ({standard.alone} and {printed.alone} s: the envelope exp(-C t / 2m) does not know k). With the object a"
+        f" stiffer arm comes back sooner ({standard.rate:.2f} and {printed.rate:.2f} touches a second), meets it faster"
+        f" ({standard.speed:.2f} and {printed.speed:.2f} m/s) and so loses more to impacts ({standard.share:.0%} and"
+        f" {printed.share:.0%} of the lost energy), since 1 - e = (2/3) p v to first order. It has an end: the medians"
+        f" from k = {min(flat):g} to {max(flat):g} N/m cannot be told from the lowest, and at {last.k:g} N/m it is"
+        f" {last.settling} s, {end}. Touches, speeds and shares are those of the first {min(MANY, last.starts)} starts."
     )
     table = [
-        (
-            f"{row.k:g}",
-            f"{row.settling:.2f}",
-            f"{row.alone:.2f}",
-            f"{row.rate:.2f}",
-            f"{row.speed:.3f}",
-            f"{row.share:.1%}",
-        )
+        (f"{row.k:g}", str(row.settling), str(row.alone), f"{row.rate:.2f}", f"{row.speed:.2f}", f"{row.share:.0%}")
         for row in rows
     ]
     return Result(
@@ -220,19 +209,21 @@ def _stiffer(rows: Sequence[Stiffer]) -> Result:
 
 def _damped(rows: Sequence[Damped]) -> Result:
     without = rows[0]
-    later = [row for row in rows if row.C > 0.0 and row.later > 0.5]
+    later = [row for row in rows if row.C > 0.0 and row.later - 2.0 * row.error > 0.5]
     text = (
-        f"Medians over the first {without.starts} random starts. Where the arms have no damper, impacts are all that"
-        f" stops them: some {float(f'{without.together:.2g}'):g} s with the object, never without. Where they have"
-        f" dampers it is the other way round: from C = {min(row.C for row in later):g} N"
-        " s/m on, in most of the random starts the arms settle later with the object between them than alone, because"
-        " the object has no damper, takes energy over and gives it back. That the term of (18) is negative compares V'"
+        f"Medians over {without.starts} random starts, with the 95 % interval of each. Where the arms have no damper,"
+        f" impacts are all that stops them: {without.together} s with the object, never without. Where they have"
+        f" dampers it is the other way round: from C = {min(row.C for row in later):g} N s/m on, in most of the random"
+        " starts (by two standard errors) the arms settle later with the object between them than alone, because the"
+        " object has no damper, takes energy over and gives it back. That the term of (18) is negative compares V'"
         " at one state, not two motions."
     )
     table = [
-        (f"{row.C:g}", f"{row.together:.3g}", f"{row.alone:.3g}", f"{row.together / row.alone:.2f}", f"{row.later:.0%}")
-        if np.isfinite(row.alone)
-        else (f"{row.C:g}", f"{float(f'{row.together:.2g}'):g}", "never", "", f"{row.later:.0%}")
+        (
+            f"{row.C:g}", str(row.together), str(row.alone) if np.isfinite(row.alone.middle) else "never",
+            f"{row.together.middle / row.alone.middle:.2f}" if np.isfinite(row.alone.middle) else "",
+            f"{row.later:.0%} +- {row.error:.0%}",
+        )
         for row in rows
     ]
     return Result(

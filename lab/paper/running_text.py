@@ -76,7 +76,8 @@ def _proof() -> list[Statement]:
                     "V' <= 0 at every instant.",
                     f"largest V' {NO_RISE}",
                     motion.rate_is_never_positive,
-                    "With a = b = 4/5 the elastic terms cancel; what is left are losses.",
+                    "With a = b = 4/5 the elastic terms cancel; what is left are losses, whose sign is algebra:"
+                    " no motion can break it.",
                     letter=ANY_P[0],
                     values=ANY_P[1],
                 ),
@@ -170,7 +171,7 @@ def _effect() -> list[Statement]:
                     "The collision terms of (18) are never negative.",
                     "smallest term >= 0 W",
                     motion.collision_term_lowers,
-                    "p H u^(3/2) u'^2 is a product of squares and positive numbers.",
+                    "p H u^(3/2) u'^2 is a product of squares and positive numbers: algebra; no motion can break it.",
                     least=True,
                     unit=" W",
                     letter=ANY_P[0],

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import Energy, energy, pairs_of
+from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
@@ -16,6 +17,9 @@ from grasp_ros.simulation import simulate
 STEP = 2e-4  # s, of the differences
 STENCIL = np.array([1.0 / 280.0, -4.0 / 105.0, 0.2, -0.8, 0.0, 0.8, -0.2, 4.0 / 105.0, -1.0 / 280.0])  # order 8
 PLACES = 12  # in each stretch between two events
+
+
+ALGEBRA = "algebra"  # two ways to write the same function of a state: wrong code breaks the row, and no motion does
 
 
 class Equation(NamedTuple):
@@ -28,6 +32,7 @@ class Equation(NamedTuple):
     found: float
     allowed: float  # the number must not exceed it; or, for a margin, not fall below 0
     margin: bool = False
+    by: str = "motion"  # what could break it: a motion, or ALGEBRA alone
 
     @property
     def agrees(self) -> bool:
@@ -53,6 +58,11 @@ class Sample:
         self.stencils = states
         self.state: Array = states[:, 4]
         self.rate: Array = np.einsum("k,nki->ni", STENCIL, states) / STEP
+
+    @cached_property
+    def crosses(self) -> bool:
+        """Whether a pair separates faster than 1/p while it penetrates, and moves on another scale of time then."""
+        return bool((self.run.event_table[:, 2] == Transition.CLAMP).any())
 
     @cached_property
     def level(self) -> Energy:

@@ -15,7 +15,7 @@ from tqdm import tqdm
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.scene import Scene
 from grasp_ros.scene.versions import versions
-from grasp_ros.simulation import simulate
+from grasp_ros.simulation import canvas, simulate
 from lab.paper import arms, beyond, beyond_figures, figures
 from lab.paper.cases import (
     FIGURES,
@@ -111,9 +111,9 @@ def image(drawing: Any) -> Image:
     for kind in ("svg", "png"):
         file = io.BytesIO()
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
+        with canvas.style(figures.style()):
+            drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
         files.append(file)
-    figures.close(drawing)
     return Image(short_svg(files[0].getvalue()), _few_colors(files[1]))
 
 

@@ -7,15 +7,12 @@ from itertools import cycle
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from grasp_ros.methods.contract import STEP
+from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import save
 from lab.studies.accuracy import by_method, frontier
 from lab.studies.drift import Drift
@@ -93,10 +90,11 @@ def _method_legend(axes: Axes, methods: list[str]) -> None:
     axes.legend(handles=handles, loc="center", ncols=2, fontsize=7, frameon=False, handlelength=3.0)
 
 
+@canvas.style()
 def contacts_missed(records: Sequence[Record], path: Path) -> None:
     """By how much the count of touches is wrong, against tolerance (above) and step (below)."""
     names = list(dict.fromkeys(record.scene for record in records))
-    figure, grid = plt.subplots(
+    figure, grid = canvas.subplots(
         2, len(names), figsize=(2.6 * len(names), 5.2), sharey=True, sharex="row", layout="constrained", squeeze=False
     )
     for column, name in enumerate(names):
@@ -124,9 +122,10 @@ def contacts_missed(records: Sequence[Record], path: Path) -> None:
     save(figure, path, DPI)
 
 
+@canvas.style()
 def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
     """Relative energy drift against time."""
-    figure, axes = plt.subplots(figsize=(8.5, 4.8), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(8.5, 4.8), layout="constrained")
     for row in sorted(drifts, key=lambda row: -row.worst):
         label = f"{row.method}, {row.setting}: {row.worst:.0e}, {row.seconds:.2g} s"
         if not row.t:
@@ -146,9 +145,10 @@ def energy_drift(drifts: Sequence[Drift], path: Path) -> None:
     save(figure, path, DPI)
 
 
+@canvas.style()
 def control_period(points: Sequence[Point], name: str, path: Path) -> None:
     """Deviation and price of the sampled loop against the control period."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9.5, 4.0), layout="constrained")
+    figure, (left, right) = canvas.subplots(1, 2, figsize=(9.5, 4.0), layout="constrained")
     period = [point.period_ms for point in points]
     left.plot(period, [point.deviation for point in points], "o-", color="#0072b2")
     deviation = "largest deviation of a position\nfrom continuous feedback, m"
@@ -176,9 +176,10 @@ def control_period(points: Sequence[Point], name: str, path: Path) -> None:
     save(figure, path, DPI)
 
 
+@canvas.style()
 def prediction(predictions: Sequence[Prediction], path: Path) -> None:
     """How two roundings grow."""
-    figure, axes = plt.subplots(figsize=(8.0, 4.4), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(8.0, 4.4), layout="constrained")
     shades = ("#0072b2", "#e69f00", "#d55e00", "#009e73", "#cc79a7", "#000000")
     for row, shade in zip(predictions, cycle(shades), strict=False):
         there = row.distance > 0.0
@@ -196,6 +197,7 @@ def prediction(predictions: Sequence[Prediction], path: Path) -> None:
     save(figure, path, DPI)
 
 
+@canvas.style()
 def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str, float], path: Path) -> None:
     """Spectral radius of the sampled loop against the period, and growth in the simulation.
 
@@ -207,7 +209,7 @@ def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str,
     limits : dict
         By label: the first period at which the radius is 1, s.
     """
-    figure, axes = plt.subplots(figsize=(7.5, 4.0), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(7.5, 4.0), layout="constrained")
     for (label, (period, radius)), shade in zip(curves.items(), ("#0072b2", "#d55e00"), strict=False):
         text = f"{label}: stable to {1e3 * limits[label]:.4g} ms"
         axes.plot(1e3 * np.asarray(period), radius, color=shade, label=text)
@@ -223,10 +225,11 @@ def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str,
     save(figure, path, DPI)
 
 
+@canvas.style()
 def _panels(number: int) -> tuple[Any, list[Axes]]:
     columns = min(number, 3)
     rows = -(-number // columns)
-    figure, grid = plt.subplots(
+    figure, grid = canvas.subplots(
         rows, columns, figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained", squeeze=False
     )
     panels = list(grid.flat)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 from matplotlib.patches import Rectangle
 
 from grasp_ros.maps.figures import heat
+from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import save
 from lab.studies.maps import Limits, Settling
 
@@ -18,23 +15,26 @@ DPI = 130
 GAIN, LOSS = "Kp of both arms, N/m", "p of both contacts, s/m"
 
 
+@canvas.style()
 def settling(found: Settling, path: Path) -> None:
-    """The map, and the zoom into its edge, whose place the map shows."""
-    figure, both = plt.subplots(1, 2, figsize=(13.0, 5.6), layout="constrained")
-    figure.suptitle("case 3: seconds until it settles; grey: not within 10 s", fontsize="medium")
+    """The map, and a window of it, whose place the map shows."""
+    figure, both = canvas.subplots(1, 2, figsize=(13.0, 5.6), layout="constrained")
+    title = f"case 3: seconds until it has settled for good; grey: not within {found.within:g} s"
+    figure.suptitle(title, fontsize="medium")
     for axes, plan, data in zip(both, (found.plan, found.zoom), (found.data, found.zoomed), strict=True):
         heat(axes, plan, data["settling_time"].values, "settling time, s")
         axes.set_xlabel(GAIN)
         axes.set_ylabel(LOSS)
     y, x = found.zoom.axes
     both[0].add_patch(Rectangle((x.low, y.low), x.high - x.low, y.high - y.low, fill=False, color="#d55e00"))
-    both[1].set_title("the window with the longest edge", fontsize="small")
+    both[1].set_title("the window in which neighbours differ most", fontsize="small")
     save(figure, path, DPI)
 
 
+@canvas.style()
 def limits(found: Limits, path: Path) -> None:
     """Unstable runs of the four loops over period and gain, with the exact limit of a free arm."""
-    figure, all_axes = plt.subplots(2, 2, figsize=(10.0, 7.5), sharex=True, sharey=True, layout="constrained")
+    figure, all_axes = canvas.subplots(2, 2, figsize=(10.0, 7.5), sharex=True, sharey=True, layout="constrained")
     for axes, loop in zip(all_axes.flat, found.loops, strict=True):
         axes.pcolormesh(1e3 * found.periods, found.gains, loop.unstable, cmap="Oranges", vmin=0.0, vmax=1.5)
         axes.contour(1e3 * found.periods, found.gains, found.radius[loop.delay], levels=[1.0], colors="#0072b2")

@@ -46,28 +46,37 @@ def _head() -> str:
     found = ", ".join(f"{name} {version}" for name, version in versions().items())
     return "# Maps\n\n" + prose(
         f"Written by `{COMMAND}`; every number is computed. {found}. A pixel or a row is a run of its own, whose"
-        " outcomes come from closed forms and Taylor polynomials; settled means that no mass leaves the bound any more,"
-        " a part of the largest initial displacement. `grasp map` does the same for any scene.")
+        " outcomes come from closed forms and Taylor polynomials; settled means that no mass leaves the bound, a part"
+        " of the largest initial displacement, any more: V_c proves it, for which a run goes on past its horizon."
+        " `grasp map` does the same for any scene.")
 
 
 def _settling(found: maps.Settling) -> str:
     times = found.data["settling_time"].values
-    settles = np.isfinite(times)
-    lossy, quarter = settles.mean(axis=1), len(settles) // 4
-    zoomed = np.isfinite(found.zoomed["settling_time"].values)
+    within, quarter = found.within, len(times) // 4
+    least, most = np.isfinite(times[:quarter]).mean(), np.isfinite(times[-quarter:]).mean()
+    shares = ", ".join(f"{100.0 * (times <= limit).mean():.1f} % within {limit:g} s" for limit in (10.0, 20.0, 50.0))
     y, x = found.zoom.axes
+    finer = np.diff(found.plan.axes[1].values[:2])[0] / np.diff(x.values[:2])[0]
     text = (
         f"Case 3 has neither dampers nor velocity feedback: only impacts take energy. Of {times.size} pairs of gain"
-        f" and dissipation {100.0 * settles.mean():.1f} % settle in a run of 10 s to {100.0 * maps.SETTLED:g} % of the"
-        f" largest initial displacement: {100.0 * lossy[:quarter].mean():.1f} % in the quarter with the least"
-        f" dissipation, {100.0 * lossy[-quarter:].mean():.1f} % in that with the most. The edge is no curve: counted"
-        f" with boxes of 2 to 32 pixels its dimension is {found.dimension:.2f}, so that a small change of a number"
-        f" decides whether the grasp settles. The zoom, Kp {x.low:.4g} to {x.high:.4g} N/m and p {y.low:.4g} to"
-        f" {y.high:.4g} s/m, holds {100.0 * zoomed.mean():.0f} % that settle. An accuracy of 1e-16 instead of"
-        f" {maps.MAP_ACCURACY:g} moves {100.0 * found.changed:.2g} % of its pixels to the other side of the edge. The"
-        f" {times.size} runs took {found.seconds:.0f} s on this machine.")
-    head = "## Where the grasp of case 3 settles"
+        f" and dissipation {100.0 * np.isfinite(times).mean():.1f} % settle for good within {within:g} s to"
+        f" {100.0 * maps.SETTLED:g} % of the largest initial displacement ({shares}): {100.0 * least:.1f} % in the"
+        f" quarter with the least dissipation, {100.0 * most:.1f} % in that with the most. Of the pixels"
+        f" {100.0 * found.jumps[0]:.1f} % have a neighbour whose time differs by more than {100.0 * maps.JUMP:g} %, and"
+        f" in the window, Kp {x.low:.4g} to {x.high:.4g} N/m and p {y.low:.4g} to {y.high:.4g} s/m,"
+        f" {100.0 * found.jumps[1]:.1f} %, though its pixels are {finer:.2g} times as fine in Kp:"
+        f" {_smooth(found)} An accuracy of 1e-16 instead of {maps.MAP_ACCURACY:g} moves {100.0 * found.changed:.2g} %"
+        f" of its pixels by as much. The {times.size} runs took {found.seconds:.0f} s on this machine.")
+    head = "## When the grasp of case 3 settles"
     return f"{head}\n\n![settling time over gain and dissipation](maps/settling.png)\n\n{prose(text)}"
+
+
+def _smooth(found: maps.Settling) -> str:
+    """What the shares of jumps at two sizes of pixels say."""
+    if found.jumps[1] > 0.5 * found.jumps[0]:
+        return "there a small change of a number decides when the grasp settles, and finer pixels do not help."
+    return "finer pixels resolve the jumps, the settling time is smooth between them."
 
 
 def _limits(found: maps.Limits) -> str:
@@ -99,16 +108,15 @@ def _robustness(plan: Plan, data: Any, seconds: float) -> str:
     done = int((data["status"].values == 0).sum())
     strong = figures.correlations(data, plan, values)[:STRONGEST]
     words = ", ".join(f"`{name}` ({rank:+.2f})" for name, rank in strong)
-    late = float((values[inside] > plan.scene.duration - 1.0).mean())
+    within = plan.setup.horizons * plan.scene.duration
     low, middle, high = np.quantile(values[inside], (0.05, 0.5, 0.95))
     text = (
         f"{len(values)} scenes with each of the {len(plan.axes)} numbers of case 1 off by up to {100.0 * maps.OFF:g} %,"
         f" independently (a Sobol sequence): {done} runs reach their end, and {100.0 * inside.mean():.2f} % settle"
-        f" within {plan.scene.duration:g} s to {100.0 * plan.setup.settled:g} % of the largest initial displacement."
-        f" Of these half need less than {middle:.3g} s, and 90 % between {low:.3g} and {high:.3g} s. The settling time"
-        f" goes with {words} (rank correlations). Of those that settle {100.0 * late:.0f} % come inside for the last"
-        " time in the last second: a mass that drifts in the bound may leave it again after the end, so that a longer"
-        f" run would call fewer of them settled so early. They took {seconds:.0f} s on this machine.")
+        f" within {within:g} s to {100.0 * plan.setup.settled:g} % of the largest initial displacement. Half of them"
+        f" need less than {middle:.3g} s, 90 % between {low:.3g} and {high:.3g} s, and the slowest"
+        f" {values[inside].max():.3g} s. The settling time goes with {words} (rank correlations). They took"
+        f" {seconds:.0f} s on this machine.")
     rows = []
     for name in ("touches_left", "touches_right", "peak_input_left", "peak_input_right", "peak_impact_left",
                  "peak_impact_right"):

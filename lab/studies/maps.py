@@ -23,8 +23,9 @@ from grasp_ros.simulation.ensemble import ensemble
 
 GAINS = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
 LOSSES = "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"
-PIXELS = 1000
-SETTLED, MAP_ACCURACY, CHECKED = 0.05, 1e-10, 2000
+PIXELS = 200
+SETTLED, MAP_ACCURACY, CHECKED, HORIZONS = 0.05, 1e-10, 2000, 10
+JUMP = 0.1  # of a settling time
 TICKS, FIRST_S, LAST_S, GROWN = 300, 0.01, 0.4, 3.0
 PERIODS, LEVELS = 40, 26
 RUNAWAY = 20_000  # units of work; a run that grows without bound may take any number, and one that does not a tenth
@@ -33,15 +34,20 @@ SAMPLE, OFF = 100_000, 0.3
 
 
 class Settling(NamedTuple):
-    """The map of case 3, and what lies at its edge."""
+    """The map of case 3, and a window of it."""
 
     plan: Plan
     data: Any
     zoom: Plan
     zoomed: Any
-    dimension: float  # of the edge, by counting boxes
-    changed: float  # part of the pixels of the zoom that an accuracy of 1e-16 puts on the other side
+    jumps: tuple[float, float]  # share of neighbours whose settling times differ by more than JUMP: map and window
+    changed: float  # share of the pixels of the window that an accuracy of 1e-16 moves by more than JUMP
     seconds: float
+
+    @property
+    def within(self) -> float:
+        """Time in s that a run has to settle."""
+        return self.plan.setup.horizons * self.plan.scene.duration
 
 
 class Loops(NamedTuple):
@@ -63,18 +69,19 @@ class Limits(NamedTuple):
 
 
 def settling(directory: Path, pixels: int = PIXELS) -> Settling:
-    """Where case 3 settles within 10 s, over both gains and both dissipations, and a zoom into its edge."""
+    """When case 3 settles for good, over both gains and both dissipations, and a window where that is least smooth."""
     scene = scenes.load("case_03", ["time.duration_s=10.0"])
-    setup = Setup(("settling_time",), MAP_ACCURACY, settled=SETTLED)
+    setup = Setup(("settling_time",), MAP_ACCURACY, settled=SETTLED, horizons=HORIZONS)
     axes = (Axis(LOSSES, 0.02, 20.0, pixels, True), Axis(GAINS, -9.0, 60.0, pixels))
     plan = Plan(scene, setup, axes)
     seconds = _computed(plan, directory / f"settling_{pixels}.zarr").seconds
     data = store.read(directory / f"settling_{pixels}.zarr")
-    settles = np.isfinite(data["settling_time"].values)
-    zoom = Plan(scene, setup, _window(plan, settles, max(pixels // 20, 4), max(pixels // 4, 2)))
+    jumps = _jumps(data["settling_time"].values)
+    zoom = Plan(scene, setup, _window(plan, jumps, max(pixels // 20, 4), max(pixels // 4, 2)))
     _computed(zoom, directory / f"zoom_{pixels}.zarr")
     zoomed = store.read(directory / f"zoom_{pixels}.zarr")
-    return Settling(plan, data, zoom, zoomed, dimension(settles), _changed(zoom, zoomed), seconds)
+    shares = float(jumps.mean()), float(_jumps(zoomed["settling_time"].values).mean())
+    return Settling(plan, data, zoom, zoomed, shares, _changed(zoom, zoomed), seconds)
 
 
 def _computed(plan: Plan, path: Path) -> store.Store:
@@ -82,12 +89,11 @@ def _computed(plan: Plan, path: Path) -> store.Store:
         return run(plan, path, progress=lambda done, _: bar.update(done - bar.n))
 
 
-def _window(plan: Plan, settles: Array, size: int, pixels: int) -> tuple[Axis, Axis]:
-    """The window with the longest edge in it, as axes."""
-    mixed = _mixed(settles, 1)
+def _window(plan: Plan, jumps: Array, size: int, pixels: int) -> tuple[Axis, Axis]:
+    """The window with the most jumps in it, as axes."""
     counts = {
-        (i, j): mixed[i : i + size, j : j + size].sum()
-        for i in range(0, mixed.shape[0] - size + 1, size // 2) for j in range(0, mixed.shape[1] - size + 1, size // 2)
+        (i, j): jumps[i : i + size, j : j + size].sum()
+        for i in range(0, jumps.shape[0] - size + 1, size // 2) for j in range(0, jumps.shape[1] - size + 1, size // 2)
     }
     i, j = max(counts, key=lambda place: counts[place])
     y, x = plan.axes
@@ -95,32 +101,25 @@ def _window(plan: Plan, settles: Array, size: int, pixels: int) -> tuple[Axis, A
             Axis(x.name, float(x.values[j]), float(x.values[j + size - 1]), pixels))
 
 
-def _mixed(inside: Array, size: int) -> Array:
-    """Boxes of size + 1 pixels that overlap by one, and hold both kinds."""
-    boxes = [inside[i::size, j::size] for i in range(size + 1) for j in range(size + 1)] if size == 1 else []
-    if not boxes:
-        height, width = ((length - 1) // size for length in inside.shape)
-        boxes = [inside[i : i + size * height : size, j : j + size * width : size]
-                 for i in range(size + 1) for j in range(size + 1)]
-    height, width = (min(box.shape[axis] for box in boxes) for axis in (0, 1))
-    total = np.sum([box[:height, :width] for box in boxes], axis=0)
-    return np.asarray((total > 0) & (total < len(boxes)))
+def _differ(one: Array, other: Array) -> Array:
+    """Where two times differ by more than a part JUMP of the larger, or only one is finite."""
+    with np.errstate(invalid="ignore"):
+        far = np.abs(one - other) > JUMP * np.maximum(one, other)
+    return np.asarray(np.where(np.isfinite(one) & np.isfinite(other), far, np.isfinite(one) != np.isfinite(other)))
 
 
-def dimension(inside: Array) -> float:
-    """Box-counting dimension of the edge of a region, from boxes of 2 to 32 pixels."""
-    sizes = [size for size in (2, 4, 8, 16, 32) if size < min(inside.shape) // 4]
-    counts = [max(int(_mixed(inside, size).sum()), 1) for size in sizes]
-    return float(-np.polyfit(np.log(sizes), np.log(counts), 1)[0]) if len(sizes) > 1 else math.nan
+def _jumps(times: Array) -> Array:
+    """Pixels, but those of the last row and column, whose neighbour above or to the right settles much else."""
+    here = times[:-1, :-1]
+    return np.asarray(np.logical_or(_differ(here, times[1:, :-1]), _differ(here, times[:-1, 1:])))
 
 
 def _changed(plan: Plan, data: Any) -> float:
-    """Part of some pixels, drawn at random, that the finest accuracy puts on the other side of the edge."""
+    """Share of some pixels, drawn at random, whose time the finest accuracy moves by more than a part JUMP."""
     rows = np.random.default_rng(1).choice(plan.rows, min(CHECKED, plan.rows), replace=False)
     changes = {key: values[rows] for key, values in plan.variants(0, plan.rows).changes.items()}
     fine = ensemble(plan.scene, changes, plan.setup.outcomes, setup=plan.setup._replace(accuracy=1e-16))
-    coarse = data["settling_time"].values.ravel()[rows]
-    return float((np.isfinite(fine.columns["settling_time"]) != np.isfinite(coarse)).mean())
+    return float(_differ(fine.columns["settling_time"], data["settling_time"].values.ravel()[rows]).mean())
 
 
 def limits(periods: int = PERIODS, levels: int = LEVELS) -> Limits:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import matplotlib.pyplot as plt
-
 from grasp_ros.physics.model import penetration
+from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, Motion, save
 
 
+@canvas.style()
 def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
     """Draw what variants of a scene cost: name, us per control period, kB per simulated second."""
     names = [name for name, _, _ in rows]
-    figure, panels = plt.subplots(1, 2, sharey=True, figsize=(9.0, 0.3 * len(rows) + 1.2), layout="constrained")
+    figure, panels = canvas.subplots(1, 2, sharey=True, figsize=(9.0, 0.3 * len(rows) + 1.2), layout="constrained")
     for axes, column, label in zip(panels, (1, 2), ("us per control period, no ROS", "bag, kB per s"), strict=True):
         values = [float(row[column]) for row in rows]
         bars = axes.barh(names, values, color=[OBJECT_COLOR if name == names[0] else LEFT_COLOR for name in names])
@@ -27,9 +27,10 @@ def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
     save(figure, path)
 
 
+@canvas.style()
 def v_jumps(motions: Sequence[Motion], path: Path) -> None:
     """Draw V and V_c of motions whose V jumps, and u' beside -1/p."""
-    figure, panels = plt.subplots(2, len(motions), sharex="col", figsize=(11.0, 6.0), layout="constrained")
+    figure, panels = canvas.subplots(2, len(motions), sharex="col", figsize=(11.0, 6.0), layout="constrained")
     for motion, (top, bottom) in zip(motions, panels.T, strict=True):
         level, pairs = motion.energy, motion.scene.system.pairs
         _, d_l, _, d_r = penetration(motion.state)
@@ -53,11 +54,12 @@ def v_jumps(motions: Sequence[Motion], path: Path) -> None:
     save(figure, path)
 
 
+@canvas.style()
 def hard_cases(
     rows: Sequence[tuple[str, float, float | None, Sequence[float | None]]], others: Sequence[str], path: Path
 ) -> None:
     """Draw the errors of hard cases: family, what is promised, ours, those of other methods; None: no result."""
-    figure, axes = plt.subplots(figsize=(11.0, 5.0), layout="constrained")
+    figure, axes = canvas.subplots(figsize=(11.0, 5.0), layout="constrained")
     floor = 1e-17  # where an exact 0 is drawn
     series = [("this package", LEFT_COLOR, "o", [own for _, _, own, _ in rows])]
     for place, name in enumerate(others):

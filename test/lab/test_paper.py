@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,12 +18,13 @@ from lab.paper.claims import Check, Claim, Kind, Part, Verdict
 from lab.paper.conditions import condition_rows
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations, form_equations
-from lab.paper.judgement import judge
+from lab.paper.judgement import judge, statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
 from lab.paper.quantities import quantities
 from lab.paper.replay import COLUMNS, frames
 from lab.paper.sample import Sample
+from lab.paper.scatter import median
 from lab.paper.symmetry import asymmetry, where_false
 
 CASES = load_cases()
@@ -116,8 +118,26 @@ def test_a_symmetric_start_is_a_knife_edge() -> None:
 
 def test_times_beyond_what_can_be_known_are_ranges() -> None:
     assert seconds(settlings(CASES[1])) == "18.2 s"
-    assert re.fullmatch(r"5\d\d to [67]\d\d s", seconds(settlings(CASES[3])))
+    assert re.fullmatch(r"[34]\d\d to [67]\d\d s", seconds(settlings(CASES[3])))
     assert seconds([np.inf, np.inf]) == "never"
+
+
+def test_medians_stand_within_the_scatter_of_all_starts() -> None:
+    """The first 15 of 200 starts once printed 0.373, 1.12 and 0.963 for what all give as 0.66, 1.57 and 0.75."""
+    starts = random_starts(200)
+    for key, part, value, expected in (("O2", 0, 5.0, 0.660), ("O6", 1, 1000.0, 1.57), ("O10", 1, 100.0, 0.752)):
+        swept: Any = statements()[key].parts[part]
+        (_, found), = swept._replace(values=(value,)).curve(CASES, starts)
+        assert found.low <= expected <= found.high
+        assert found.high - found.low < 0.25 * found.middle
+
+
+def test_an_interval_of_a_median_holds_it_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(0)
+    found = [median(rng.exponential(size=60).tolist()) for _ in range(2000)]
+    share = np.mean([each.low <= np.log(2.0) <= each.high for each in found])
+    assert 0.945 < share < 0.985
+    assert median([1.0, 2.0, np.inf]).high == np.inf
 
 
 def test_a_border_in_asymmetry_is_named_where_there_is_one() -> None:
@@ -172,16 +192,16 @@ def test_stiffer_arms_lose_more_in_harder_impacts(monkeypatch: pytest.MonkeyPatc
     soft, stiff = arms.stiffer(CASES, STARTS)
     assert stiff.share > 2.0 * soft.share
     assert stiff.speed > 1.5 * soft.speed
-    assert stiff.alone == pytest.approx(soft.alone, rel=0.1)
-    assert stiff.settling < soft.settling
+    assert stiff.alone.middle == pytest.approx(soft.alone.middle, rel=0.1)
+    assert stiff.settling.middle < soft.settling.middle
 
 
 def test_collisions_slow_damped_arms_and_stop_undamped_ones(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(arms, "DAMPINGS", (0.0, 0.7, 5.0))
     none, some, much = arms.damped(CASES, STARTS[:3])
-    assert none.together < none.alone == np.inf
+    assert none.together.middle < none.alone.middle == np.inf
     assert some.later == 1.0
-    assert much.together >= much.alone
+    assert much.together.middle >= much.alone.middle
 
 
 def test_the_papers_own_method_at_plausible_steps() -> None:

@@ -15,7 +15,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from lab.paper import compare, measures, motion, universal
 from lab.paper.cases import Cases, load_cases, random_starts, with_values
-from lab.paper.claims import Verdict
+from lab.paper.claims import Kind, Verdict
 from lab.paper.judgement import statements
 
 CASES = load_cases()
@@ -42,8 +42,7 @@ def _no_other_readings(monkeypatch: pytest.MonkeyPatch) -> None:
     """They do not enter a verdict, and take most of the time."""
     for module in (compare, universal):
         monkeypatch.setattr(module, "read_starts", lambda *several: {})
-    for module in (compare, measures):
-        monkeypatch.setattr(module, "OFFSETS", (0.0,))
+    monkeypatch.setattr(measures, "OFFSETS", (0.0,))
 
 
 def put(case: int, change: dict[str, float], cases: Cases) -> Cases:
@@ -154,6 +153,21 @@ def test_an_object_that_moves_does_not_rest() -> None:
     assert verdict("T2", 0, CASES, (1,)) is HOLDS
     moving = CASES[1].changed({"object.velocity_m_per_s": 0.1})
     assert verdict("T2", 0, {**CASES, 1: moving}, (1,)) is FAILS
+
+
+def test_a_grasp_that_does_not_press_is_a_limit() -> None:
+    """O3 once held, where T9, the grasp itself, does not."""
+    assert verdict("O3", 2, CASES, ()) is LIMITED
+    assert verdict("O3", 2, dict.fromkeys(CASES, scenes.load("preload")), ()) is HOLDS
+
+
+def test_a_ratio_over_nothing_decides_nothing() -> None:
+    """O8: equal arms from a symmetric start do not differ at all; 0.9233 against 0 once counted as true."""
+    part = statements()["O8"].parts[0].judge(CASES, STARTS)
+    trivial = [check for check in part.checks if check.kind is Kind.TRIVIAL]
+    assert trivial
+    assert all("against 0: no ratio" in check.value for check in trivial)
+    assert not any("inf" in check.value for check in part.checks)
 
 
 def test_arms_that_overlap_hold_the_object() -> None:

@@ -23,6 +23,7 @@ def test_runs_stop_where_the_energy_rises(sampled: bool) -> None:
     whole = simulate(scene, sampled=sampled)
     assert (whole.status, whole.stop) == (Status.DONE, "")
     driven = scene.changed({})
+    driven.system.bodies.setflags(write=True)
     driven.system.bodies[OBJECT, Of.DAMPING] = -50.0
     cut = simulate(driven, sampled=sampled)
     assert cut.status is Status.ENERGY_RISES

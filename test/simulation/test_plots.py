@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from itertools import combinations, product
 from pathlib import Path
 from typing import Any
@@ -34,7 +37,6 @@ def test_axes_letters_and_legends_do_not_collide(names: tuple[str, ...], width: 
     for box in boxes:
         assert box.x0 >= -1.0
         assert box.x1 <= figure.bbox.x1 + 1.0
-    plots.plt.close(figure)
 
 
 def test_contacts_of_a_recording_are_those_of_the_events() -> None:
@@ -53,3 +55,27 @@ def test_what_is_refused(tmp_path: Path) -> None:
         compose([run], [""], width_mm=1.0)
     with pytest.raises(Refused, match="no output times"):
         plots.draw(simulate(scenes.load("case_01"), grid=np.zeros(0)), tmp_path / "a.png", "")
+
+
+DRAWN = """
+import sys
+from pathlib import Path
+from grasp_ros import scene
+from grasp_ros.simulation import plots, simulate
+plots.draw_several([simulate(scene.load("case_01", "time.duration_s=1"))], ["a caption"], sys.argv[1], width_mm=90.0)
+assert "matplotlib.pyplot" not in sys.modules
+"""
+
+
+def test_settings_of_others_change_no_pixel(tmp_path: Path) -> None:
+    """A page of 90 mm once came out as one of 113, and a backend or a file that cannot be read ended the run."""
+    wild, broken = tmp_path / "wild", tmp_path / "broken"
+    wild.write_text("savefig.bbox: tight\ntext.usetex: True\nfont.size: 30\naxes.grid: True\n")
+    broken.write_bytes(b"\xff\xfe\x00")
+    pictures = []
+    for k, settings in enumerate(({}, {"MATPLOTLIBRC": str(wild)}, {"MATPLOTLIBRC": str(broken)},
+                                  {"MPLBACKEND": "module://matplotlib_inline.backend_inline"})):
+        path = tmp_path / f"{k}.png"
+        subprocess.run([sys.executable, "-c", DRAWN, str(path)], env={**os.environ, **settings}, check=True)
+        pictures.append(path.read_bytes())
+    assert len(set(pictures)) == 1

@@ -42,7 +42,8 @@ class Oddity(NamedTuple):
     meant: str
 
     def __str__(self) -> str:
-        return f"{self.key}: {self.value!r} {self.why}; meant: {self.meant}"
+        value = dict(self.value) if isinstance(self.value, Mapping) else self.value
+        return f"{self.key}: {value!r} {self.why}; meant: {self.meant}"
 
 
 def nothing_odd(_: Sections, __: System) -> Iterable[Oddity]:

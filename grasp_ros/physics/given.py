@@ -1,0 +1,111 @@
+"""What callers hold in their hands, taken once, at the door: numbers and times of Python, numpy, pandas and xarray.
+
+Whatever is a real number counts as one, whatever its type; texts, truth values and times where a number is meant do
+not. What is not taken is refused with its name.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from datetime import timedelta
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.physics.errors import Refused
+
+SECOND = np.timedelta64(1, "s")
+
+
+def plain(value: Any) -> int | float | None:
+    """A real number as int or float; None for anything else."""
+    if isinstance(value, (bool, np.bool_, np.timedelta64)):
+        return None
+    if isinstance(value, Integral):
+        return int(value)
+    if isinstance(value, Real):
+        return float(value)
+    if hasattr(value, "__array__") and getattr(value, "ndim", None) == 0 and not isinstance(value, np.generic):
+        return plain(np.asarray(value)[()])
+    return None
+
+
+def number(name: str, value: Any) -> float:
+    """A number.
+
+    Raises
+    ------
+    Refused
+        If it is none.
+    """
+    found = plain(value)
+    if found is None:
+        raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
+    return float(found)
+
+
+def whole(name: str, value: Any, low: int) -> int:
+    """A whole number >= low; 1e7 is one.
+
+    Raises
+    ------
+    Refused
+        If it is none.
+    """
+    found = plain(value)
+    if found is None or not math.isfinite(found) or found != math.floor(found) or found < low:
+        raise Refused(f"{name}: {value!r} is not allowed; allowed: a whole number >= {low}")
+    return int(found)
+
+
+def column(name: str, values: Any) -> NDArray[np.float64]:
+    """Numbers (n,) from anything that holds them in a row, a generator as well; always a new array.
+
+    Raises
+    ------
+    Refused
+        If there are none, in another shape, or some are missing.
+    """
+    array = _array(name, values)
+    if array.ndim != 1:
+        raise Refused(f"{name}: shape {array.shape} is not allowed; allowed: (n,)")
+    if array.dtype.kind not in "fiu":
+        raise Refused(f"{name}: {_shown(array)} is not allowed; allowed: numbers (n,)")
+    return array.astype(np.float64)
+
+
+def times(name: str, values: Any) -> NDArray[np.float64]:
+    """Times (n,) in s from numbers, one number, or lengths of time of Python, numpy or pandas; always a new array.
+
+    Raises
+    ------
+    Refused
+        If there are none, or in another shape.
+    """
+    array = _array(name, values)
+    if array.dtype.kind == "O" and array.size and all(isinstance(entry, timedelta) for entry in array.flat):
+        array = array.astype("timedelta64[us]")
+    if array.dtype.kind == "m":
+        array = array / SECOND
+    return column(name, array.reshape(1) if array.ndim == 0 else array)
+
+
+def _array(name: str, values: Any) -> NDArray[Any]:
+    """What numpy makes of it."""
+    try:
+        array = np.asarray(list(values) if isinstance(values, Iterator) else values)
+    except (TypeError, ValueError) as error:
+        raise Refused(f"{name}: {error}; allowed: numbers (n,)") from None
+    if isinstance(values, np.ma.MaskedArray) and np.ma.getmaskarray(values).any():
+        raise Refused(f"{name}: some are masked; allowed: numbers (n,)")
+    if array.dtype.kind == "O" and array.size and all(plain(entry) is not None for entry in array.flat):
+        return array.astype(np.float64)
+    return array.astype(np.float64) if array.size == 0 and array.dtype.kind == "O" else array
+
+
+def _shown(array: NDArray[Any]) -> str:
+    """The first entry, and its type."""
+    return f"{array.flat[0]!r}, {array.dtype}," if array.size else str(array.dtype)

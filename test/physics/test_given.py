@@ -1,0 +1,167 @@
+"""What Python users hold in their hands: taken, or refused in a sentence at the door."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from datetime import timedelta
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas
+import pytest
+import xarray
+
+from grasp_ros import scene as scenes
+from grasp_ros import simulation
+from grasp_ros.exact import Integrator
+from grasp_ros.maps.plan import Axis, Plan
+from grasp_ros.maps.run import run as run_map
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import compose
+from grasp_ros.simulation import Setup, ensemble, load, simulate
+
+GAIN = "left_feedback.position_gain_N_per_m"
+CASE = scenes.load("case_01", "time.duration_s=1")
+MASS = (2, 2.0, np.int64(2), np.uint8(2), np.float32(2.0), np.float64(2.0), np.longdouble(2.0), np.array(2.0),
+        np.array(2), Fraction(2), xarray.DataArray(2.0))
+NO_MASS = ("2", b"2", True, np.True_, np.array([2.0]), np.timedelta64(2, "s"), 2.0 + 0.0j, None, Decimal(2), [2.0])
+TIMES = [0.25, 0.5, 1.0]
+GRIDS = (
+    TIMES, tuple(TIMES), np.array(TIMES), np.array(TIMES, dtype=np.float32), iter(TIMES), (t for t in TIMES),
+    pandas.Series(TIMES), pandas.Index(TIMES), xarray.DataArray(TIMES), np.array(TIMES, dtype=object),
+    pandas.to_timedelta(TIMES, unit="s"), pandas.Series(pandas.to_timedelta(TIMES, unit="s")),
+    np.array([250, 500, 1000], dtype="timedelta64[ms]"), [timedelta(seconds=t) for t in TIMES],
+)
+ONE = (1, 1.0, np.float64(1.0), np.array(1.0), np.timedelta64(1, "s"), timedelta(seconds=1), [1.0])
+NO_GRID = {
+    "1.0": "numbers", None: None, "columns": "shape", "names": "numbers", "truth": "numbers", "dates": "numbers",
+    "ragged": "allowed", "masked": "masked", "complex": "numbers", "never": "ascending",
+}
+NO_GRIDS: dict[str, Any] = {
+    "1.0": "1.0", "columns": np.array(TIMES)[:, None], "names": ["0.5", "1.0"], "truth": [True, False],
+    "dates": np.array(["2020-01-01"], dtype="datetime64[s]"), "ragged": [[0.5], [0.5, 1.0]],
+    "masked": np.ma.masked_array(TIMES, [False, True, False]), "complex": [0.5 + 0.0j],
+    "never": np.array(["NaT"], dtype="timedelta64[s]"),
+}
+
+
+@pytest.mark.parametrize("mass", MASS, ids=repr)
+def test_every_real_number_is_one(mass: Any) -> None:
+    changed = CASE.changed({"object.mass_kg": mass})
+    values = {**CASE.values, "object": {**CASE.values["object"], "mass_kg": mass}}
+    for scene in (changed, compose("case_01", values)):
+        found = scene.values["object"]["mass_kg"]
+        assert type(found) is float
+        assert found == 2.0
+        assert scenes.parse(scene.to_yaml(), "case_01", "case_01").values == scene.values
+
+
+@pytest.mark.parametrize("mass", NO_MASS, ids=repr)
+def test_what_is_no_number_is_none(mass: Any) -> None:
+    with pytest.raises(Refused, match=r"object\.mass_kg: .* is not allowed; allowed: a number >= "):
+        CASE.changed({"object.mass_kg": mass})
+
+
+def test_lists_of_a_scene_may_be_arrays() -> None:
+    table = scenes.load("table")
+    (section, key), = ((section, key) for section, numbers in table.values.items() for key, value in numbers.items()
+                       if isinstance(value, tuple) and key.endswith("_N"))
+    values = np.array(table.values[section][key], dtype=np.float32)
+    assert table.changed({f"{section}.{key}": values}).values[section][key] == tuple(values.tolist())
+
+
+@pytest.mark.parametrize("grid", GRIDS, ids=lambda grid: type(grid).__name__)
+def test_output_times_of_any_kind(grid: Any) -> None:
+    assert simulate(CASE, grid=grid).t.tolist() == TIMES
+
+
+@pytest.mark.parametrize("grid", ONE, ids=repr)
+def test_one_output_time(grid: Any) -> None:
+    run = simulate(CASE, grid=grid)
+    assert run.t.tolist() == [1.0]
+    assert run.state.tobytes() == simulate(CASE, grid=TIMES).state[-1].tobytes()
+    assert Integrator(CASE.system, continuous=True).advance(np.float32(1.0), grid).shape == (1, 6)
+
+
+@pytest.mark.parametrize("name", NO_GRIDS)
+def test_what_is_no_output_time_is_refused(name: str) -> None:
+    with pytest.raises(Refused, match=f"^grid: .*{NO_GRID[name]}"):
+        simulate(CASE, grid=NO_GRIDS[name])
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"setting": 1, "method": "rk4"}, {"accuracy": np.float32(1e-9)}, {"setting": np.float32(1e-6)},
+     {"setting": np.array(1e-9)}, {"max_events": 1e7}, {"max_work": np.int32(10**6)}, {"sampled": np.True_},
+     {"sampled": 1}, {"setting": np.int64(1), "method": "rk4"}],
+    ids=repr,
+)
+def test_what_a_run_takes_its_file_gives_back(tmp_path: Path, settings: dict[str, Any]) -> None:
+    run = simulate(CASE, grid=TIMES, **settings)
+    path = str(tmp_path / "run.npz")
+    run.save(path)
+    again = load(path)
+    assert again.state.tobytes() == run.state.tobytes()
+    assert (again.setting, again.sampled) == (run.setting, run.sampled)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [({"max_work": float("nan")}, "max_work: nan"), ({"max_events": "9"}, "max_events: '9'"),
+     ({"max_events": 2.5}, "max_events: 2.5"), ({"max_events": True}, "max_events: True"),
+     ({"accuracy": "1e-9"}, "exact: accuracy: '1e-9'"),
+     ({"method": "rk4", "setting": "1"}, "rk4: step: '1'"), ({"max_work": -1}, "max_work: -1")],
+)
+def test_settings_that_are_none(settings: dict[str, Any], words: str) -> None:
+    with pytest.raises(Refused, match=rf"^{words} is"):
+        simulate(CASE, **settings)
+
+
+def test_columns_of_an_ensemble_of_any_kind() -> None:
+    gains = [2.0, 5.0]
+    expected = ensemble(CASE, {GAIN: gains}, ["last_state"]).columns["x_left_end"].tolist()
+    frame = pandas.DataFrame({GAIN: gains})
+    for changes in (frame, {GAIN: pandas.Series(gains)}, {GAIN: np.array(gains, dtype=np.float32)},
+                    {GAIN: np.array([2, 5])}, {GAIN: (gain for gain in gains)}, {GAIN: xarray.DataArray(gains)}):
+        assert ensemble(CASE, changes, "last_state").columns["x_left_end"].tolist() == expected
+    for wrong in (["2.0"], 2.0, [[2.0]], [True], "2.0", [None]):
+        with pytest.raises(Refused, match=f"^changes: {GAIN}: "):
+            ensemble(CASE, {GAIN: wrong})
+    with pytest.raises(Refused, match=r"^max_work: nan is not allowed; allowed: a whole number >= 1$"):
+        ensemble(CASE, {GAIN: gains}, setup=Setup(max_work=float("nan")))  # type: ignore[arg-type]
+    assert ensemble(CASE, {GAIN: gains}, setup=Setup(settled=np.float32(0.5), max_events=1e5)).done.all()  # type: ignore[arg-type]
+
+
+def test_a_plan_of_numpy_numbers_goes_to_its_file(tmp_path: Path) -> None:
+    axes = (Axis(GAIN, np.int64(1), np.float32(2.0), np.int64(2)),)  # type: ignore[arg-type]
+    plan = Plan(CASE, Setup(("touches",), np.float32(1e-9), max_work=np.int64(10**6)), axes, seed=np.int32(1))  # type: ignore[arg-type]
+    run_map(plan, str(tmp_path / "map.zarr"))
+    assert run_map(plan, str(tmp_path / "map.zarr")).spans == []
+
+
+def test_what_says_that_it_is_frozen_is() -> None:
+    run, table = simulate(CASE, sampled=True), ensemble(CASE, {GAIN: [2.0]})
+    for array in (run.t, run.state, run.event_table, run.command, run.inputs, CASE.system.bodies, CASE.system.state,
+                  table.columns["touches_left"], table.changes[GAIN], table.status):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    for mapping in (CASE.values, CASE.values["object"], table.columns, table.stops, run.controllers):
+        with pytest.raises(TypeError):
+            mapping["mass_kg"] = 1.0  # type: ignore[index]
+    for record in (CASE, run, table):
+        for other in (pickle.loads(pickle.dumps(record)), copy.deepcopy(record), copy.copy(record)):
+            assert type(other) is type(record)
+    assert pickle.loads(pickle.dumps(run)).state.tobytes() == run.state.tobytes()
+    assert copy.deepcopy(CASE) == CASE
+
+
+def test_the_columns_that_are_handed_over_stay_writable() -> None:
+    grid, gains = np.array(TIMES), np.array([2.0])
+    simulate(CASE, grid=grid)
+    ensemble(CASE, {GAIN: gains})
+    grid[0], gains[0] = 0.0, 1.0
+    assert simulation.load is load
