@@ -31,7 +31,7 @@ from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
-from grasp_ros.physics.layout import Filled, Of, Outcome, Pair, U, Work
+from grasp_ros.physics.layout import Filled, Of, Outcome, Pair, U, Work, X
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -53,7 +53,7 @@ class Status(Enum):
     STALLED = "stopped: a search for the next event does not end, or the time does not advance"
 
 
-_OUTPUTS, _EVENTS, _FILLED = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled)
+_OUTPUTS, _EVENTS, _FILLED, _WORK = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled), len(Work)
 _NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
 _UNKNOWN = [int(Pair.UNKNOWN)] * 3
 _DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
@@ -114,12 +114,13 @@ class Integrator:
         max_work: int = MAX_WORK,
     ) -> None:
         self._accuracy = check_accuracy(accuracy)
-        state = np.asarray(system.state, dtype=float)
-        if state.shape != (6,) or not all(map(math.isfinite, state.tolist())):
-            raise Refused(f"state: {state!r} is not an array of six finite numbers")
+        begin = np.asarray(system.state, dtype=float)
+        state = begin.tolist()  # of few numbers lists are faster than arrays
+        if begin.shape != (6,) or not all(map(math.isfinite, state)):
+            raise Refused(f"state: {begin!r} is not an array of six finite numbers")
         self.status = Status.DONE
         self.progress: Callable[[float], object] | None = None  # told the time in s every BREATH units of work
-        self.work = np.zeros(len(Work), dtype=np.int64)
+        self.work = np.zeros(_WORK, dtype=np.int64)
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self.system, self.continuous = system, continuous
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
@@ -127,13 +128,12 @@ class Integrator:
         self._mode = np.array(_UNKNOWN)
         self.plant, self.records = plant_of(self._plant_block), state_of(self._state_block, self._mode)
         given = system.closed_loop if continuous else system.bodies
-        self.plant.given[:] = self.plant.bodies[:] = given
+        self.plant.given[:] = given  # `bodies` follow from it
         for body in system.absent:  # what is not there rests at 0 without any force
-            self.plant.given[body, Of.MASS] = self.plant.bodies[body, Of.MASS] = 1.0
+            self.plant.given[body, Of.MASS] = 1.0
         self.plant.pairs[:], self._plant_block[COULOMB] = system.pairs, system.coulomb
         self.plant.own[:] = given[:, Of.FORCE]
-        self.records.y[:6] = state
-        self.records.y[6:] = state[0] - state[2], state[2] - state[4]
+        self.records.y[:] = *state, state[X.L] - state[X.O], state[X.O] - state[X.R]
         self.records.rest[SINCE] = math.inf
         self._events: list[Array] = []
         self._event_count = 0

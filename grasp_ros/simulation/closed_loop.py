@@ -40,7 +40,9 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> 
     Refused
         If there is no such arm, or what is to control it cannot be called.
     """
-    found = {}
+    found: dict[int, Foreign] = {}
+    if not controllers:
+        return found
     arms = [side for side, body in SIDES.items() if scene.system.bodies[body, Of.MASS] > 0.0]
     for side, law in controllers.items():
         if side not in arms:

@@ -120,6 +120,8 @@ def simulate(
 
 def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:
     """Refuse more control periods, each of which costs a piece of work at least, than the budget lets a run do."""
+    if not (sampled or scene.system.external):
+        return
     changes = [length_hint(force.changes(scene.ticks)) for force in scene.system.external]
     ticks, most = scene.ticks if sampled else max(changes, default=0), max(MAX_WORK, max_work)
     if ticks > most:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.compilation.jit import kernel, whole
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import (
     approach,
@@ -25,7 +25,7 @@ from grasp_ros.exact.records import Array, Leaning, Plant, State
 from grasp_ros.exact.tolerances import CLAMPS, DERIVATIVE, SHORT_START, SURFACE, TURNS
 from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
 
-LOWEST, HIGHEST = 2, 6  # derivatives
+LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # derivatives; typed, or each is compiled anew
 UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
 
 
@@ -56,7 +56,7 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
     if closed and state.mode[beside] == Pair.CONTACT and y[U.L + beside] > 0.0:
         push, pace = impact_beside(plant, state, side)
-        found = first_difference(plant, y, side, push, pace, LOWEST, 3)
+        found = first_difference(plant, y, side, push, pace, LOWEST, NEXT)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
     found = own_difference(plant, y, side, LOWEST)
     begins = closed and own_motion(plant, y, beside).order < NEVER
@@ -144,7 +144,7 @@ def parts(plant: Plant, y: Array, side: Body) -> bool:
     if not d < 0.0:
         return False
     t = y[U.L + side] / -d
-    a, jerk = abs(difference(plant, y, side, 2)[0]), abs(difference(plant, y, side, 3)[0])
+    a, jerk = abs(difference(plant, y, side, LOWEST)[0]), abs(difference(plant, y, side, NEXT)[0])
     change = max(t * a, 0.5 * t * (t * jerk))  # in this order, because squares underflow
     clamps = 0.0 < surface_factor(plant, y, side, SURFACE) < CLAMPS * loss * change
     return bool(TURNS * change < -d and not clamps)

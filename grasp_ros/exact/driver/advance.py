@@ -91,19 +91,19 @@ def advance(
     Returns
     -------
     int
-        A `layout.Outcome`. If it is none of DONE, EVENTS_FULL, WORK_USED and NO_COMMAND, `rows` holds nothing of the
-        segment that failed.
+        Value of a `layout.Outcome`: to make a member of an enum for Python costs a microsecond. If it is none of DONE,
+        EVENTS_FULL, WORK_USED and NO_COMMAND, `rows` holds nothing of the segment that failed.
     """
     tables, plant, state = tables_in(block, order), plant_in(plant_block), state_in(state_block, mode)
     settings = new_settings(tolerance, order, plant.given)
     out = Output(grid, rows, events, filled, work, observer)
     if loop.lengths.shape[0] == 0:
-        return answer_end(state, loop)
+        return answer_end(state, loop).value
     end, idle, before, enters = 0.0, 0, Level(0.0, 0.0, 0.0, 0.0), True
     while True:
         if enters:
             if not open_interval(plant, state, loop):
-                return Outcome.NO_COMMAND
+                return Outcome.NO_COMMAND.value
             end, out = loop.lengths[loop.place[Place.INTERVAL]], enter_interval(plant, state, loop, out, grid)
             idle, before, enters = 0, energy_level(plant, state, 0.0), False
             keep_scale(state, before)
@@ -114,7 +114,7 @@ def advance(
         if enters:
             continue
         if outcome != Outcome.GO_ON:
-            return outcome
+            return outcome.value
         settle_pairs(plant, state, settings, out)
         if rests(plant, state):
             rest(state, loop)
@@ -123,12 +123,12 @@ def advance(
         modes = (state.mode[LEFT], state.mode[RIGHT])
         segment, ends = next_segment(tables, plant, state, settings, span, out.work)
         if math.isnan(segment.t):
-            return Outcome.STALLED
+            return Outcome.STALLED.value
         end_segment(tables, plant, state, settings, segment, ends, out)
         idle = 0 if segment.t > 0.0 else idle + 1
         after = energy_level(plant, state, segment.t)
         outcome = check_segment(plant, state, settings, before, after, segment.t, idle, modes)
         if outcome != Outcome.GO_ON:
             out.filled[Filled.OUTPUTS] = reached
-            return outcome
+            return outcome.value
         before = after

@@ -150,7 +150,7 @@ def state_in_flight(tables: Tables, plant: Plant, segment: Segment, settings: Se
         at[X.R], at[V.R], _, _ = fly(segment.flights.right, tau)
         return expanded
     part = math.floor(tau * 2.0 * rate)
-    begin = part / (2.0 * rate) if part > 0.0 else 0.0
+    begin = part * (0.5 / rate) if part > 0.0 else 0.0  # exact: the rate is a power of two
     if part != expanded:
         expand_flight(plant.bodies, segment.flights, begin, tables.c)
     values(tables.c, FLIGHT_ORDER, tau - begin, at)
