@@ -70,7 +70,7 @@ def raw(path: str | os.PathLike[str]) -> Iterator[Stored]:
         If the path is not such a bag, or if it is damaged.
     """
     with decoding(path, KIND, BagError):
-        yield from open_storage(path).messages()
+        yield from open_storage(Path(path)).messages()
 
 
 def read(path: str | os.PathLike[str]) -> Recording:

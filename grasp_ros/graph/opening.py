@@ -21,7 +21,7 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 
 
-def open_storage(path: str | os.PathLike[str], salvage: bool = False) -> Storage:
+def open_storage(path: Path, salvage: bool = False) -> Storage:
     """The storage file of a bag, or of a directory that holds one.
 
     Raises
