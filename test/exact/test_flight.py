@@ -74,7 +74,8 @@ def root(
     u = sign * (x - x_o)
     y[U.L + side] = u
     launched = [launch(rows[row], *map(float, at[2 * (row == OBJECT) :][:2])) for row in (LEFT, RIGHT, OBJECT)]
-    pair = pair_in_flight.py_func(Plant(rows, rows, pairs, 0.0), y, Flights(*launched), side)
+    uncompiled = getattr(pair_in_flight, "py_func", pair_in_flight)  # there is one only where kernels are compiled
+    pair = uncompiled(Plant(rows, rows, pairs, 0.0), y, Flights(*launched), side)
     at = Motion(x, v, x_o, v_o, u, sign * (v - v_o), abs(x) + abs(x_o))
     found, known = first_root(kind, pair, 0.0, at, span, math.inf, work)
     assert known == math.inf

@@ -180,6 +180,14 @@ def test_the_force_of_the_other_pair_decides_with_its_value_and_its_rate(side: B
 
 
 @SIDES
+def test_drag_of_the_object_lessens_what_the_force_of_the_other_pair_does(side: Body) -> None:
+    """The force accelerates 2 kg by 5 m/s^2, which the arm balances; its rate gives 150 m/s^3, and 0.8 N s/m take 2."""
+    b = bench(side, 0.0, 0.0, beside=(0.01, 0.2), beside_mode=Pair.CONTACT, p=0.0, push=-5.0)
+    b.plant.bodies[OBJECT, Of.MASS], b.plant.bodies[OBJECT, Of.DAMPING] = 2.0, 0.8
+    assert leaning(b.plant, b.state, side) == pytest.approx((3.0, 148.0))
+
+
+@SIDES
 @pytest.mark.parametrize("push", [-3.0, 3.0])
 def test_a_force_that_only_begins_at_the_surface_decides_with_its_rate(side: Body, push: float) -> None:
     """At u' = -1/p the force is zero; what pushes the other arm off that surface lets it grow, either way."""

@@ -8,7 +8,7 @@ import uuid
 from functools import cache
 from pathlib import Path
 
-COMPILING = "compiling the kernels; this happens once after an installation and takes some 20 s"
+COMPILING = "compiling the kernels; this happens once after an installation and takes up to a minute"
 
 PACKAGE = Path(__file__).parents[2]
 COMPILED_ROOMS = "physics", "exact", "observe", "methods"
