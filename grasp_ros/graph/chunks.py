@@ -9,11 +9,14 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Iterator
+from importlib.metadata import version
 
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex
 from mcap.writer import Writer
+
+from grasp_ros.graph.rosbag2 import BagError
 
 HEAD = struct.Struct("<BQ")  # opcode and length of every record
 RECORD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
@@ -37,13 +40,13 @@ class Messages:
 
     Raises
     ------
-    AttributeError
-        If the writer is of another make than the one that is known here: it has no other door.
+    BagError
+        If the writer is of another make than those that pyproject.toml allows: it has no public door for this.
     """
 
     def __init__(self, writer: Writer) -> None:
-        if getattr(writer, _INDEXES):
-            raise AttributeError(_INDEXES)
+        if getattr(writer, _INDEXES, None) != [] or not hasattr(writer, _CHUNK) or not hasattr(writer, _STATISTICS):
+            raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.2,<1.7")
         setattr(writer, _INDEXES, _ChunkIndexes())
         self._writer, self._chunk, self._statistics = writer, getattr(writer, _CHUNK), getattr(writer, _STATISTICS)
         self.counts: Counter[int] = Counter()

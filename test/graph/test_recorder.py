@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import multiprocessing
 import os
 import re
@@ -19,6 +20,7 @@ import yaml
 from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
+from mcap.writer import Writer as LibraryWriter
 from mcap_ros2.decoder import DecoderFactory
 from processes import wait_for
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -246,6 +248,19 @@ def test_the_library_would_write_the_same_bytes(
     own = record(tmp_path / "own")
     monkeypatch.setattr(Messages, "add", add)
     assert record(tmp_path / "library") == own
+
+
+def test_a_writer_of_the_library_that_has_moved_is_refused_in_a_sentence() -> None:
+    """And that of this library has not: what the recorder takes of it is where it was."""
+    Messages(LibraryWriter(io.BytesIO()))
+    for name in ("chunk_builder", "chunk_indices", "statistics"):
+        writer = LibraryWriter(io.BytesIO())
+        delattr(writer, f"_Writer__{name}")
+        with pytest.raises(bag.BagError, match=r"mcap \S+: its writer is another one; allowed: mcap>=1\.2,<1\.7"):
+            Messages(writer)
+    [bound] = [line for line in (Path(__file__).parents[2] / "pyproject.toml").read_text().splitlines()
+               if '"mcap>' in line]
+    assert bound.strip() == '"mcap>=1.2,<1.7",'
 
 
 def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:

@@ -16,9 +16,8 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.limits import Limits
+from grasp_ros.graph.nodes.admission import Limits, Recorded
 from grasp_ros.graph.nodes.peers import Gone, Need
-from grasp_ros.graph.nodes.recorded import Recorded
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.graph.nodes.timing import Timing

@@ -15,11 +15,9 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.limits import Limits
+from grasp_ros.graph.nodes.admission import Limits, Recorded, Sources
 from grasp_ros.graph.nodes.node import UNKNOWN
 from grasp_ros.graph.nodes.peers import Gone, Need
-from grasp_ros.graph.nodes.recorded import Recorded
-from grasp_ros.graph.nodes.sources import Sources
 from grasp_ros.graph.nodes.steering import Steering
 from grasp_ros.graph.nodes.stepped import SteppedNode
 from grasp_ros.physics.model import Array

@@ -18,14 +18,13 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError, Recorder
 from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.admission import Limits, Sources
 from grasp_ros.graph.nodes.beats import digest
 from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen
 from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.limits import Limits
 from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, Phase
 from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.nodes.sources import Sources
 from grasp_ros.graph.nodes.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
 from grasp_ros.graph.rosbag2 import lyapunov_template
 from grasp_ros.graph.running import Running

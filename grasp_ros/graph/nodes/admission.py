@@ -1,0 +1,156 @@
+"""What a plant and a monitor admit: commands that can be true, of a source that is known, up to where the monitor is.
+
+Who sent a message is not known to whoever gets it. But a reader knows how many writers it has ever been connected with,
+and a writer is connected before its first message comes. So while that number stands, all messages come from the same
+source; what comes when it has just changed may come from another one, also if that has already left.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from rclpy.event_handler import QoSSubscriptionEventType
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.subscription import Subscription
+
+from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.nodes.messages import Command
+from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
+from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.scene import Scene
+from grasp_ros.scene.topics import CHANGES, COMMANDS, LYAPUNOV, WINDOW, Topic
+
+
+class Limits:
+    """The largest forces that act, as the scene and the announcements of its controllers have them.
+
+    The package's own controllers keep to the limit. A command of another one that does not is neither taken nor cut:
+    the actuator would not do it, and nobody has computed what it would do instead.
+
+    Parameters
+    ----------
+    node : GraspNode
+    scene : Scene
+    """
+
+    def __init__(self, node: GraspNode, scene: Scene) -> None:
+        self._node = node
+        self._limits: dict[Topic, float] = {}
+        for side, topic in COMMANDS.items():
+            numbers = scene.values.get(f"{side}_actuator", {})
+            if "limit_N" in numbers and topic in scene.controllers.values():
+                self._limits[topic] = float(numbers["limit_N"])
+                node.subscribe(CHANGES[side], partial(self._on_change, topic, f"{side}_actuator.limit_N"))
+
+    def _on_change(self, topic: Topic, name: str, message: Any) -> None:
+        for other, value in zip(message.name, message.position, strict=False):
+            if other == name and 0.0 <= value < math.inf:
+                self._limits[topic] = value
+
+    def allow(self, topic: Topic, command: Command | None) -> bool:
+        """Whether the actuator can do what a command says; None, what is no command, it cannot."""
+        return command is not None and abs(command[1]) <= self._limits.get(topic, math.inf)
+
+    def admit(self, topic: Topic, command: Command) -> bool:
+        """The same, and what it cannot do is counted."""
+        if allowed := self.allow(topic, command):
+            return allowed
+        self._node.refuse("commands beyond a limit", topic)
+        self._node.get_logger().warning(
+            f"{topic.name}: {command[1]:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N",
+            throttle_duration_sec=PATIENCE_SECONDS,
+        )
+        return allowed
+
+
+class Sources:
+    """The sources of a topic, as a reader is connected with them.
+
+    Parameters
+    ----------
+    subscription : Subscription
+    seconds : float
+        After a change for which a message may be somebody else's.
+
+    Attributes
+    ----------
+    now : int
+        How many there are.
+    """
+
+    def __init__(self, subscription: Subscription, seconds: float) -> None:
+        # Asked at every message, in the order of the messages: an event of the executor would come before or after.
+        with subscription.handle:
+            self._matches = rclpy_implementation.EventHandle(
+                subscription.handle, QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED
+            )
+        self._seconds, self._until, self._ever, self.now = seconds, 0.0, -1, 0
+
+    def begin(self) -> None:
+        """Take those that are there as known."""
+        self._look()
+        self._until = 0.0
+
+    def settled(self) -> bool:
+        """Whether it has been the same ones for a while."""
+        now, before = time.monotonic(), self._ever
+        self._look()
+        if before not in (-1, self._ever):
+            self._until = now + self._seconds
+        return now >= self._until
+
+    def alone(self) -> bool:
+        """Whether there is one, the same for a while."""
+        return self.settled() and self.now < 2
+
+    def _look(self) -> None:
+        with self._matches:
+            status = self._matches.take_event()
+        if status is not None:
+            self._ever, self.now = status.total_count, status.current_count
+
+
+class Recorded:
+    """The last tick that the monitor has complete, as it says itself.
+
+    Parameters
+    ----------
+    plant : SteppedNode
+    then : callable
+        Called when there is a new one.
+
+    Attributes
+    ----------
+    tick : int
+        -1: none of this run.
+    heard : float, s
+        Wall time at which that was said; -inf: never.
+    """
+
+    def __init__(self, plant: SteppedNode, then: Callable[[], None]) -> None:
+        self._plant, self._then = plant, then
+        self.tick, self.heard = -1, -math.inf
+        plant.counters["refused records"] = 0
+        if plant.monitored:
+            plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
+
+    def forget(self) -> None:
+        """Begin anew: the plant was reset."""
+        self.tick = -1
+
+    def outrun(self, lead: int = WINDOW) -> bool:
+        """Whether the plant has to wait for its monitor: it is more than some ticks ahead."""
+        return self._plant.monitored and self._plant.tick - self.tick > lead
+
+    def _on_lyapunov(self, cdr: bytes) -> None:
+        stamp = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
+        tick, rest = divmod(stamp, self._plant.scene.period_ns)
+        if rest or not max(self.tick, 0) <= tick <= self._plant.tick:
+            self._plant.refuse("refused records", LYAPUNOV)
+            return
+        self.tick, self.heard = tick, time.monotonic()
+        self._then()
