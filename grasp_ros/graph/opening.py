@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection, Iterator
 from itertools import chain, islice
 from pathlib import Path
@@ -29,6 +30,7 @@ def open_storage(path: Path, salvage: bool = False) -> Storage:
     BagError
         If there is none, or more than one.
     """
+    path = Path(path)
     with decoding(path, KIND, BagError):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
         if len(files) == 1 and files[0].suffix != ".db3":
