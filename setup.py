@@ -10,7 +10,7 @@ setup(
     python_requires=">=3.11,<3.13",
     packages=[*find_packages(include=[NAME, f"{NAME}.*"]), f"{NAME}.config"],
     package_dir={f"{NAME}.config": "config"},  # scenes and layouts are part of the package however it is installed
-    package_data={NAME: ["py.typed"], f"{NAME}.config": ["*"]},
+    package_data={NAME: ["py.typed", "*.pyi"], f"{NAME}.config": ["*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

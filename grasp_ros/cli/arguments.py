@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import errno
+import glob
 import os
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,13 +13,16 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.cli.output import STDOUT, note
+from grasp_ros.cli.parser import Command as Command
+from grasp_ros.cli.parser import add_levels
 from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 
-Command = Callable[[argparse.Namespace], int]
+Options = argparse.ArgumentParser | argparse._ArgumentGroup
 STUDY_DIRECTORY = Path("runs") / "studies"
 ROW = 16  # numbers that a run keeps for each output time: time, state, commands, energies, and copies
 
@@ -27,14 +30,31 @@ ROW = 16  # numbers that a run keeps for each output time: time, state, commands
 def add_command(commands: Any, name: str, command: Command, text: str) -> argparse.ArgumentParser:
     """Add a subcommand; `command` is what it runs, and returns the exit status."""
     sub: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
-    sub.set_defaults(command=command)
+    sub.set_defaults(command=command, parser=sub)
+    add_levels(sub)
     return sub
+
+
+def add_json(sub: Options) -> None:
+    """The result as data."""
+    sub.add_argument("--json", action="store_true", help="print JSON instead of a table; null for what is not finite")
 
 
 def add_scene(sub: argparse.ArgumentParser) -> None:
     """One scene, with settings."""
-    sub.add_argument("scene", help="a name that `grasp scenes` lists, or the path of a .yaml file")
+    scene = sub.add_argument("scene", help="a name that `grasp scenes` lists, or the path of a .yaml file")
+    complete_scenes(scene)
     add_settings(sub)
+
+
+def complete_scenes(argument: argparse.Action) -> None:
+    """Let a shell complete the names of scenes, and files, in place of an argument."""
+    argument.completer = _scenes_and_files  # type: ignore[attr-defined]
+
+
+def _scenes_and_files(prefix: str, **_: object) -> list[str]:
+    files = [str(path) for path in Path().glob(f"{glob.escape(prefix)}*") if path.is_dir() or path.suffix == ".yaml"]
+    return [*scenes.names(), *files]
 
 
 def add_settings(sub: argparse.ArgumentParser) -> None:
@@ -55,10 +75,10 @@ def load_scene(reference: str, settings: Sequence[str] = ()) -> Scene:
 def warn(scene: Scene) -> None:
     """Print what a scene can hardly mean, a line each."""
     for warning in scene.warnings:
-        print(f"grasp: warning: {scene.name}: {warning}", file=sys.stderr)
+        note(f"grasp: warning: {scene.name}: {warning}")
 
 
-def add_accuracy(sub: argparse.ArgumentParser) -> None:
+def add_accuracy(sub: Options) -> None:
     """The accuracy of `exact`."""
     sub.add_argument(
         "--accuracy", type=float, default=ACCURACY, metavar="A",
@@ -66,12 +86,12 @@ def add_accuracy(sub: argparse.ArgumentParser) -> None:
     )
 
 
-def add_output(sub: argparse.ArgumentParser, metavar: str, text: str, default: Path | None = None) -> None:
+def add_output(sub: Options, metavar: str, text: str, default: Path | None = None) -> None:
     """A file or a directory to write."""
     sub.add_argument("-o", "--output", type=Path, default=default, metavar=metavar, help=text)
 
 
-def add_force(sub: argparse.ArgumentParser) -> None:
+def add_force(sub: Options) -> None:
     """Whether a file that is there may be replaced."""
     sub.add_argument("--force", action="store_true", help="replace the output file if it is there")
 
@@ -84,6 +104,8 @@ def check_output(output: Path, force: bool, inputs: Sequence[str] = ()) -> None:
     Refused
         Names the file.
     """
+    if output == STDOUT:
+        return
     with writing(output):
         if not (output.is_file() or output.is_dir()):
             output.parent.stat()
@@ -134,5 +156,5 @@ def prepare() -> None:
     from grasp_ros.exact.integrator import compile_kernels
 
     if not kernels_on_disk():
-        print(COMPILING, file=sys.stderr)
+        note(COMPILING)
     compile_kernels()

@@ -13,8 +13,18 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare, warn
+from grasp_ros.cli.arguments import (
+    add_accuracy,
+    add_command,
+    add_json,
+    add_output,
+    add_scene,
+    load_scene,
+    prepare,
+    warn,
+)
 from grasp_ros.cli.controllers import sides_of
+from grasp_ros.cli.output import show
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check, network
 from grasp_ros.graph.processes import Graph, GraphError, become
@@ -62,6 +72,7 @@ def add_to(commands: Any) -> None:
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
     sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
     sub.add_argument("bag", type=Path)
+    add_json(sub)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
     _add_limits(sub)
     sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
@@ -80,6 +91,7 @@ def add_to(commands: Any) -> None:
     _add_network(sub)
     sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
     sub.add_argument("bag", type=Path)
+    add_json(sub)
 
 
 def _add_limits(sub: argparse.ArgumentParser) -> None:
@@ -232,7 +244,9 @@ def _inspect(options: argparse.Namespace) -> int:
         prepare()
         comparison = compare_recording(recording)
         rows, equal = rows + comparison.rows, comparison.equal
-    print(report.table(rows))
+    show(options, report.table(rows), {
+        **report.data_of(rows), "ticks": len(recording.tick), "alarms": recording.alarms, "messages": recording.counts,
+        "missing": recording.missing, "equal": equal if options.replay else None})
     return 0 if equal and _keeps(recording, options) else 1
 
 
@@ -270,5 +284,5 @@ def _verify(options: argparse.Namespace) -> int:
     found = verify(recording)
     laws = [(f"{side} controller", law) for side, law in laws_of(recording).items()]
     rows = [("bag", str(recording.path)), ("run", recording.running.words), *laws, ("verified", found.words)]
-    print(report.table(rows))
+    show(options, report.table(rows), {**report.data_of(rows), "holds": found.holds})
     return 0 if found.holds else 1

@@ -11,36 +11,46 @@ import errno
 import io
 import os
 import sys
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from importlib import import_module
 
-from grasp_ros.cli.arguments import Command
+from grasp_ros.cli.commands import COMMANDS, overview
+from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.disk import FULL
 from grasp_ros.graph.stopping import raise_on_signals
 from grasp_ros.physics.errors import Refused
 
-SUBJECTS = {  # files of this room, and their commands: what is not asked for is not imported, which takes a while
-    "simulate": ("scenes", "methods", "simulate"), "map": ("map",),
-    "graph": ("run", "recover", "inspect", "replay", "watch", "ctl", "verify"), "plot": ("plot",),
-}
+HELP = f"""\
+Simulate, run, inspect and draw a grasp that collides.
+
+{overview()}
+
+`grasp COMMAND --help` says more; `grasp --version` says which. Begin with `grasp simulate case_01`.
+"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point of `grasp`; returns the exit status."""
+    if "_ARGCOMPLETE" in os.environ:
+        complete(_parser)
     words = sys.argv[1:] if arguments is None else arguments
-    return run(lambda: _parser(words[0] if words else ""), words)
+    return run(lambda: _parser(words), words)
 
 
 def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> int:
     """Run the command that the words name; returns the exit status."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:  # it was closed before we began
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115 - for as long as we live
     try:
         status = _status(parser, words)
         sys.stdout.flush()  # here, where it can still be said that it failed
         return status
     except OSError as error:
         enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
-        if not enough and error.errno not in (*FULL, errno.EIO):  # EIO: the terminal is gone
+        if not enough and error.errno not in (*FULL, errno.EIO, errno.EBADF):  # EIO: the terminal is gone
             raise
         if error.errno in FULL:
             with suppress(OSError):
@@ -55,24 +65,72 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
     """Run a command; in one line what it refuses."""
     try:
         raise_on_signals()
+        begin = time.monotonic()
         options = parser().parse_args(words)
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
-        return command(options)
+        if hasattr(options, "quiet"):
+            import_module("grasp_ros.cli.output").set_level(options)
+        status = command(options)
+        if getattr(options, "verbose", False):
+            _say_more(time.monotonic() - begin)
+        return status
     except Refused as error:
-        print(f"grasp: {' '.join(str(error).splitlines())}", file=sys.stderr)
+        print(shortened(f"grasp: {error}"), file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("grasp: interrupted", file=sys.stderr)
         return 130
+    except SystemExit as stop:  # of argparse, which has said why
+        return stop.code if isinstance(stop.code, int) else 0
 
 
-def _parser(wanted: str) -> argparse.ArgumentParser:
-    """A parser of one command, or of all of them where it is none."""
-    parser = argparse.ArgumentParser(prog="grasp", description="Simulate, run, inspect and draw a colliding grasp.")
-    commands = parser.add_subparsers(required=True, metavar="command")
-    known = [subject for subject, names in SUBJECTS.items() if wanted in names]
-    for subject in known or SUBJECTS:
-        import_module(f"grasp_ros.cli.{subject}").add_to(commands)
+def complete(parser: Callable[[Sequence[str]], argparse.ArgumentParser]) -> None:
+    """Answer a shell that completes a command line, and end."""
+    import argcomplete
+
+    line = os.environ.get("COMP_LINE", "")[: int(os.environ.get("COMP_POINT", "0"))].split(" ")
+    words = line[1:-1]  # the last one is not complete yet
+    argcomplete.autocomplete(parser(words))
+
+
+def _say_more(seconds: float) -> None:
+    """What `-v` adds."""
+    from grasp_ros.exact.compilation.kernel_cache import cache_directory
+    from grasp_ros.scene.versions import versions
+
+    print(", ".join(f"{name} {version}" for name, version in versions().items()), file=sys.stderr)
+    print(f"kernels: {cache_directory()}\n{seconds:.3f} s", file=sys.stderr)
+
+
+class _Version(argparse.Action):
+    """Which one this is; asked for only then, because it takes a while to find out."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from importlib.metadata import version
+
+        print(f"grasp {version('grasp_ros')}")
+        parser.exit()
+
+
+class _Overview(Parser):
+    """The parser of `grasp` itself, whose help is one screen."""
+
+    def format_help(self) -> str:
+        return f"{self.format_usage()}\n{HELP}"
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    """A parser of the command that the words name, or of all names where they name none."""
+    parser = _Overview(prog="grasp", usage="grasp [--version] [-q | -v] COMMAND ...")
+    parser.add_argument("--version", action=_Version, nargs=0)
+    add_levels(parser, None)
+    commands = parser.add_subparsers(prog="grasp", required=True, metavar="command", parser_class=Parser)
+    wanted = next((word for word in words if not word.startswith("-")), "")
+    if wanted in COMMANDS:
+        import_module(f"grasp_ros.cli.{COMMANDS[wanted].module}").add_to(commands)
+    else:
+        for name in COMMANDS:
+            commands.add_parser(name)
     return parser

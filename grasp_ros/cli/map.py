@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_scene, load_scene, prepare, whole
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, load_scene, prepare, whole
+from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation.chunk import STATUSES, Setup
@@ -22,10 +23,10 @@ RANGE = "section.key=low:high[:n[:log]]"
 
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
-    text = "outcomes of many variants of a scene: a map over two numbers, or a sample; goes on after it was stopped"
-    sub = add_command(commands, "map", _map, text)
+    sub = add_command(commands, "map", _map, f"{COMMANDS['map'].text}; run it again to resume what was stopped")
     add_scene(sub)
     add_accuracy(sub)
+    add_json(sub)
     sub.add_argument("--x", metavar=RANGE, help="number along the map, n values (default 101), even or logarithmic")
     sub.add_argument("--y", metavar=RANGE, help="number up the map")
     sub.add_argument("--vary", action="append", default=[], metavar="section.key=low:high[::log]",
@@ -73,35 +74,49 @@ def _run(options: argparse.Namespace) -> int:
                   options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
     prepare()
-    with tqdm(total=plan.rows, unit="run", desc=scene.name, smoothing=0.05, disable=None) as bar:
+    with bar(plan.rows, "run", scene.name) as told:
         def progress(done: int, _: int) -> None:
-            bar.update(done - bar.n)
+            if told is not None:
+                told(done)
 
         run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
     data = store.read(options.output)
-    print(report(data))
+    show(options, report(data), data_of(data))
     for column in store.columns_of(data):
         path = options.output.with_name(f"{options.output.stem}_{column}.png")
         figures.draw(data, plan, column, path)
-        print(f"written to {path}")
-    print(f"written to {options.output}")
+        note(f"written to {path}")
+    note(f"written to {options.output}")
     return 0
+
+
+HEADS = {"least": 0.0, "5 %": 0.05, "median": 0.5, "95 %": 0.95, "largest": 1.0}
+
+
+def data_of(data: Any) -> dict[str, Any]:
+    """Of each outcome its quantiles, unit and number of infinite values; and how the runs ended."""
+    from grasp_ros.maps import store
+
+    found: dict[str, Any] = {}
+    for name in store.columns_of(data):
+        values = data[name].values.ravel()
+        finite = values[np.isfinite(values)]
+        cells = np.quantile(finite, [*HEADS.values()]).tolist() if len(finite) else [np.nan] * len(HEADS)
+        found[name] = {"units": data[name].attrs["units"], **dict(zip(HEADS, cells, strict=True)),
+                       "inf": int(np.isinf(values).sum())}
+    codes, counts = np.unique(data["status"].values, return_counts=True)
+    found["status"] = {STATUSES[code] if code >= 0 else "not done": int(count)
+                       for code, count in zip(codes, counts, strict=True)}
+    return found
 
 
 def report(data: Any) -> str:
     """A line for each outcome, and how the runs ended."""
-    from grasp_ros.maps import store
-
-    names = store.columns_of(data)
-    width = max(map(len, [*names, "status"]))
-    heads = ("least", "5 %", "median", "95 %", "largest", "inf")
-    lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in heads)]
-    for name in names:
-        values = data[name].values.ravel()
-        finite = values[np.isfinite(values)]
-        cells = np.quantile(finite, (0.0, 0.05, 0.5, 0.95, 1.0)) if len(finite) else np.full(5, np.nan)
-        lines.append(f"{name:<{width}}" + "".join(f"{cell:12.6g}" for cell in cells) + f"{np.isinf(values).sum():12d}")
-    codes, counts = np.unique(data["status"].values, return_counts=True)
-    ended = ", ".join(f"{STATUSES[code] if code >= 0 else 'not done'} {count}" for code, count in zip(
-        codes, counts, strict=True))
+    found = data_of(data)
+    width = max(map(len, found))
+    lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in (*HEADS, "inf"))]
+    for name, row in found.items():
+        if name != "status":
+            lines.append(f"{name:<{width}}" + "".join(f"{row[head]:12.6g}" for head in HEADS) + f"{row['inf']:12d}")
+    ended = ", ".join(f"{name} {count}" for name, count in found["status"].items())
     return "\n".join([*lines, f"{'status':<{width}}  {ended}"])

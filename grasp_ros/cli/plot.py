@@ -20,6 +20,8 @@ from grasp_ros.cli.arguments import (
     prepare,
     warn,
 )
+from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.output import STDOUT, destination
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
@@ -30,7 +32,7 @@ Span = tuple[float, float] | None
 
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
-    sub = add_command(commands, "plot", _plot, "draw bags, files of `grasp simulate`, or scenes, side by side")
+    sub = add_command(commands, "plot", _plot, COMMANDS["plot"].text)
     sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+")
     add_settings(sub)
     sub.add_argument("--sampled", action="store_true", help="scenes: hold each command over a control period")
@@ -39,7 +41,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
-    add_output(sub, "FILE", "image file, .png, .svg or .pdf (default: .png beside the source)")
+    add_output(sub, "FILE", "image, .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     add_force(sub)
 
 
@@ -59,8 +61,9 @@ def _plot(options: argparse.Namespace) -> int:
         if math.isfinite(span[1]) and span[1] > longest:
             raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
         span = span[0], min(span[1], longest)
-    plots.draw_several(motions, captions, output, width_mm=options.width, span=span)
-    print(f"written to {output}")
+    figure = plots.compose(motions, captions, width_mm=options.width, span=span)
+    with destination(output) as file:
+        plots.write(figure, file, "png" if output == STDOUT else plots.format_of(figure, output))
     return 0
 
 

@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.graph.recording import Recording
 from grasp_ros.methods.contract import UNITS
-from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import printable
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array, Mode
-from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
-from grasp_ros.simulation.chunk import Setup
-from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.losses import losses
-from grasp_ros.simulation.quantities import HORIZONS, SETTLED, by_output_times, impact_forces_of, settling_times
+from grasp_ros.simulation.quantities import SETTLED
+from grasp_ros.simulation.summary import MOTION, OUTPUTS
 
 Row = tuple[str, str]
 
@@ -33,89 +30,62 @@ def table(rows: Iterable[Row]) -> str:
     return printable("\n".join(f"{name:<{width}}  {value}" for name, value in rows))
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def describe_trajectory(trajectory: Trajectory) -> list[Row]:
-    """What happened in a simulation; inf and nan are shown as they are."""
-    level = trajectory.energy
-    method = METHODS[trajectory.method]
-    foreign = [(f"{side} controller", name) for side, name in trajectory.controllers.items()]
+def data_of(rows: Iterable[Row]) -> dict[str, str]:
+    """The same as data, by names without blanks."""
+    return {name.replace(",", "").replace(" ", "_"): value for name, value in rows}
+
+
+def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[Row]:
+    """What happened in a simulation, in words, with its `summary`; inf and nan are shown as they are."""
+    method, own = METHODS[trajectory.method], found["controllers"]
     rows = [
-        ("scene", trajectory.scene.title),
-        ("feedback", trajectory.scene.feedback_in_words(trajectory.sampled, bool(foreign))),
-        *foreign,
-        ("status", trajectory.stop or trajectory.status.value),
-        ("simulated", _simulated(trajectory)),
-        *([("at rest", f"from {trajectory.at_rest:.6g} s on")] if trajectory.at_rest is not None else []),
-        ("touches left, right", _touches(trajectory) if method.events else "not looked for"),
+        ("scene", found["title"]), ("feedback", found["feedback"]),
+        *((f"{side} controller", name) for side, name in own.items()),
+        ("status", trajectory.stop or trajectory.status.value), ("simulated", _simulated(found)),
+        *([("at rest", f"from {found['at_rest_s']:.6g} s on")] if "at_rest_s" in found else []),
+        ("touches left, right", _touches(found) if method.events else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
-        ("work", ", ".join(f"{number} {name}" for name, number in trajectory.counters.items())),
+        ("work", ", ".join(f"{number} {name}" for name, number in found["work"].items())),
     ]
-    if len(trajectory.t):
+    if "V_c_J" in found:
         ends = "both ends" if trajectory.status is Status.DONE else "first and last output"
-        rows.append((f"V_c of {PLANT_ALONE}" if foreign else f"V_c at {ends}", _ends(level.V_c)))
-        rows += _amounts(trajectory)
+        rows.append((f"V_c of {PLANT_ALONE}" if own else f"V_c at {ends}", _ends(found["V_c_J"])))
+        rows += _amounts(found)
     known = trajectory.scene.certificate_in_words(trajectory.sampled)
-    rows.append(("certificate", "none: V_c needs the energy of every controller" if foreign else known))
-    if not method.energy_check and len(trajectory.t):
-        rise = float((level.V_c - np.minimum.accumulate(level.V_c)).max())
-        rows.append(("risen by the method", f"{rise:.3g} J of V_c"))
+    rows.append(("certificate", "none: V_c needs the energy of every controller" if own else known))
+    if "V_c_rise_J" in found:
+        rows.append(("risen by the method", f"{found['V_c_rise_J']:.3g} J of V_c"))
     return _with_words(trajectory.scene, rows)
 
 
-def _simulated(trajectory: Trajectory) -> str:
+def _simulated(found: dict[str, Any]) -> str:
     """How far the output times go, and how far they should."""
-    end, times = trajectory.scene.duration, f"{len(trajectory.t)} output times"
-    if trajectory.status is Status.DONE:
-        return f"{end:g} s, {times}"
-    return f"{trajectory.t[-1] if len(trajectory.t) else 0.0:g} s of {end:g} s, {times}"
+    of = "" if found["status"] == Status.DONE.name else f" of {found['duration_s']:g} s"
+    return f"{found['reached_s']:g} s{of}, {found['output_times']} output times"
 
 
-def _amounts(trajectory: Trajectory) -> list[Row]:
+def _amounts(found: dict[str, Any]) -> list[Row]:
     """Settling times, largest forces, and the energy lost by cause, as far as the scene has them."""
-    system = trajectory.scene.system
     rows = []
-    if settled := _settled(trajectory):
-        rows.append((f"settled to {SETTLED:.0%}", settled))
-    exact, largest = _largest(trajectory)
-    shown = [f"{name} {value:.5g} N" for name, value in largest.items() if value > 0.0]
-    if shown:
-        rows.append(("largest forces" if exact else "largest at outputs", ", ".join(shown)))
-    if len(trajectory.t) > 1 and not system.external:
-        lost = losses(trajectory)
-        parts = [f"{name} {float(value):.4g}" for name, value in lost._asdict().items() if float(value) != 0.0]
-        how = "; trapezoidal rule at the output times" if parts and by_output_times(trajectory) else ""
+    if "settled_s" in found:
+        times, never = found["settled_s"], f"not within {found['settled_within_s']:g} s"
+        settled = ", ".join(f"{name} {time:.2f} s" for name, time in times.items())
+        rows.append((f"settled to {SETTLED:.0%}", settled if np.isfinite([*times.values()]).all() else never))
+    largest = [f"{name} {value:.5g} N" for name, value in found["largest_N"].items() if value > 0.0]
+    if largest:
+        exact = found["largest_of"] == MOTION
+        rows.append(("largest forces" if exact else "largest at outputs", ", ".join(largest)))
+    if "lost_J" in found:
+        parts = [f"{name} {value:.4g}" for name, value in found["lost_J"].items() if value != 0.0]
+        how = "; trapezoidal rule at the output times" if parts and found["lost_by"] == OUTPUTS else ""
         rows.append(("energy lost, J", (", ".join(parts) or "none") + how))
     return rows
 
 
-def _settled(trajectory: Trajectory) -> str:
-    """When each mass settled for good; nothing where V_c does not prove it, because it can rise or bounds no place."""
-    times, scene = settling_times(trajectory), trajectory.scene
-    if np.isnan(times).any():
-        return ""
-    if np.isinf(times).any():
-        looked = trajectory.t[-1] if by_output_times(trajectory) else HORIZONS * scene.duration
-        return f"not within {looked:g} s"
-    return ", ".join(f"{NAMES[body]} {times[COLUMN[body] // 2]:.2f} s" for body in scene.system.present)
-
-
-def _largest(trajectory: Trajectory) -> tuple[bool, dict[str, float]]:
-    """Largest inputs and impact forces in N: of the motion itself if it can be watched once more, or at the outputs."""
-    names = ("f_l", "f_r", "fw_l", "fw_r")
-    exact = trajectory.method == EXACT and trajectory.status is Status.DONE and not trajectory.controllers
-    if exact:
-        setup = Setup(accuracy=trajectory.setting, sampled=trajectory.sampled)
-        columns = ensemble(trajectory.scene, {}, ("peak_input", "peak_impact"), setup=setup, threads=1).columns
-        return True, dict(zip(names, (float(column[0]) for column in columns.values()), strict=True))
-    inputs, impacts = np.abs(trajectory.command).max(axis=0), impact_forces_of(trajectory).max(axis=0)
-    return False, dict(zip(names, [*inputs.tolist(), *impacts.tolist()], strict=True))
-
-
-def _touches(trajectory: Trajectory) -> str:
+def _touches(found: dict[str, Any]) -> str:
     """Touches of both sides; what is rare only where it happens."""
-    text = ", ".join(str(len(trajectory.times(Transition.TOUCH, side))) for side in (LEFT, RIGHT))
-    clamps = sum(len(trajectory.times(Transition.CLAMP, side)) for side in (LEFT, RIGHT))
-    sticks = len(trajectory.times(Transition.STICK, OBJECT))
+    clamps, sticks = sum(found["clamped"].values()), found["sticks"]
+    text = ", ".join(map(str, found["touches"].values()))
     return text + (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
 
 
@@ -175,7 +145,7 @@ def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
     return [*rows, *watch, *(("warning", warning) for warning in scene.warnings)]
 
 
-def _ends(values: Array) -> str:
+def _ends(values: Array | Sequence[float]) -> str:
     return f"{values[0]:.6g} J, {values[-1]:.6g} J (twice the energy)"
 
 

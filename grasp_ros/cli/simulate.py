@@ -1,18 +1,18 @@
-"""`grasp scenes`, `methods` and `simulate`: what there is, and a run without ROS."""
+"""`grasp simulate` and `methods`: a run without ROS, and the ways to integrate it."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-from tqdm import tqdm
 
-from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import (
     add_accuracy,
     add_command,
     add_force,
+    add_json,
     add_output,
     add_scene,
     check_memory,
@@ -21,54 +21,61 @@ from grasp_ros.cli.arguments import (
     prepare,
     whole,
 )
+from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.controllers import load_controllers
+from grasp_ros.cli.output import STDOUT, bar, destination, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation import GRID_POINTS, simulate
+from grasp_ros.simulation import GRID_POINTS, Trajectory, simulate
+from grasp_ros.simulation.tables import write_csv
+
+TABLE = (".csv",)  # endings of files that are tables; any other is a .npz file
 
 
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
-    add_command(commands, "scenes", _scenes, "list the scenes that come with the package")
-    text = "list the methods of integration: order, source, what each does at a touch"
-    add_command(commands, "methods", _methods, text)
-    sub = add_command(commands, "simulate", _simulate, "simulate a scene without ROS")
+    add_json(add_command(commands, "methods", _methods, COMMANDS["methods"].text))
+    sub = add_command(commands, "simulate", _simulate, COMMANDS["simulate"].text)
     add_scene(sub)
-    add_accuracy(sub)
     sub.add_argument("--grid", type=whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
-    sub.add_argument("--method", choices=METHODS, default=EXACT, help="way to integrate; see `grasp methods`")
-    setting = sub.add_mutually_exclusive_group()
-    setting.add_argument("--step", type=float, metavar="S", help="step in s of a method with a fixed step")
-    setting.add_argument("--tolerance", type=float, metavar="T", help="tolerance (rtol = atol) of an adaptive method")
-    sub.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N",
-                     help=f"budget of contact events (default {MAX_EVENTS})")
-    sub.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N",
-                     help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
                      help="a callable of tick, time, x and v in place of the scene's feedback; see docs/api.md")
-    add_output(sub, "FILE.npz", "write states, events, V and counters")
-    add_force(sub)
+    result = sub.add_argument_group("result")
+    add_output(result, "FILE", "write states, forces, V and, as .npz, events and counters; .csv, or - for the standard"
+                               " output, writes a table")
+    add_force(result)
+    add_json(result)
+    method = sub.add_argument_group("method")
+    add_accuracy(method)
+    method.add_argument("--method", choices=METHODS, metavar="M", default=EXACT,
+                        help=f"way to integrate, see `grasp methods` (default {EXACT})")
+    setting = method.add_mutually_exclusive_group()
+    setting.add_argument("--step", type=float, metavar="S", help="step in s of a method with a fixed step")
+    setting.add_argument("--tolerance", type=float, metavar="T", help="tolerance (rtol = atol) of an adaptive method")
+    method.add_argument("--max-events", type=whole(1), default=MAX_EVENTS, metavar="N",
+                        help=f"budget of contact events (default {MAX_EVENTS})")
+    method.add_argument("--max-work", type=whole(1), default=MAX_WORK, metavar="N",
+                        help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
 
 
-def _scenes(_: argparse.Namespace) -> int:
-    for name in scenes.names():
-        print(f"{name}  {scenes.load(name).title}")
-    return 0
-
-
-def _methods(_: argparse.Namespace) -> int:
-    for name, method in METHODS.items():
-        print(f"{name}\n  order: {method.order}\n  source: {method.source}\n  at a touch: {method.at_touch}")
-        print(f"  --{method.knob}, default {method.default:g}{UNITS[method.knob]}")
+def _methods(options: argparse.Namespace) -> int:
+    show(options, "\n".join(
+        f"{name}\n  order: {method.order}\n  source: {method.source}\n  at a touch: {method.at_touch}\n"
+        f"  --{method.knob}, default {method.default:g}{UNITS[method.knob]}" for name, method in METHODS.items()
+    ), [
+        {"name": name, "order": method.order, "source": method.source, "at_touch": method.at_touch, "knob": method.knob,
+         "default": method.default, "package": method.package} for name, method in METHODS.items()
+    ])
     return 0
 
 
 def _simulate(options: argparse.Namespace) -> int:
     from grasp_ros.cli.report import describe_trajectory, table
+    from grasp_ros.simulation.summary import summary
 
     scene = load_scene(options.scene, options.settings)
     setting, controllers = _setting(options), load_controllers(options.controllers)
@@ -78,18 +85,26 @@ def _simulate(options: argparse.Namespace) -> int:
         check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    silent = METHODS[options.method].knob == STEP
-    with tqdm(total=scene.duration, unit="s", desc=scene.name, disable=silent or None, delay=1.0) as bar:
+    with bar(scene.duration, "s", scene.name) as told:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,
-            progress=lambda reached: bar.update(reached - bar.n),
+            progress=None if METHODS[options.method].knob == STEP else told,
         )
-    print(table(describe_trajectory(trajectory)))
+    found = summary(trajectory)
+    show(options, table(describe_trajectory(trajectory, found)), found)
     if options.output is not None:
-        trajectory.save(options.output)
-        print(f"written to {options.output}")
+        _write(trajectory, options.output)
     return 0 if trajectory.status is Status.DONE else 1
+
+
+def _write(trajectory: Trajectory, path: Path) -> None:
+    """As a table, or with all that belongs to it."""
+    with destination(path) as file:
+        if path == STDOUT or path.suffix in TABLE:
+            write_csv(trajectory, file)
+        else:
+            trajectory.save(file)
 
 
 def _setting(options: argparse.Namespace) -> float | None:

@@ -14,6 +14,7 @@ from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number
 from grasp_ros.scene import PAPER, Scene
+from grasp_ros.scene.suggestion import allowed
 
 EXACT = "exact"
 MOST_STEPS = 1e9
@@ -94,7 +95,7 @@ def find(name: str) -> Method:
         If there is none.
     """
     if name not in METHODS:
-        raise Refused(f"method {name!r} is not allowed; allowed: {', '.join(METHODS)}")
+        raise Refused(f"method {name!r} is not allowed; {allowed(name, METHODS)}")
     return METHODS[name]
 
 

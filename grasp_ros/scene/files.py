@@ -6,7 +6,7 @@ import os
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from typing import BinaryIO
 from zipfile import BadZipFile
@@ -94,6 +94,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             part.replace(path.resolve())
         finally:
             part.unlink(missing_ok=True)
+
+
+def opened(target: str | os.PathLike[str] | BinaryIO) -> AbstractContextManager[BinaryIO]:
+    """A file to write, see `replacing`, or one that is open already and stays so."""
+    return replacing(target) if isinstance(target, (str, os.PathLike)) else nullcontext(target)
 
 
 @contextmanager

@@ -13,7 +13,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from grasp_ros import CONFIG
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
@@ -23,9 +22,12 @@ from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import read_text, reading
+from grasp_ros.scene.html import numbers_of, table
+from grasp_ros.scene.library import names, text_of
 from grasp_ros.scene.settings import apply
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
+from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
 from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, is_text, read_sections
 
@@ -180,13 +182,21 @@ class Scene(Frozen):
         for name, number in numbers.items():
             section, _, key = name.partition(".")
             if key not in self.values.get(section, {}):
-                raise SceneError(f"{self.name}: {name}: not in this scene; allowed: what it names")
+                known = [f"{own}.{key}" for own, found in self.values.items() for key in found]
+                raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(name, known)}")
             document[section][key] = number
         return _read(document, self.name, self.name)
 
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
         return dump(self._document())
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        words = [("scene", f"{self.name}: {self.title}"), ("watch", self.watch)]
+        words += [(name, text) for name, texts in (("reading", self.readings), ("warning", self.warnings))
+                  for text in texts]
+        return table([*words, *numbers_of(self.effects, self.values)])
 
     def _document(self) -> dict[str, Any]:
         """What a file with this scene holds."""
@@ -196,12 +206,6 @@ class Scene(Frozen):
             for section, numbers in self.values.items()
         }
         return {"title": self.title, "readings": list(self.readings), **watch, **values}
-
-
-def names() -> list[str]:
-    """Names of the scenes that come with the package, the paper's cases first."""
-    found = [entry.name.removesuffix(".yaml") for entry in CONFIG.iterdir() if entry.name.endswith(".yaml")]
-    return sorted(found, key=lambda name: (not name.startswith("case_"), name))
 
 
 def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:
@@ -228,9 +232,9 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
         text = read_text(path, SceneError)
         return parse(text, path.stem, str(path), settings)
     if reference not in names():
-        known = ", ".join(names())
-        raise SceneError(f"{reference}: no such scene; allowed: a path that ends in .yaml, or one of {known}")
-    return parse((CONFIG / f"{reference}.yaml").read_text(encoding="utf-8"), reference, reference, settings)
+        known = allowed(reference, names(), "a path that ends in .yaml, or one of ")
+        raise SceneError(f"{reference}: no such scene; {known}")
+    return parse(text_of(reference), reference, reference, settings)
 
 
 def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Scene:

@@ -9,6 +9,7 @@ from typing import Any
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.strict_yaml import load
+from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.validation import SceneError
 
 
@@ -38,12 +39,12 @@ def _apply(setting: str, document: dict[Any, Any]) -> None:
     section, key, value = match.groups()
     if key is None:
         if section not in BY_SECTION:
-            raise SceneError(f"--set {setting}: no such section; allowed: {', '.join(BY_SECTION)}")
+            raise SceneError(f"--set {setting}: no such section; {allowed(section, BY_SECTION)}")
         document.setdefault(section, {})
         return
     known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
     if f"{section}.{key}" not in known:
-        raise SceneError(f"--set {setting}: no such key; allowed: {', '.join(known)}")
+        raise SceneError(f"--set {setting}: no such key; {allowed(f'{section}.{key}', known)}")
     try:
         number = load(value)
     except Refused as error:

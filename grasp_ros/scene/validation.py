@@ -12,6 +12,7 @@ from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.effects.base import Effect
 from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.suggestion import allowed as what_is_allowed
 
 SOMETHING = frozenset(("left_arm", "object", "right_arm"))
 
@@ -38,8 +39,8 @@ def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequ
     """
     for key in found:
         if key not in allowed:
-            known = ", ".join(allowed)
-            raise SceneError(f"{source}: {prefix}{key}: unknown key with the value {found[key]!r}; allowed: {known}")
+            meant = what_is_allowed(f"{prefix}{key}", [f"{prefix}{known}" for known in allowed])
+            raise SceneError(f"{source}: {prefix}{key}: unknown key with the value {found[key]!r}; {meant}")
     for key in needed:
         if key not in found:
             optional = ", ".join(key for key in allowed if key not in needed)

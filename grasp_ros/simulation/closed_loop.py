@@ -24,7 +24,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
 from grasp_ros.simulation.sampled_plant import NO_INTERVAL, Outputs, Record, SampledPlant
-from grasp_ros.simulation.trajectory import Loop
+from grasp_ros.simulation.ticks import Loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
@@ -106,7 +106,7 @@ class SampledLoop:
         for ticks in self._blocks():
             if plant.tick in self._changes:
                 self._scene = self._scene.changed(self._changes[plant.tick])
-            outputs, interval = _outputs(self._grid, ticks, scene.period_ns)
+            outputs, interval = outputs_within(self._grid, ticks, scene.period_ns)
             rows = self._states[self._rows : self._rows + len(interval)]
             record = plant.run(self._laws, outputs, self._foreign, rows)
             self._keep(record, interval[: len(record.states)])
@@ -170,7 +170,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     rows, block = [], list(islice(following, LONGEST + 1))
     while len(block) > 1:
         ticks = np.array(block)
-        outputs, _ = _outputs(grid, ticks, scene.period_ns)
+        outputs, _ = outputs_within(grid, ticks, scene.period_ns)
         loop = KernelLoop(
             np.diff(ticks) * scene.period_ns / NANOSECONDS, ticks * scene.period_ns / NANOSECONDS, outputs.bounds,
             new_place(), np.empty((len(ticks) - 1, 3)), system.external_over(ticks[:-1]),
@@ -182,7 +182,7 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
     return np.concatenate([*rows, _rest(grid, scene.ticks, scene.period_ns, integrator.state)])
 
 
-def _outputs(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tuple[Outputs, NDArray[np.int64]]:
+def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tuple[Outputs, NDArray[np.int64]]:
     """Output times within the intervals [t, t') between ascending ticks, and the interval of each."""
     times = ticks * period_ns / NANOSECONDS
     bounds = np.searchsorted(grid, times, side="left")

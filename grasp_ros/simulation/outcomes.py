@@ -15,6 +15,7 @@ from grasp_ros.observe.sight import Quantity, Seen, Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import U, V, X
 from grasp_ros.physics.model import Array
+from grasp_ros.scene.suggestion import allowed
 
 NOTHING = Wanted(0)
 
@@ -128,7 +129,7 @@ def find(names: Iterable[str]) -> list[Outcome]:
     found: dict[str, Outcome] = {}
     for name in names:
         if name not in GROUPS and name not in OUTCOMES:
-            raise Refused(f"outcome {name}: not known; allowed: {', '.join({**GROUPS, **OUTCOMES})}")
+            raise Refused(f"outcome {name}: not known; {allowed(name, {**GROUPS, **OUTCOMES})}")
         found.update({column: OUTCOMES[column] for column in GROUPS.get(name, (name,))})
     if not found:
         raise Refused(f"outcomes: none; allowed: one or more of {', '.join(GROUPS)}")

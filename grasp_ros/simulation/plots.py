@@ -6,7 +6,7 @@ import os
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 import numpy as np
 
@@ -62,23 +62,24 @@ class Motion(Protocol):
         """V, V_c, V' and the contact mode."""
 
 
-def draw(motion: Motion, path: str | os.PathLike[str], caption: str) -> None:
+def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = None) -> None:
     """Draw a motion into an image file.
 
     Parameters
     ----------
     motion : Motion
-    path : Path
+    path : Path or str
         The ending decides the format.
-    caption : str
-        Second line of the title.
+    caption : str, optional
+        Second line of the title. Default: the feedback of the scene, in words.
 
     Raises
     ------
     Refused
         If the motion is empty, matplotlib does not know the format, or the file cannot be written.
     """
-    draw_several([motion], [caption], path)
+    sampled = getattr(motion, "sampled", True)  # a recording is
+    draw_several([motion], [motion.scene.feedback_in_words(sampled) if caption is None else caption], Path(path))
 
 
 def draw_several(
@@ -237,17 +238,40 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> None:
     Refused
         If the path has no ending, matplotlib does not know the format, or the file cannot be written.
     """
-    path = Path(path)
-    known, ending = figure.canvas.get_supported_filetypes(), path.suffix.removeprefix(".").lower()
+    ending = format_of(figure, path)
+    with replacing(path) as file:
+        write(figure, file, ending, dpi)
+
+
+def format_of(figure: Figure, path: str | os.PathLike[str]) -> str:
+    """Format of an image file, by its ending.
+
+    Raises
+    ------
+    Refused
+        If the path has no ending, or matplotlib does not know the format.
+    """
+    known, ending = sorted(figure.canvas.get_supported_filetypes()), Path(path).suffix.removeprefix(".").lower()
+    if not ending:
+        raise Refused(f"{path}: no ending; allowed: one of {', '.join(known)}")
+    if ending not in known:
+        raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(known)}")
+    return ending
+
+
+def write(figure: Figure, file: BinaryIO, ending: str, dpi: int = 150) -> None:
+    """Write a figure into an open file.
+
+    Raises
+    ------
+    Refused
+        If matplotlib cannot draw this format here.
+    """
     try:
-        if not ending:
-            raise Refused(f"{path}: no ending; allowed: one of {', '.join(sorted(known))}")
-        if ending not in known:
-            raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(sorted(known))}")
-        with replacing(path) as file, canvas.style():
+        with canvas.style():
             figure.savefig(file, format=ending, dpi=dpi)
     except RuntimeError as error:  # a .pgf where there is no TeX
-        raise Refused(f"{path}: {error}") from None
+        raise Refused(f"{ending}: {error}") from None
 
 
 def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:

@@ -13,12 +13,12 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.observe.observer import Watcher, settle, watch
 from grasp_ros.observe.sight import Wanted
-from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.lyapunov import displacement_bound
-from grasp_ros.physics.model import Array, Contact, impact_force
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
+from grasp_ros.simulation.contacts import intervals
 from grasp_ros.simulation.trajectory import Trajectory
 
 SETTLED = 0.02  # of the largest initial displacement
@@ -83,19 +83,9 @@ def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZ
 
 def contact_intervals(run: Trajectory, side: int) -> Array:
     """Begin and end of every stretch with u > 0 of one side, (n, 2) in s."""
-    table = run.event_table[run.event_table[:, 1] == side]
-    begins = table[table[:, 2] == Transition.TOUCH, 0].tolist()
-    ends = table[table[:, 2] == Transition.RELEASE, 0].tolist()
-    if ends and (not begins or ends[0] < begins[0]):
-        begins.insert(0, 0.0)  # it began in contact
-    if len(begins) > len(ends):
-        ends.append(float(run.t[-1]))
-    return np.reshape([*zip(begins, ends, strict=True)], (-1, 2))
+    return intervals(run.event_table, side, float(run.t[-1]) if len(run.t) else 0.0)[:, :2]
 
 
 def impact_forces_of(run: Trajectory) -> Array:
-    """fw of both sides at the output times, (n, 2) in N; 0 where there is no contact, or none in the scene."""
-    forces = np.zeros((len(run.t), 2))
-    for side, u, d in pairs_of(run.scene.system, run.state):
-        forces[:, side] = impact_force(Contact(*run.scene.system.pairs[side]), u, d)
-    return forces
+    """fw of both sides at the output times, (n, 2) in N: `Trajectory.impacts`."""
+    return run.impacts

@@ -141,20 +141,22 @@ class SampledPlant:
             np.zeros((1, 3)), GIVEN.callee, GIVEN.rows, GIVEN.normals, self._waiting,
         )
 
-    def follow(self, answers: Array) -> Array:
+    def follow(self, answers: Array, outputs: Outputs | None = None) -> Array:
         """Advance by one control period for each row of answers that are known beforehand.
 
         Parameters
         ----------
         answers : array (k, 3), N by body
+        outputs : Outputs, optional
+            Default: the begin of each period.
 
         Returns
         -------
-        array (k, 6)
-            States at the begin of each period; only those reached, if `status` is not DONE afterwards.
+        array (m, 6)
+            States at the output times; only those reached, if `status` is not DONE afterwards.
         """
         count = len(answers)
-        outputs = Outputs(np.zeros(count), np.arange(count + 1))
+        outputs = outputs or Outputs(np.zeros(count), np.arange(count + 1))
         return self._go(outputs, np.array(answers, dtype=float, order="C")).states
 
     def run(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from operator import length_hint
 from types import MappingProxyType
 
@@ -12,24 +11,20 @@ import numpy as np
 
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods import registry
-from grasp_ros.methods.contract import ACCURACY_KNOB, Problem
-from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.methods.contract import ACCURACY_KNOB
+from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.closed_loop import (
-    Changes,
-    Progress,
-    SampledLoop,
-    check_changes,
-    drive_external,
-    foreign_controllers,
-)
-from grasp_ros.simulation.trajectory import Trajectory, tick_times
+from grasp_ros.simulation.closed_loop import Changes, Progress, check_changes, foreign_controllers
+from grasp_ros.simulation.progress import showing
+from grasp_ros.simulation.solve import How, solve
+from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.trajectory import Trajectory
 
 GRID_POINTS = 2001
 
@@ -46,7 +41,7 @@ def simulate(
     max_work: int = MAX_WORK,
     changes: Changes = MappingProxyType({}),
     controllers: Mapping[str, Law | type] = MappingProxyType({}),
-    progress: Progress = None,
+    progress: Progress | bool = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
 
@@ -78,9 +73,9 @@ def simulate(
         as the scene says. The loop is sampled. Each is called once for every tick, the last one included. A function
         that numba has compiled runs at full speed. A class is made anew for the run; of any other object `reset()` is
         called before it, if it has one.
-    progress : callable, optional
-        Called with the time reached, in s: at the end of the horizon, if the run gets there, and on the way, except by
-        methods with a fixed step.
+    progress : callable or True, optional
+        True: a bar, in a terminal or in a notebook. A callable is told the time reached, in s: at the end of the
+        horizon, if the run gets there, and on the way, except by methods with a fixed step.
 
     Raises
     ------
@@ -101,20 +96,13 @@ def simulate(
     _check_grid(scene, grid)
     _check_ticks(scene, sampled, max_work)
     foreign = foreign_controllers(scene, controllers)
-    loop = SampledLoop(scene, grid, changes, progress, foreign) if sampled else None
-    drive = loop.drive if loop else partial(drive_external, scene, grid) if scene.system.external else None
-    problem = Problem(scene.system, scene.duration, grid, setting, max_events, max_work, sampled, drive,
-                      None if loop else progress)
-    found = METHODS[method].solve(problem)
-    if progress is not None and found.status is Status.DONE:
-        progress(scene.duration)
-    for body in scene.system.absent:
-        found.state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
-    reached = len(found.state)
-    record = None if loop is None else loop.record()
+    with showing(progress, scene.duration, "s", scene.name) as told:
+        found, loop = solve(scene, grid, How(method, setting, sampled, max_events, max_work), changes, foreign, told)
+        if told is not None and found.status is Status.DONE:
+            told(scene.duration)
     return Trajectory(
-        scene, grid[:reached], found.state, record, found.event_table, found.work, found.status, method, setting,
-        found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()}, found.at_rest,
+        scene, grid[: len(found.state)], found.state, loop, found.event_table, found.work, found.status, method,
+        setting, found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()}, found.at_rest,
     )
 
 

@@ -1,52 +1,35 @@
-"""What a simulation delivers, its file, and the ticks of its output times."""
+"""What a simulation delivers: the motion at its output times and at any other, its events, its file."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from grasp_ros import scene as scenes
 from grasp_ros.exact.events import Event, to_events
 from grasp_ros.exact.integrator import Status
-from grasp_ros.methods.registry import EXACT, METHODS, find
+from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
-from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy, pairs_of
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
-from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN
+from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
-from grasp_ros.scene.files import decoding, replacing
-from grasp_ros.scene.npz import TEXT, Field, read_npz, signed
-
-
-def tick_times(scene: Scene) -> Array:
-    """Times in s of all control periods of a scene, shape (ticks + 1,)."""
-    return np.arange(scene.ticks + 1) * scene.period_ns / NANOSECONDS
-
-
-def tick_of(scene: Scene, t: Array) -> NDArray[np.int64]:
-    """The last tick at or before each time in s, shape (n,)."""
-    ticks = np.floor(np.asarray(t) * (NANOSECONDS / scene.period_ns)).astype(np.int64)  # rounding may miss it by one
-    ticks -= ticks * scene.period_ns / NANOSECONDS > t
-    ticks += (ticks + 1) * scene.period_ns / NANOSECONDS <= t
-    return np.minimum(ticks, scene.ticks)
-
-
-class Loop(NamedTuple):
-    """What went through a sampled loop, at n output times; see `Trajectory.command` and `Trajectory.inputs`."""
-
-    command: Array  # (n, 2), N
-    inputs: Array  # (n, 3), N by body
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.files import opened
+from grasp_ros.scene.npz import signed
+from grasp_ros.simulation.contacts import contact_table, side_of
+from grasp_ros.simulation.html import html_of_run
+from grasp_ros.simulation.repeat import breaks_of, states_at
+from grasp_ros.simulation.sections import Function, Section, as_function, crossings
+from grasp_ros.simulation.tables import dataframe_of, dataset_of, write_csv
+from grasp_ros.simulation.ticks import Loop, tick_of
 
 
 @dataclass(frozen=True)
@@ -156,17 +139,121 @@ class Trajectory(Frozen):
         return largest_deformation(self.scene.system, self.state)
 
     @property
+    def impacts(self) -> Array:
+        """Impact forces fw_l, fw_r (n, 2) at the output times in N; 0 where there is no contact, or none at all."""
+        forces = np.zeros((len(self.t), 2))
+        for side, u, d in pairs_of(self.scene.system, self.state):
+            forces[:, side] = impact_force(Contact(*self.scene.system.pairs[side]), u, d)
+        return forces
+
+    def at(self, t: ArrayLike) -> Array:
+        """States (..., 6) at any times (...) in s: the dense output.
+
+        They are the states of the run with these output times, bit for bit, because it is integrated again with them,
+        see `repeat`.
+
+        Raises
+        ------
+        Refused
+            If a time is outside the run, or the run cannot be repeated.
+        """
+        return states_at(self, np.asarray(t, dtype=float))
+
+    @cached_property
     def events(self) -> list[Event]:
-        """The events as records."""
-        return to_events(self.event_table)
+        """The events as records, each with the state at its time.
+
+        Raises
+        ------
+        Refused
+            If the run cannot be repeated, see `at`; `event_table` needs no repetition.
+        """
+        return to_events(self.event_table, self.at(self.event_table[:, Entry.TIME]))
+
+    def contacts(self, side: str) -> np.ndarray:
+        """The contacts of the "left" or "right" arm: a structured array, a row for each stretch with u > 0.
+
+        Columns, with the units of `contacts.UNITS`: `begin` and `end` in s; `speed_in` and `speed_out`, u' at the touch
+        and -u' at the release in m/s, and `restitution`, their quotient; `peak_force` in N, `impulse` in N s, `loss`,
+        the energy that the contact took, in J, and `deepest`, the largest u in m. A contact that goes on at the end of
+        the run ends there, and has NaN for speed_out and restitution; so has one that was there at the begin for
+        speed_in. Peaks and integrals are those of polynomials that follow the motion to 1e-12.
+
+        Raises
+        ------
+        Refused
+            If there is no such side, or the run cannot be repeated, see `at`.
+        """
+        return contact_table(self.scene.system, self.event_table, side_of(side), breaks_of(self), self.at)
+
+    def section(self, function: Function | ArrayLike, level: float = 0.0, direction: int = 0) -> Section:
+        """Where a function of the motion crosses a level: times, states and directions.
+
+        Between its events a motion is smooth. There the function is replaced by polynomials that follow it to 1e-12 of
+        its largest value, and all roots of these are found; each is a crossing if the function has other signs on both
+        sides of it. So no crossing is missed but where the function comes beyond the level by less than that. Where the
+        function, or the motion at a reversal under dry friction, is not smooth by itself, it is followed in ever
+        smaller pieces; `Section.resolution` is the length of the longest that is left, within which crossings may be
+        missed in pairs: 0 for a linear function of a motion without friction.
+
+        Parameters
+        ----------
+        function : array (6,) or callable
+            Weights of the state, for a function that is linear in it; or any function of times (n,) in s and states
+            (n, 6) that returns (n,) numbers.
+        level : float
+        direction : int
+            +1: only where it rises, -1: falls, 0: both.
+
+        Raises
+        ------
+        Refused
+            If the function or the direction is none, or the run cannot be repeated, see `at`.
+        """
+        return crossings(as_function(function, level), direction, breaks_of(self), self.at)
+
+    def dataset(self) -> Any:
+        """An `xarray.Dataset` over `t`: states, forces, energies, with names and units as attributes.
+
+        Raises
+        ------
+        Refused
+            If xarray is not installed.
+        """
+        return dataset_of(self)
+
+    def dataframe(self) -> Any:
+        """The same as a `pandas.DataFrame`; units by column in its `attrs["units"]`.
+
+        Raises
+        ------
+        Refused
+            If pandas is not installed.
+        """
+        return dataframe_of(self)
+
+    def to_csv(self, path: str | os.PathLike[str] | BinaryIO) -> None:
+        """The same as a text file, by its path or open: a row for each output time; units in the names of the columns.
+
+        Raises
+        ------
+        Refused
+            If the file cannot be written.
+        """
+        with opened(path) as file:
+            write_csv(self, file)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return html_of_run(self)
 
     def times(self, kind: Transition, side: int) -> Array:
         """Times in s of one side's events of a kind."""
         chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
         return chosen
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write everything to a .npz file.
+    def save(self, path: str | os.PathLike[str] | BinaryIO) -> None:
+        """Write everything to a .npz file, by its path or open.
 
         Raises
         ------
@@ -174,11 +261,11 @@ class Trajectory(Frozen):
             If the file cannot be written.
         """
         level, parts = self.energy, self.parts
-        with replacing(path) as file:
+        with opened(path) as file:
             np.savez_compressed(file, **signed(dict(
                 t=self.t, state=self.state, command=self.command, inputs=self.inputs,
                 V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **parts._asdict(),
-                epsilon=self.epsilon,
+                epsilon=self.epsilon, impacts=self.impacts,
                 touch_left=self.times(Transition.TOUCH, LEFT), touch_right=self.times(Transition.TOUCH, RIGHT),
                 release_left=self.times(Transition.RELEASE, LEFT), release_right=self.times(Transition.RELEASE, RIGHT),
                 events=self.event_table, work=self.work,
@@ -188,79 +275,3 @@ class Trajectory(Frozen):
                 controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
                 at_rest=np.inf if self.at_rest is None else self.at_rest,
             )))
-
-
-_ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate")}
-_TIMES = {
-    f"{kind}_{side}": Field("<f8", (f"{kind} {side}",)) for kind in ("touch", "release") for side in ("left", "right")
-}
-_WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene", "energy_of")}
-FIELDS = {
-    **_ROW, **dict.fromkeys(Parts._fields, Field("<f8", ("n",))), "epsilon": Field("<f8", ("n", 2)),
-    "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
-    "mode": Field("<i8", ("n",)), **_TIMES, "events": Field("<f8", ("events", 5)), "work": Field("<i8", ("work",)),
-    "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
-    "at_rest": Field("<f8"),
-    "controllers": Field(TEXT, (2,)),
-}
-
-
-def load(path: str | os.PathLike[str]) -> Trajectory:
-    """Read what `Trajectory.save` wrote.
-
-    Raises
-    ------
-    Refused
-        If the file is not such a file.
-    """
-    path = Path(path)
-    with decoding(path, "a file of `grasp simulate`"):
-        data = read_npz(path, FIELDS)
-        words = {name: str(data[name]) for name in _WORDS}
-        scene, method = scenes.parse(words["scene"], words["scene_name"], str(path)), find(words["method"])
-        if data["work_names"].tolist() != [counter.name.lower() for counter in method.counters]:
-            raise Refused(f"work_names: {data['work_names'].tolist()}; allowed: the counters of {method.name}")
-        loop = Loop(data["command"], data["inputs"]) if data["sampled"] else None
-        found = Trajectory(
-            scene, data["t"], data["state"], loop, data["events"], data["work"], Status[words["status"]], method.name,
-            float(data["setting"]), words["stop"],
-            {side: name for side, name in zip(SIDES, data["controllers"].tolist(), strict=True) if name},
-            float(data["at_rest"]) if np.isfinite(data["at_rest"]) else None,
-        )
-        if found.energy_of != words["energy_of"]:
-            raise Refused(f"energy_of: {words['energy_of']}; allowed with these controllers: {found.energy_of}")
-        _check(found)
-        for side, name in ((LEFT, "left"), (RIGHT, "right")):
-            for kind in (Transition.TOUCH, Transition.RELEASE):
-                key = f"{kind.name.lower()}_{name}"
-                if data[key].tolist() != found.times(kind, side).tolist():
-                    raise Refused(f"{key}: not those of the events")
-        return found
-
-
-def _check(found: Trajectory) -> None:
-    """Refuse numbers that no run has."""
-    events, end, done = found.event_table, found.scene.duration, found.status is Status.DONE
-    there = [body for body in COLUMN if body not in found.scene.system.absent]
-    columns = [COLUMN[body] + k for body in there for k in (0, 1)]
-    absent = np.delete(found.state, columns, axis=1)
-    acted = found.scene.ticks if found.sampled else 0
-    for name, good, allowed in (
-        ("t", _ascending(found.t, end), "ascending times within the horizon"),
-        ("state", not done or np.isfinite(found.state[:, columns]).all(), "finite numbers"),
-        ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
-        ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
-        ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
-        ("events", _ascending(events[:, 0], end), "ascending times within the horizon"),
-        ("events", np.isfinite(events).all() and np.isin(events[:, 1], list(COLUMN)).all(), "events of this scene"),
-        ("events", np.isin(events[:, 2], list(Transition)).all(), "events of this scene"),
-        ("work", (found.work >= 0).all(), "numbers >= 0"),
-        ("setting", np.isfinite(found.setting) and found.setting > 0.0, "a number > 0"),
-    ):
-        if not good:
-            raise Refused(f"{name}: not allowed; allowed: {allowed}")
-
-
-def _ascending(times: Array, end: float) -> bool:
-    """Whether times ascend within [0, end]."""
-    return bool((times[1:] >= times[:-1]).all() and (times >= 0.0).all() and (times <= end).all())

@@ -23,6 +23,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.suggestion import allowed
 
 POSITION_GAIN, VELOCITY_GAIN, SET_POINT, FEED_FORWARD = range(4)
 Place = tuple[str, int, int]  # array of `Block`, row, column
@@ -170,5 +171,5 @@ def parameter_of(scene: Scene, name: str) -> Parameter:
     known = [f"{own}.{parameter.key}" for own in scene.values for parameter in BY_SECTION[own].parameters
              if parameter.key in scene.values[own] and not parameter.several]
     if name not in known:
-        raise Refused(f"{scene.name}: {name}: not a number of this scene; allowed: {', '.join(known)}")
+        raise Refused(f"{scene.name}: {name}: not a number of this scene; {allowed(name, known)}")
     return next(parameter for parameter in BY_SECTION[section].parameters if parameter.key == key)

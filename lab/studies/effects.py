@@ -28,7 +28,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.trajectory import tick_times
+from grasp_ros.simulation.ticks import tick_times
 from lab.studies import page_figures
 from lab.studies.document import put, read, write
 

@@ -70,7 +70,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate merge.yaml", "merge.yaml: <<: unknown key with the value {'title': 'x'}; allowed: title"),
         ("simulate date.yaml", "date.yaml: line 1: 2001-13-45 cannot be read: month must be in 1..12"),
         ("simulate case_01 --set left_arm.mass_kg=0", "left_arm.mass_kg: 0 is not allowed; allowed: a number >= 1e-12"),
-        ("simulate case_01 --set left_arm.mass=1", "--set left_arm.mass=1: no such key; allowed: "),
+        ("simulate case_01 --set left_arm.mass=1", "left_arm.mass=1: no such key; did you mean left_arm.mass_kg?"),
         ("simulate case_01 --set mass", "--set mass: not understood; allowed: section.key=value"),
         ("simulate case_01 --set left_arm.mass_kg=2001-13-45", "month must be in 1..12; allowed: a number"),
         ("simulate case_01 --set left_arm.mass_kg=\a", "special characters are not allowed"),

@@ -40,7 +40,7 @@ def test_a_forbidden_import_is_seen(tmp_path: Path) -> None:
 
 def test_nothing_lies_loose_at_the_root() -> None:
     loose = {path.name for path in (ROOT / "grasp_ros").iterdir() if path.name != "__pycache__"} - ROOMS
-    assert loose == {"__init__.py", "py.typed"}
+    assert loose == {"__init__.py", "__init__.pyi", "py.typed"}
 
 
 def test_tests_mirror_the_rooms() -> None:

@@ -20,7 +20,7 @@ from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import SampledPlant, simulate
-from grasp_ros.simulation.trajectory import tick_of, tick_times
+from grasp_ros.simulation.ticks import tick_of, tick_times
 
 
 def plain_loop(scene: Scene) -> tuple[Array, Array]:

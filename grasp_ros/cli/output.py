@@ -1,0 +1,77 @@
+"""What commands print: results on the standard output, as tables or as JSON, and all else on the standard error."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from grasp_ros.scene.files import replacing, writing
+
+if TYPE_CHECKING:
+    from grasp_ros.simulation.progress import Told
+
+STDOUT = Path("-")
+_LEVEL = {"quiet": False}
+
+
+def set_level(options: argparse.Namespace) -> None:
+    """How much a command says beside its results."""
+    _LEVEL["quiet"] = bool(getattr(options, "quiet", False))
+
+
+def note(text: str) -> None:
+    """Say something beside the results, unless nobody wants to hear it."""
+    if not _LEVEL["quiet"]:
+        print(text, file=sys.stderr)
+
+
+@contextmanager
+def bar(total: float, unit: str, name: str) -> Iterator[Told | None]:
+    """A bar on a terminal, see `simulation.progress`; None where there is none."""
+    from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
+
+    with showing(not _LEVEL["quiet"], total, unit, name) as told:
+        yield told
+
+
+def show(options: argparse.Namespace, text: str, data: Any) -> None:
+    """Print a result: its text, or with `--json` its data; on the standard error if a file goes to the output."""
+    shown = json.dumps(plain(data), indent=1, ensure_ascii=False) if options.json else text
+    print(shown, file=sys.stderr if getattr(options, "output", None) == STDOUT else sys.stdout)
+
+
+def plain(data: Any) -> Any:
+    """Data as JSON has it: numbers that are not finite are null."""
+    if isinstance(data, dict):
+        return {str(key): plain(value) for key, value in data.items()}
+    if isinstance(data, np.ndarray):
+        return plain(data.tolist())
+    if isinstance(data, Sequence) and not isinstance(data, str):
+        return [plain(value) for value in data]
+    if isinstance(data, np.generic):
+        return plain(data.item())
+    if isinstance(data, float) and not math.isfinite(data):
+        return None
+    return data if isinstance(data, (str, int, float, bool, type(None))) else str(data)
+
+
+@contextmanager
+def destination(path: Path) -> Iterator[BinaryIO]:
+    """The file of `-o`, see `scene.files.replacing`, or the standard output for `-`."""
+    if path != STDOUT:
+        with replacing(path) as file:
+            yield file
+        note(f"written to {path}")
+        return
+    sys.stdout.flush()
+    with writing("standard output"):
+        yield sys.stdout.buffer
+        sys.stdout.buffer.flush()

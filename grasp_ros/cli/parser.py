@@ -1,0 +1,56 @@
+"""Parsers whose errors are short, name the command that was wrong, and say what was meant."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any, NoReturn
+
+Command = Callable[[argparse.Namespace], int]
+LONGEST = 200  # characters of a line that refuses something
+
+
+def shortened(line: str, most: int = LONGEST) -> str:
+    """One line; where it is too long, without its middle."""
+    line = " ".join(line.split())
+    end = most // 3
+    return line if len(line) <= most else f"{line[: most - end - 5]} ... {line[-end:]}"
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser of one command, or of `grasp` itself."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage of this command and one short line."""
+        choice = re.fullmatch(r"argument (.*): invalid choice: '(.*?)' \(choose from (.*)\)", message, re.S)
+        if choice is not None:
+            known = re.findall(r"[\w-]+", choice[3])
+            message = f"argument {choice[1]}: {choice[2]} is not allowed; {_allowed(choice[2], known)}"
+        self.print_usage(sys.stderr)
+        self.exit(2, shortened(f"{self.prog}: error: {message}") + "\n")
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
+        """Arguments; what nobody knows is an error of the command, and not of `grasp`."""
+        options, rest = self.parse_known_args(args, namespace)
+        if rest:
+            parser: argparse.ArgumentParser = getattr(options, "parser", self)
+            known = [word for action in parser._actions for word in action.option_strings]
+            word = rest[0].split("=")[0]
+            meant = f"; {_allowed(word, known)}" if word.startswith("-") else ""
+            parser.error(f"unrecognized arguments: {' '.join(rest)}{meant}")
+        return options
+
+
+def _allowed(word: str, known: list[str]) -> str:
+    from grasp_ros.scene.suggestion import allowed  # with all of `scene`, which help should not wait for
+
+    return allowed(word, known)
+
+
+def add_levels(parser: argparse.ArgumentParser, default: object = argparse.SUPPRESS) -> None:
+    """How much is said beside the results."""
+    level = parser.add_mutually_exclusive_group()
+    level.add_argument("-q", "--quiet", action="store_true", default=default, help="say nothing but results and errors")
+    level.add_argument("-v", "--verbose", action="store_true", default=default, help="also say versions and how long")

@@ -1,0 +1,69 @@
+"""`grasp scenes` and `new`: the scenes that there are, and one to start from."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from pathlib import Path
+from typing import Any
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.arguments import (
+    add_command,
+    add_force,
+    add_json,
+    add_output,
+    add_settings,
+    check_output,
+    complete_scenes,
+    load_scene,
+)
+from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.output import STDOUT, destination, show
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.commented import commented
+from grasp_ros.scene.library import text_of
+
+DEFAULT = "case_01"
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommands."""
+    sub = add_command(commands, "scenes", _scenes, COMMANDS["scenes"].text)
+    complete_scenes(sub.add_argument("scene", nargs="?", help="print this one, as a file, with its comments"))
+    add_json(sub)
+    sub = add_command(commands, "new", _new, COMMANDS["new"].text)
+    sub.add_argument("file", metavar="FILE.yaml", type=Path, nargs="?", help="new file; its name is that of the scene")
+    complete_scenes(sub.add_argument("--like", metavar="SCENE", default=DEFAULT,
+                                     help=f"what it begins with (default {DEFAULT})"))
+    add_settings(sub)
+    add_output(sub, "FILE.yaml", "the same as FILE.yaml; - is the standard output")
+    add_force(sub)
+
+
+def _scenes(options: argparse.Namespace) -> int:
+    if options.scene is not None:
+        scene = scenes.load(options.scene)
+        packaged = options.scene in scenes.names()
+        text = text_of(options.scene) if packaged else scene.to_yaml()
+        show(options, text.rstrip("\n"), {"name": scene.name, "title": scene.title, "readings": scene.readings,
+                                          "watch": scene.watch, **scene.values})
+        return 0
+    found = [scenes.load(name) for name in scenes.names()]
+    width = max(len(scene.name) for scene in found)
+    show(options, "\n".join(f"{scene.name:<{width}}  {scene.title}" for scene in found),
+         [{"name": scene.name, "title": scene.title, "sections": list(scene.values)} for scene in found])
+    return 0
+
+
+def _new(options: argparse.Namespace) -> int:
+    if (options.file is None) == (options.output is None):
+        raise Refused("new: allowed: one FILE.yaml to write, or -o - for the standard output")
+    output: Path = options.file or options.output
+    if output != STDOUT and not re.fullmatch(r".+\.ya?ml", output.name):
+        raise Refused(f"{output}: is not allowed; allowed: a name that ends in .yaml")
+    check_output(output, options.force)
+    text = commented(load_scene(options.like, options.settings))
+    with destination(output) as file:
+        file.write(text.encode())
+    return 0

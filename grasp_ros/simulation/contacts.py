@@ -1,0 +1,99 @@
+"""The contacts of one side as a table: when, how fast in and out, and what each did."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import EPS, LEFT, Entry, Transition
+from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force, penetration
+from grasp_ros.physics.system import System
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.simulation.smooth import States, expand
+
+UNITS = {
+    "begin": "s", "end": "s", "speed_in": "m/s", "speed_out": "m/s", "restitution": "1", "peak_force": "N",
+    "impulse": "N s", "loss": "J", "deepest": "m",
+}
+ROUNDINGS = 8.0 * EPS  # of a position, in the difference of two
+
+
+def intervals(event_table: Array, side: int, end: float) -> Array:
+    """Begin and end of every stretch with u > 0 of one side up to a time, (n, 4): s, and u' at both, m/s.
+
+    u' is NaN at a begin or an end that is that of the run.
+    """
+    own = event_table[event_table[:, Entry.BODY] == side]
+    begins, ends = (own[own[:, Entry.KIND] == kind][:, [Entry.TIME, Entry.RATE]].tolist()
+                    for kind in (Transition.TOUCH, Transition.RELEASE))
+    if ends and (not begins or ends[0][0] < begins[0][0]):
+        begins.insert(0, [0.0, np.nan])  # it began in contact
+    if len(begins) > len(ends):
+        ends.append([end, np.nan])
+    rows = [(a[0], b[0], a[1], b[1]) for a, b in zip(begins, ends, strict=True)]
+    return np.reshape(rows, (-1, 4))
+
+
+def side_of(name: str) -> int:
+    """The side of that name.
+
+    Raises
+    ------
+    Refused
+        If there is none.
+    """
+    if name not in SIDES:
+        raise Refused(f"side {name!r} is not allowed; allowed: {' or '.join(SIDES)}")
+    return int(SIDES[name])
+
+
+def contact_table(system: System, event_table: Array, side: int, breaks: Array, states: States) -> np.ndarray:
+    """The contacts of one side, see `trajectory.Trajectory.contacts`.
+
+    Parameters
+    ----------
+    system : System
+    event_table : array (m, 5)
+    side : int
+    breaks : array (k,), s
+        Begin and end of the run, and between them all times at which the motion is not smooth.
+    states : callable
+        Dense output.
+    """
+    found = intervals(event_table, side, float(breaks[-1]))
+    found = found[found[:, 1] > found[:, 0]]
+    rows = np.zeros(len(found), dtype=[(name, "f8") for name in UNITS])
+    rows["begin"], rows["end"], rows["speed_in"], rows["speed_out"] = *found.T[:3], -found[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rows["restitution"] = rows["speed_out"] / rows["speed_in"]
+    spans = [np.unique(np.concatenate([[a, b], breaks[(breaks > a) & (breaks < b)]])) for a, b in found[:, :2]]
+    group = np.repeat(np.arange(len(spans)), [len(span) - 1 for span in spans])
+    begins, ends = (np.concatenate([np.zeros(0), *(span[part] for span in spans)])
+                    for part in (slice(None, -1), slice(1, None)))
+    pair, n = _Pair(system, side), len(found)
+    pieces = expand(states, pair.quantities, begins, ends, group)
+    for name, column in (("impulse", 0), ("loss", 1)):
+        rows[name] = pieces.integral(column, n) if n else 0.0
+    for name, column in (("peak_force", 0), ("deepest", 2)):
+        rows[name] = pieces.largest(column, n) if n else 0.0
+    return rows
+
+
+class _Pair:
+    """Force in N, power lost in W, and penetration in m of one pair."""
+
+    def __init__(self, system: System, side: int) -> None:
+        self._contact, self._side = Contact(*system.pairs[side].tolist()), side
+
+    def quantities(self, _: Array, state: Array) -> tuple[Array, Array]:
+        u_l, d_l, u_r, d_r = penetration(np.nan_to_num(state))
+        u, d = (u_l, d_l) if self._side == LEFT else (u_r, d_r)
+        u = np.maximum(u, 0.0)
+        force, elastic = impact_force(self._contact, u, d), hertzian_force(self._contact, u)
+        rounding = ROUNDINGS * np.abs(np.nan_to_num(state[:, 0::2])).max(axis=1)
+        slope = 1.5 * self._contact.hertzian * np.sqrt(u + rounding)
+        noise = np.stack([slope * rounding * (1.0 + self._contact.dissipation * np.abs(d)),
+                          slope * rounding * self._contact.dissipation * d * d, rounding], axis=1)
+        return np.stack([force, (force - elastic) * d, u], axis=1), noise
+
+

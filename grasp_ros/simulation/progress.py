@@ -1,0 +1,47 @@
+"""A bar that shows how far a computation is: in a terminal or a notebook, and none where nobody looks."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+Told = Callable[[float], object]
+DELAY_S = 0.5  # a computation that is over by then needs no bar
+
+
+def notebook() -> bool:
+    """Whether this is the kernel of a notebook."""
+    return "ipykernel" in sys.modules
+
+
+def anybody_looks() -> bool:
+    """Whether a bar can be drawn: in a notebook, or on a terminal that can move its cursor and may."""
+    moves = os.environ.get("TERM", "") != "dumb" and "NO_COLOR" not in os.environ
+    return notebook() or (sys.stderr.isatty() and moves)
+
+
+@contextmanager
+def showing(progress: Told | bool | None, total: float, unit: str, name: str) -> Iterator[Told | None]:
+    """What is to be told how far a computation is: what a caller gave, a bar in place of True, or nothing.
+
+    Parameters
+    ----------
+    progress : callable, bool or None
+    total : float
+        What the last call says.
+    unit : str
+    name : str
+        Stands in front of the bar.
+    """
+    if not isinstance(progress, bool):
+        yield progress
+        return
+    if not (progress and anybody_looks()):
+        yield None
+        return
+    from tqdm.auto import tqdm
+
+    with tqdm(total=total, unit=unit, desc=name, delay=DELAY_S, smoothing=0.05) as bar:
+        yield lambda reached: bar.update(reached - bar.n)

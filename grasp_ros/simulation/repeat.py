@@ -1,0 +1,139 @@
+"""Dense output: a run again, with other output times.
+
+No state depends on the other output times, not in its last bit, so that the run with the wanted times is the dense
+output. It costs as much as the run, and holds for every method. Commands that were recorded at every control period are
+used again as they are, whatever gave them; otherwise the laws of the scene answer again.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from grasp_ros.exact.integrator import MAX_WORK, Integrator, Status
+from grasp_ros.methods.registry import EXACT
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import OBJECT, Entry
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.simulation.closed_loop import outputs_within
+from grasp_ros.simulation.sampled_plant import SampledPlant
+from grasp_ros.simulation.solve import How, solve
+from grasp_ros.simulation.ticks import tick_of, tick_times
+
+UNLIMITED = 2**62  # budgets of a run that has been there before
+
+
+class Run(Protocol):
+    """What a run must tell to be repeated, see `trajectory.Trajectory`."""
+
+    @property
+    def scene(self) -> Scene: ...  # noqa: D102
+
+    @property
+    def t(self) -> Array: ...  # noqa: D102
+
+    @property
+    def state(self) -> Array: ...  # noqa: D102
+
+    @property
+    def event_table(self) -> Array: ...  # noqa: D102
+
+    @property
+    def command(self) -> Array: ...  # noqa: D102
+
+    @property
+    def sampled(self) -> bool: ...  # noqa: D102
+
+    @property
+    def controllers(self) -> object: ...  # noqa: D102
+
+    @property
+    def method(self) -> str: ...  # noqa: D102
+
+    @property
+    def setting(self) -> float: ...  # noqa: D102
+
+    @property
+    def status(self) -> Status: ...  # noqa: D102
+
+
+def reached(run: Run) -> float:
+    """Time in s up to which a run is known."""
+    if run.status is Status.DONE:
+        return run.scene.duration
+    return float(max([0.0, *run.t[-1:], *run.event_table[-1:, 0]]))
+
+
+def states_at(run: Run, times: Array) -> Array:
+    """States (..., 6) at any times (...) in s of a run: those of the run with these output times, bit for bit.
+
+    Raises
+    ------
+    Refused
+        If a time is outside the run, if the commands of its controllers were not recorded at every control period, or
+        if the run cannot be repeated here to the last bit, as one from another machine.
+    """
+    wanted = np.asarray(times, dtype=float)
+    end = reached(run)
+    if not ((wanted >= 0.0) & (wanted <= end)).all():
+        odd = wanted[~((wanted >= 0.0) & (wanted <= end))].flat[0]
+        raise Refused(f"time {float(odd)!r} is not allowed; allowed: 0 to {end!r} s")
+    grid, place = np.unique(np.concatenate([wanted.ravel(), run.t]), return_inverse=True)
+    states = _again(run, grid)
+    if len(states) < len(grid) or not np.array_equal(states[place[wanted.size :]], run.state, equal_nan=True):
+        raise Refused(f"{run.scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this"
+                      " machine and these versions, without `changes` between its output times")
+    return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
+
+
+def breaks_of(run: Run) -> Array:
+    """Times (k,) in s between which a run is smooth: its begin and end, its events, and changes of its inputs."""
+    scene, end = run.scene, reached(run)
+    times = [np.array([0.0, end]), run.event_table[:, Entry.TIME]]
+    if run.sampled:
+        times.append(tick_times(scene))
+    else:
+        times += [np.array([*force.changes(scene.ticks)]) * scene.period_ns / NANOSECONDS
+                  for force in scene.system.external]
+    found = np.unique(np.concatenate(times))
+    return np.asarray(found[found <= end])
+
+
+def _again(run: Run, grid: Array) -> Array:
+    """States (n, 6) at ascending times; fewer if the run stops."""
+    if run.sampled and _every_tick(run, grid[-1:]):
+        return _with_commands(run, grid)
+    if run.controllers:
+        raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
+                      " period, as without a grid")
+    exact = run.method == EXACT
+    how = How(run.method, run.setting, run.sampled, UNLIMITED, UNLIMITED if exact else MAX_WORK)
+    return solve(run.scene, grid, how)[0].state
+
+
+def _every_tick(run: Run, last: Array) -> bool:
+    """Whether the output times hold every control period up to a time."""
+    ticks = tick_times(run.scene)[: int(tick_of(run.scene, last).max(initial=0)) + 1]
+    return bool(np.isin(ticks, run.t).all())
+
+
+def _with_commands(run: Run, grid: Array) -> Array:
+    """The same under the commands that were recorded."""
+    scene, last = run.scene, int(tick_of(run.scene, grid[-1:]).max(initial=0))
+    count = min(last + 1, scene.ticks)
+    answers = np.zeros((count, 3))
+    answers[:, :OBJECT] = run.command[np.searchsorted(run.t, tick_times(scene)[:count])]
+    integrator = Integrator(scene.system, continuous=False, accuracy=run.setting, max_events=UNLIMITED,
+                            max_work=UNLIMITED)
+    plant = SampledPlant(scene.system, scene.period_ns, integrator)
+    outputs, _ = outputs_within(grid, np.arange(count + 1), scene.period_ns)
+    states = plant.follow(answers, outputs)
+    if plant.status is Status.DONE:
+        states = np.concatenate([states, np.repeat(plant.state[None], len(grid) - len(states), axis=0)])
+    for body in scene.system.absent:
+        states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
+    return states

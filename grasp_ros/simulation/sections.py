@@ -1,0 +1,130 @@
+"""Crossings of a user's own function of the motion: Poincaré sections, switching surfaces, levels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import EPS
+from grasp_ros.physics.model import Array
+from grasp_ros.simulation.smooth import Pieces, States, expand, real_roots
+
+Function = Callable[[Array, Array], Array]  # t (n,), state (n, 6) to (n,)
+APART = 1e-9  # of a piece: roots that are closer are one
+SECANT = 1e-6  # of a piece: over it the slope at a root is taken
+
+
+class Section(NamedTuple):
+    """Crossings in the order of time."""
+
+    t: Array  # (n,) s
+    state: Array  # (n, 6), of the run at these times, bit for bit
+    direction: NDArray[np.int64]  # (n,) +1: rises, -1: falls
+    resolution: float  # s; 0: every piece is resolved. Otherwise crossings this close to each other may be missing
+
+
+def as_function(section: Function | ArrayLike, level: float) -> Function:
+    """A function whose zeros are wanted, of weights (6,) of the state or of a callable.
+
+    Raises
+    ------
+    Refused
+        If it is neither.
+    """
+    if callable(section):
+        return lambda t, state: np.asarray(section(t, state), dtype=float) - level
+    weights = np.asarray(section, dtype=float)
+    if weights.shape != (6,) or not np.isfinite(weights).all() or not weights.any():
+        raise Refused(f"section: {section!r} is not allowed; allowed: six weights of the state, not all 0, or a"
+                      " callable of times (n,) and states (n, 6)")
+    used = np.flatnonzero(weights)
+    return lambda _, state: np.asarray(state[:, used] @ weights[used]) - level
+
+
+def crossings(function: Function, direction: int, breaks: Array, states: States) -> Section:
+    """Where a function of time and state changes its sign, see `trajectory.Trajectory.section`.
+
+    Parameters
+    ----------
+    function : callable
+    direction : int
+        +1, -1, or 0 for both.
+    breaks : array (k,), s
+        Begin and end of the run, and between them all times at which the motion is not smooth.
+    states : callable
+        Dense output.
+
+    Raises
+    ------
+    Refused
+        If the direction is another, or the function gives no number for each time, or none that is finite.
+    """
+    if direction not in (-1, 0, 1):
+        raise Refused(f"direction: {direction!r} is not allowed; allowed: -1, 0 or 1")
+
+    def quantity(t: Array, state: Array) -> tuple[Array, Array]:
+        values = _checked(function, t, state)[:, None]
+        return values, np.zeros_like(values)
+
+    pieces = expand(states, quantity, breaks[:-1], breaks[1:], np.zeros(len(breaks) - 1, dtype=np.int64))
+    t, reach = _candidates(pieces)
+    ends = np.concatenate([breaks[:1], t, breaks[-1:]])
+    middles = 0.5 * (ends[1:] + ends[:-1])
+    signs = _carried(np.sign(_checked(function, middles, states(middles))))
+    turn = np.where(signs[:-1] != 0, np.sign(np.diff(signs)), 0)
+    kept = (turn != 0) & ((turn == direction) | (direction == 0))
+    t = _polished(function, states, t[kept], reach[kept])
+    lost = pieces.length[~pieces.resolved]
+    return Section(t, states(t), turn[kept], float(lost.max(initial=0.0)))
+
+
+def _checked(function: Function, t: Array, state: Array) -> Array:
+    values = np.asarray(function(t, state), dtype=float)
+    if values.shape != t.shape or not np.isfinite(values).all():
+        raise Refused(f"section: gives numbers of shape {values.shape} for times of shape {t.shape}, or some that are"
+                      " not finite; allowed: a finite number for each")
+    return values
+
+
+def _carried(signs: Array) -> NDArray[np.int64]:
+    """Signs with each 0 replaced by the last one before it that is none."""
+    last = np.maximum.accumulate(np.where(signs != 0.0, np.arange(len(signs)), 0))
+    return signs[last].astype(np.int64)
+
+
+def _candidates(pieces: Pieces) -> tuple[Array, Array]:
+    """Times (n,) of all roots of the polynomials, and how far each may be off, in s; ascending and apart."""
+    found, reach = [np.zeros(0)], [np.zeros(0)]
+    size = np.abs(pieces.series[..., 0])
+    near = ~pieces.resolved | (size[:, 0] <= size[:, 1:].sum(axis=1) * (1.0 + 1e-9))
+    for k in np.flatnonzero(near).tolist():
+        roots = pieces.times(k, real_roots(pieces.series[k, :, 0]))
+        found.append(roots)
+        reach.append(np.full(len(roots), pieces.length[k]))
+    begins, values = pieces.begin[1:], pieces.values[..., 0]
+    jumps = np.flatnonzero(values[1:, 0] * values[:-1, -1] <= 0.0)  # between the last node and the next piece's first
+    found.append(begins[jumps])
+    reach.append(np.minimum(pieces.length[1:], pieces.length[:-1])[jumps])
+    t, wide = np.concatenate(found), np.concatenate(reach)
+    order = np.argsort(t, kind="stable")
+    t, wide = t[order], wide[order]
+    apart = np.diff(t, prepend=-np.inf) > APART * wide + 4.0 * EPS * t
+    return t[apart], wide[apart]
+
+
+def _polished(function: Function, states: States, t: Array, reach: Array) -> Array:
+    """One secant step for each root, on the dense output itself; where it does not help, the root stays."""
+    if not len(t):
+        return t
+    span = SECANT * reach
+    sides = np.stack([np.maximum(t - span, 0.0), t], axis=1)
+    values = function(sides.ravel(), states(sides.ravel())).reshape(-1, 2)
+    slope = (values[:, 1] - values[:, 0]) / np.maximum(sides[:, 1] - sides[:, 0], np.finfo(float).tiny)
+    step = np.divide(values[:, 1], slope, out=np.zeros_like(t), where=slope != 0.0)
+    better = np.clip(t - np.clip(step, -span, span), 0.0, None)
+    good = np.abs(function(better, states(better))) < np.abs(values[:, 1])
+    return np.where(good, better, t)

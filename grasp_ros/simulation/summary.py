@@ -1,0 +1,74 @@
+"""What came of a run in a few numbers, as data: what `grasp simulate` prints, with `--json` and as a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Status
+from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.ensemble import ensemble
+from grasp_ros.simulation.losses import losses
+from grasp_ros.simulation.quantities import HORIZONS, by_output_times, settling_times
+from grasp_ros.simulation.trajectory import Trajectory
+
+MOTION, OUTPUTS = "motion", "output times"  # what a number is of
+ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def summary(run: Trajectory) -> dict[str, Any]:
+    """Numbers of a run by names that end with their unit; what the run does not have is left out.
+
+    `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled, and is left out
+    where it proves nothing; `touches` is left out for methods that do not look for them. V_c is twice the energy.
+    """
+    scene, method = run.scene, METHODS[run.method]
+    found: dict[str, Any] = {
+        "scene": scene.name, "title": scene.title, "watch": scene.watch, "warnings": list(scene.warnings),
+        "feedback": scene.feedback_in_words(run.sampled, bool(run.controllers)), "controllers": dict(run.controllers),
+        "status": run.status.name, "stop": run.stop, "duration_s": scene.duration, "output_times": len(run.t),
+        "reached_s": scene.duration if run.status is Status.DONE else float(max([0.0, *run.t[-1:]])),
+        "method": method.name, method.knob: run.setting, "work": run.counters,
+    }
+    if run.at_rest is not None:
+        found["at_rest_s"] = run.at_rest
+    if method.events:
+        found["touches"] = {name: len(run.times(Transition.TOUCH, side)) for side, name in ARMS.items()}
+        found["clamped"] = {name: len(run.times(Transition.CLAMP, side)) for side, name in ARMS.items()}
+        found["sticks"] = len(run.times(Transition.STICK, OBJECT))
+    if len(run.t):
+        found |= _amounts(run)
+    return found
+
+
+def _amounts(run: Trajectory) -> dict[str, Any]:
+    """Energies, settling times, largest forces and losses, as far as the scene has them."""
+    system, level = run.scene.system, run.energy.V_c
+    found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
+    if not METHODS[run.method].energy_check:
+        found["V_c_rise_J"] = float((level - np.minimum.accumulate(level)).max())
+    times = settling_times(run)
+    if not np.isnan(times).any():
+        found["settled_s"] = {NAMES[body]: float(times[COLUMN[body] // 2]) for body in system.present}
+        found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
+    found["largest_of"], found["largest_N"] = _largest(run)
+    if len(run.t) > 1 and not system.external:
+        found["lost_J"] = {cause: float(value) for cause, value in losses(run)._asdict().items()}
+        found["lost_by"] = OUTPUTS if by_output_times(run) else MOTION
+    return found
+
+
+def _largest(run: Trajectory) -> tuple[str, dict[str, float]]:
+    """Largest inputs and impact forces in N: of the motion itself if it can be watched once more, or at the outputs."""
+    names = ("f_l", "f_r", "fw_l", "fw_r")
+    if run.method == EXACT and run.status is Status.DONE and not run.controllers:
+        setup = Setup(accuracy=run.setting, sampled=run.sampled)
+        columns = ensemble(run.scene, {}, ("peak_input", "peak_impact"), setup=setup, threads=1).columns
+        return MOTION, dict(zip(names, (float(column[0]) for column in columns.values()), strict=True))
+    inputs, impacts = np.abs(run.command).max(axis=0), run.impacts.max(axis=0)
+    return OUTPUTS, dict(zip(names, [*inputs.tolist(), *impacts.tolist()], strict=True))

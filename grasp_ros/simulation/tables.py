@@ -1,0 +1,141 @@
+"""A motion as a table: the columns with their units, for xarray, pandas and text files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, BinaryIO, NamedTuple, Protocol
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.energy import Energy
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import OBJECT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene import Scene
+from grasp_ros.scene.parameter import UNITS as KEYS
+
+TIME = ("t", "s", "time")
+_ENDINGS = {unit: ending for ending, unit in reversed(KEYS.items())} | {"J": "_J", "W": "_W", "1": ""}
+
+
+class Motion(Protocol):
+    """What a table is made of, see `trajectory.Trajectory`."""
+
+    @property
+    def scene(self) -> Scene: ...  # noqa: D102
+
+    @property
+    def t(self) -> Array: ...  # noqa: D102
+
+    @property
+    def state(self) -> Array: ...  # noqa: D102
+
+    @property
+    def command(self) -> Array: ...  # noqa: D102
+
+    @property
+    def inputs(self) -> Array: ...  # noqa: D102
+
+    @property
+    def impacts(self) -> Array: ...  # noqa: D102
+
+    @property
+    def energy(self) -> Energy: ...  # noqa: D102
+
+    @property
+    def energy_of(self) -> str: ...  # noqa: D102
+
+    @property
+    def method(self) -> str: ...  # noqa: D102
+
+    @property
+    def setting(self) -> float: ...  # noqa: D102
+
+    @property
+    def status(self) -> Status: ...  # noqa: D102
+
+
+class Column(NamedTuple):
+    """One column of the table."""
+
+    name: str
+    unit: str
+    text: str
+    read: Callable[[Motion, Energy], Array]
+
+
+def _place(name: str, place: int) -> Callable[[Motion, Energy], Array]:
+    return lambda motion, _: np.asarray(getattr(motion, name))[:, place]
+
+
+def _level(name: str) -> Callable[[Motion, Energy], Array]:
+    return lambda _, level: np.asarray(getattr(level, name))
+
+
+_BODIES = {body: NAMES[body] for body in sorted(COLUMN, key=COLUMN.__getitem__)}
+_ARMS = {body: name for body, name in _BODIES.items() if body != OBJECT}
+COLUMNS: tuple[Column, ...] = (
+    *(Column(f"{symbol}_{name}", unit, f"{text} of the {name} mass", _place("state", COLUMN[body] + k))
+      for body, name in _BODIES.items()
+      for k, (symbol, unit, text) in enumerate((("x", "m", "position"), ("v", "m/s", "velocity")))),
+    *(Column(f"command_{name}", "N", f"command of the {name} controller", _place("command", body))
+      for body, name in _ARMS.items()),
+    *(Column(f"input_{name}", "N", f"force of controller and outside on the {name} mass", _place("inputs", body))
+      for body, name in _BODIES.items()),
+    *(Column(f"impact_{name}", "N", f"impact force of the {name} contact", _place("impacts", body))
+      for body, name in _ARMS.items()),
+    Column("V", "J", "the paper's Lyapunov function (16)", _level("V")),
+    Column("V_c", "J", "its continuous repair, twice the energy", _level("V_c")),
+    Column("V_rate", "W", "its rate (18)", _level("V_rate")),
+    Column("mode", "1", "contacts: 0 none, 1 left, 2 right, 3 both", _level("mode")),
+)
+
+
+def values_of(motion: Motion) -> dict[str, Array]:
+    """Values (n,) of each column."""
+    level = motion.energy
+    return {column.name: column.read(motion, level) for column in COLUMNS}
+
+
+def about(motion: Motion) -> dict[str, Any]:
+    """What the numbers are of."""
+    return {
+        "title": motion.scene.title, "scene": motion.scene.name, "scene_yaml": motion.scene.to_yaml(),
+        "method": motion.method, "setting": motion.setting, "status": motion.status.name, "energy_of": motion.energy_of,
+    }
+
+
+def dataset_of(motion: Motion) -> Any:
+    """See `trajectory.Trajectory.dataset`."""
+    try:
+        import xarray
+    except ModuleNotFoundError as error:
+        raise Refused(f"dataset() needs {error.name}; pip install 'grasp_ros[data]'") from None
+    name, unit, text = TIME
+    values = values_of(motion)
+    return xarray.Dataset(
+        {column.name: (name, values[column.name], {"units": column.unit, "long_name": column.text})
+         for column in COLUMNS},
+        {name: (name, motion.t, {"units": unit, "long_name": text})}, about(motion),
+    )
+
+
+def dataframe_of(motion: Motion) -> Any:
+    """See `trajectory.Trajectory.dataframe`."""
+    try:
+        import pandas
+    except ModuleNotFoundError as error:
+        raise Refused(f"dataframe() needs {error.name}; pip install 'grasp_ros[data]'") from None
+    frame = pandas.DataFrame(values_of(motion), index=pandas.Index(motion.t, name=TIME[0]))
+    frame.attrs = {**about(motion), "units": {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}}
+    return frame
+
+
+def write_csv(motion: Motion, file: BinaryIO) -> None:
+    """See `trajectory.Trajectory.to_csv`; numbers have all their digits."""
+    heads = [TIME[0] + _ENDINGS[TIME[1]], *(column.name + _ENDINGS[column.unit] for column in COLUMNS)]
+    file.write((",".join(heads) + "\n").encode())
+    for row in zip(motion.t.tolist(), *(column.tolist() for column in values_of(motion).values()), strict=True):
+        file.write((",".join(map(repr, row)) + "\n").encode())

@@ -1,0 +1,191 @@
+"""What every command line has: versions, levels, JSON, pipes, completion, and errors that fit into a line."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from grasp_ros import scene, simulation
+from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.parser import LONGEST
+
+GRASP = [sys.executable, "-m", "grasp_ros.cli"]
+SHORT = ("--set", "time.duration_s=1")
+
+
+def shell(program: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """A line for bash, in which $GRASP is the command."""
+    return subprocess.run(["bash", "-c", program], capture_output=True, text=True, timeout=60, check=False,
+                          env={**os.environ, "GRASP": " ".join(GRASP), **environment})
+
+
+def test_version(command: Any) -> None:
+    result = command("--version")
+    assert (result.returncode, result.stdout.split()[0], result.stderr) == (0, "grasp", "")
+
+
+def test_help_is_one_screen_with_every_command(command: Any) -> None:
+    for words in (("--help",), ("-h",)):
+        lines = command(*words).stdout.splitlines()
+        assert len(lines) <= 30
+        assert max(map(len, lines)) <= 100
+        assert {*COMMANDS} <= {line.split()[0] for line in lines if line.startswith("  ")}
+
+
+def test_help_needs_neither_numpy_nor_a_compiler() -> None:
+    program = ("import sys; from grasp_ros.cli.main import main; main(['--help']);"
+               " print(sorted({'numpy', 'numba', 'yaml', 'matplotlib', 'rclpy'} & {*sys.modules}))")
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert found.stdout.splitlines()[-1] == "[]"
+
+
+def test_help_is_there_at_once() -> None:
+    def seconds() -> float:
+        """Of the processor, which other tests do not change."""
+        before = os.times()
+        subprocess.run([*GRASP, "--help"], capture_output=True, timeout=60, check=True)
+        after = os.times()
+        return after.children_user + after.children_system - before.children_user - before.children_system
+
+    assert min(seconds() for _ in range(3)) < 0.3
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        ("simulat case_01", "argument command: simulat is not allowed; did you mean simulate?"),
+        ("simulate case_01 --setting a=1", "did you mean --set?"),
+        ("simulate case_01 --nonsense", "unrecognized arguments: --nonsense"),
+        ("simulate case_1", "case_1: no such scene; did you mean case_01 or case_10 or case_11"),
+        ("simulate case_01 --set left_contact.dissipation=1", "did you mean left_contact.dissipation_s_per_m?"),
+        ("simulate case_01 --set left_contakt={}", "did you mean left_contact?"),
+        ("simulate case_01 --method rk5", "argument --method: rk5 is not allowed; did you mean rk45?"),
+        ("simulate case_01 --set zzz.qqq=1", "no such key; allowed: time.duration_s, "),
+        ("map case_01 --x left_arm.mass=1:2 -o m.zarr", "did you mean left_arm.mass_kg?"),
+        ("new", "new: allowed: one FILE.yaml to write"),
+        ("new mine.txt", "mine.txt: is not allowed; allowed: a name that ends in .yaml"),
+    ],
+)
+def test_a_refusal_is_short_and_says_what_was_meant(command: Any, words: str, complaint: str) -> None:
+    result = command(*words.split())
+    assert result.returncode == 2
+    last = result.stderr.splitlines()[-1]
+    assert complaint in last
+    assert len(last) <= LONGEST
+
+
+def test_usage_is_that_of_the_command_that_was_wrong(command: Any) -> None:
+    assert command("simulate", "case_01", "--nonsense").stderr.startswith("usage: grasp simulate ")
+    assert command("simulate", "--grid", "x", "case_01").stderr.startswith("usage: grasp simulate ")
+    assert command("nothing").stderr.startswith("usage: grasp [")
+
+
+def test_an_endless_key_is_refused_in_a_line(command: Any, tmp_path: Path) -> None:
+    text = scene.load("case_01").to_yaml().replace("mass_kg", "m" * 5000)
+    (tmp_path / "long.yaml").write_text(text)
+    result = command("simulate", "long.yaml")
+    assert result.returncode == 2
+    assert len(result.stderr) <= LONGEST + 1
+
+
+def test_json_of_scenes_and_methods(command: Any) -> None:
+    found = json.loads(command("scenes", "--json").stdout)
+    assert [entry["name"] for entry in found] == scene.names()
+    assert found[0]["sections"][0] == "time"
+    assert json.loads(command("scenes", "case_01", "--json").stdout)["object"]["mass_kg"] == 5.0
+    assert json.loads(command("methods", "--json").stdout)[0]["name"] == "exact"
+
+
+def test_json_of_a_simulation_has_the_numbers_of_the_table(command: Any) -> None:
+    found = json.loads(command("simulate", "case_01", *SHORT, "--json").stdout)
+    run = simulation.simulate(scene.load("case_01", SHORT[1:]))
+    assert found["touches"]["left"] == len(run.contacts("left"))
+    assert found["V_c_J"] == run.energy.V_c[[0, -1]].tolist()
+    assert found["settled_s"] == {"left": None, "object": None, "right": None}  # not yet
+    assert found["status"] == "DONE"
+
+
+def test_quiet_says_nothing_but_the_result(command: Any) -> None:
+    words = ("simulate", "case_01", *SHORT, "--set", "loop.delay_ticks=0", "-o", "a.npz", "--force")
+    loud, still = command(*words), command(*words, "-q")
+    assert "warning: case_01: loop.delay_ticks" in loud.stderr
+    assert "written to a.npz" in loud.stderr
+    assert (still.stdout, still.stderr) == (loud.stdout, "")
+    assert command("-q", *words).stderr == ""
+    assert "numpy " in command(*words, "-v").stderr
+
+
+def test_output_goes_to_a_pipe(command: Any) -> None:
+    result = command("simulate", "case_01", *SHORT, "--grid", "3", "-o", "-")
+    rows = list(csv.reader(result.stdout.splitlines()))
+    assert rows[0][:2] == ["t_s", "x_left_m"]
+    assert len(rows) == 4
+    assert "touches left, right" in result.stderr
+    program = "$GRASP plot case_01 --set time.duration_s=1 -o - | head -c 8 | od -c"
+    assert "P   N   G" in shell(program).stdout
+
+
+def test_a_table_for_other_programs(command: Any, tmp_path: Path) -> None:
+    assert command("simulate", "case_01", *SHORT, "-o", "a.csv").returncode == 0
+    numbers = np.loadtxt(tmp_path / "a.csv", delimiter=",", skiprows=1)
+    run = simulation.simulate(scene.load("case_01", SHORT[1:]))
+    assert numbers[:, 1:7].tobytes() == run.state.tobytes()
+
+
+@pytest.mark.parametrize("program", ["$GRASP scenes >&-", "$GRASP --help >&-", "$GRASP --help | head -n 1",
+                                     "$GRASP scenes --json >&- 2>&-"])
+def test_a_closed_output_is_no_traceback(program: str) -> None:
+    result = shell(f"{program}; exit ${{PIPESTATUS[0]}}")
+    assert result.returncode == 0
+    assert "Traceback" not in result.stderr
+    assert "Exception" not in result.stderr
+
+
+@pytest.mark.parametrize("name", scene.names())
+def test_a_new_scene_is_the_one_it_is_like_and_every_offer_can_be_taken(name: str) -> None:
+    from grasp_ros.scene.commented import commented
+
+    like = scene.load(name)
+    text = commented(like)
+    assert scene.parse(text, name, "new.yaml") == like
+    offered = text.split("# What else there is")[1]
+    lines = [line[2:] for line in offered.splitlines() if line.startswith(("#   ", "# ")) and ":" in line
+             and not line[2:].lstrip().startswith("#") and line[2].islower()]
+    taken = [line for line in lines if not line.startswith("  ") or "..." not in line]
+    assert isinstance(yaml.safe_load("\n".join(taken) or "{}"), dict)
+
+
+def test_new_writes_a_file_that_runs(command: Any, tmp_path: Path) -> None:
+    assert command("new", "mine.yaml", "--like", "case_03", "--set", "object.mass_kg=7").returncode == 0
+    assert scene.load(str(tmp_path / "mine.yaml")).values["object"]["mass_kg"] == 7.0
+    assert command("new", "mine.yaml").returncode == 2
+    assert command("simulate", "mine.yaml", *SHORT).returncode == 0
+    assert command("new", "-o", "-").stdout.startswith("# A scene")
+
+
+def test_scenes_prints_one_as_it_was_written(command: Any) -> None:
+    text = command("scenes", "case_01").stdout
+    assert text.startswith("# Fukuda, Shoji, Inaba (1990)")
+    assert scene.parse(text, "case_01", "case_01") == scene.load("case_01")
+
+
+def test_a_shell_completes_commands_options_and_scenes() -> None:
+    def completed(line: str) -> set[str]:
+        """As argcomplete's function for bash asks."""
+        result = shell(f"{sys.executable} -m grasp_ros.cli 8>&1 9>/dev/null >/dev/null", _ARGCOMPLETE="1",
+                       _ARGCOMPLETE_IFS="\n", COMP_LINE=line, COMP_POINT=str(len(line)), _ARGCOMPLETE_SHELL="bash")
+        return {word.strip() for word in result.stdout.split("\n")}
+
+    assert {"simulate", "scenes"} <= completed("grasp s")
+    assert {"case_10", "case_11"} <= completed("grasp simulate case_1")
+    assert "--method" in completed("grasp simulate case_01 --me")
+    assert "discrete_gradient" in completed("grasp simulate case_01 --method d")

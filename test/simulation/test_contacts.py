@@ -1,0 +1,77 @@
+"""The table of contacts, against balances that do not know it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from documents import case_of, scene_of
+
+from grasp_ros import scene
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.simulation import ensemble, simulate
+from grasp_ros.simulation.contacts import UNITS
+from grasp_ros.simulation.losses import losses
+
+RUNS: dict[str, tuple[str, dict[str, Any]]] = {
+    "case 1": ("case_01", {}), "sampled": ("case_01", {"sampled": True}), "clamped": ("v_jump_one_sided", {}),
+    "held for long": ("preload", {}), "by another method": ("case_01", {"method": "rk4_events"}),
+}
+
+
+@pytest.mark.parametrize("kind", RUNS)
+def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: str) -> None:
+    name, how = RUNS[kind]
+    run = simulate(scene.load(name), **how)
+    left, right = run.contacts("left"), run.contacts("right")
+    mass = run.scene.values["object"]["mass_kg"]
+    change = mass * (run.state[-1, 3] - run.state[0, 3])
+    tight = 1e-7 if "method" in how else 1e-11
+    assert left["impulse"].sum() - right["impulse"].sum() == pytest.approx(change, abs=tight * left["impulse"].sum())
+    lost = left["loss"].sum() + right["loss"].sum()
+    if not run.sampled and "method" not in how:  # otherwise `losses` are no more exact than the output times
+        assert lost == pytest.approx(float(losses(run).impacts) / 2.0, rel=1e-10)
+    assert left.dtype.names == tuple(UNITS)
+
+
+def test_peaks_are_those_that_an_ensemble_sees() -> None:
+    case = case_of(duration=5.0)
+    run, seen = simulate(case), ensemble(case, {}, ["peak_impact", "peak_penetration", "touches"]).columns
+    for side in ("left", "right"):
+        table = run.contacts(side)
+        assert table["peak_force"].max() == pytest.approx(seen[f"peak_impact_{side}"][0], rel=1e-11)
+        assert table["deepest"].max() == pytest.approx(seen[f"peak_penetration_{side}"][0], rel=1e-11)
+        assert len(table) == seen[f"touches_{side}"][0]
+
+
+def test_a_pair_alone_restitutes_as_its_energy_says() -> None:
+    """A free arm hits a free object: what the contact took is what is missing of the energy of the relative motion."""
+    case = scene_of("hammer", "left_arm.velocity_m_per_s=1", without=("left_feedback",))
+    sections = {name: dict(numbers) for name, numbers in case.values.items()}
+    for key in ("stiffness_N_per_m", "damping_Ns_per_m"):
+        sections["left_arm"].pop(key, None)
+    [hit] = simulate(scene.compose("hit", sections)).contacts("left")
+    m, m_o = sections["left_arm"]["mass_kg"], sections["object"]["mass_kg"]
+    energy = 0.5 * m * m_o / (m + m_o) * hit["speed_in"] ** 2
+    assert hit["speed_in"] == 1.0
+    assert hit["restitution"] ** 2 == pytest.approx(1.0 - hit["loss"] / energy, rel=1e-11)
+    assert hit["impulse"] == pytest.approx(m * m_o / (m + m_o) * (hit["speed_in"] + hit["speed_out"]), rel=1e-11)
+
+
+def test_begin_and_end_of_the_run_may_be_within_a_contact() -> None:
+    [only] = simulate(scene.load("preload")).contacts("left")
+    assert (only["end"], np.isnan(only["speed_out"]), np.isnan(only["restitution"])) == (10.0, True, True)
+    deep = simulate(case_of("case_01", 2.0, 0.001, "left_arm.position_m=0.001")).contacts("left")
+    assert deep[0]["begin"] == 0.0
+    assert np.isnan(deep[0]["speed_in"])
+    run = simulate(case_of())
+    assert run.contacts("right")["begin"].tolist() == run.times(Transition.TOUCH, 1).tolist()
+    assert run.contacts("left")["end"][0] == run.times(Transition.RELEASE, LEFT)[0]
+
+
+def test_no_contact_is_an_empty_table_and_no_side_is_refused() -> None:
+    assert len(simulate(scene.load("no_contact")).contacts("left")) == 0
+    with pytest.raises(Refused, match="side 'up' is not allowed; allowed: left or right"):
+        simulate(case_of()).contacts("up")

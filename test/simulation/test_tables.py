@@ -1,0 +1,92 @@
+"""Runs as data sets, frames and text files, and as what a notebook shows."""
+
+from __future__ import annotations
+
+import csv
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from documents import case_of
+
+import grasp_ros as gr
+from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation import progress, simulate
+from grasp_ros.simulation.tables import COLUMNS
+
+
+def test_a_data_set_has_names_and_units_as_attributes() -> None:
+    run = simulate(case_of())
+    data = run.dataset()
+    assert data.sizes == {"t": len(run.t)}
+    assert data["x_object"].attrs == {"units": "m", "long_name": "position of the object mass"}
+    assert data["t"].attrs["units"] == "s"
+    assert data.attrs["scene"] == "case_01"
+    assert data["x_object"].values.tobytes() == run.state[:, 2].tobytes()
+    assert float(data["impact_left"].sel(t=run.t[50])) == run.impacts[50, 0]
+    assert set(data) == {column.name for column in COLUMNS}
+
+
+def test_a_frame_and_a_text_file_hold_the_same_numbers(tmp_path: Path) -> None:
+    run = simulate(case_of(), sampled=True)
+    frame = run.dataframe()
+    assert frame.index.name == "t"
+    assert frame.attrs["units"]["v_left"] == "m/s"
+    run.to_csv(tmp_path / "run.csv")
+    rows = list(csv.DictReader((tmp_path / "run.csv").read_text().splitlines()))
+    assert list(rows[0])[:3] == ["t_s", "x_left_m", "v_left_m_per_s"]
+    assert np.array([float(row["v_left_m_per_s"]) for row in rows]).tobytes() == frame["v_left"].to_numpy().tobytes()
+    assert len(rows) == len(run.t)
+
+
+def test_without_the_packages_a_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = simulate(case_of(), grid=np.zeros(1))
+    for name, call in (("xarray", run.dataset), ("pandas", run.dataframe)):
+        monkeypatch.setitem(sys.modules, name, None)
+        with pytest.raises(Refused, match=rf"needs {name}; pip install 'grasp_ros\[data\]'"):
+            call()
+
+
+def test_a_notebook_shows_a_run_and_a_scene() -> None:
+    run = simulate(case_of())
+    text = run._repr_html_()
+    assert text.count("<polyline") == 3
+    assert "reached the end of the horizon" in text
+    assert "<tr><th style='text-align:left'>touches" in text
+    shown = case_of()._repr_html_()
+    assert "left_contact" in shown
+    assert "<td style='text-align:left'>10000 N/m^1.5</td>" in shown
+    bad = gr.compose("<b>", case_of().values)._repr_html_()
+    assert "<b>:" not in bad
+
+
+def test_a_bar_is_drawn_only_where_somebody_looks(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress, "DELAY_S", 0.0)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    simulate(case_of(), progress=True)
+    assert capsys.readouterr().err == ""  # no terminal
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    simulate(case_of(), progress=True)
+    assert "case_01: 100%" in capsys.readouterr().err
+    for name, value in (("TERM", "dumb"), ("NO_COLOR", "1")):
+        with monkeypatch.context() as inner:
+            inner.setenv(name, value)
+            simulate(case_of(), progress=True)
+            assert capsys.readouterr().err == ""
+
+
+def test_what_is_public_is_there_and_costs_nothing_before_it_is_used() -> None:
+    for name in gr.__all__:
+        assert getattr(gr, name) is not None
+        assert name in dir(gr)
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        gr.nothing  # noqa: B018
+    program = ("import sys; before = {*sys.modules}; import grasp_ros; "
+               "print(sorted(name for name in {*sys.modules} - before if 'numpy' in name or 'numba' in name))")
+    found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
+    assert found.stdout == "[]\n"
