@@ -1,0 +1,99 @@
+"""All settings of several solvers within a time, and what to take of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from grasp_ros.accuracy.contender import Contender
+from grasp_ros.accuracy.measure import NOT_INSTALLED, Effort, Record, attempt
+from grasp_ros.accuracy.truth import Truth
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene
+
+QUICK = Effort(patience=0.8, budget=0.03, most=5)
+SECONDS = 40.0
+OTHERS = 3
+
+
+class Advice(NamedTuple):
+    """The best choice, what comes after it, and what was possible at all."""
+
+    choice: Record | None
+    others: list[Record]  # the best of other methods, the fastest first
+    closest: Record  # the most accurate of all
+
+
+def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort: Effort = QUICK,
+            seconds: float = SECONDS, progress: Callable[[float], object] | None = None) -> list[Record]:
+    """Measure solvers from their loosest setting on, in turn, until the time is over.
+
+    Parameters
+    ----------
+    scene : Scene
+    contenders : sequence of Contender
+        One that takes longer than the patience climbs no further.
+    truth : Truth
+    effort : Effort
+    seconds : float
+        After which no measurement begins.
+    progress : callable, optional
+        Called with the time that went by, in s.
+    """
+    begin = time.monotonic()
+    records: list[Record] = []
+    climbing = {contender: iter(contender.ladder[:: effort.stride]) for contender in contenders}
+    while climbing:
+        for contender in tuple(climbing):
+            if time.monotonic() - begin > seconds:
+                return _in_order(records, contenders)
+            setting = next(climbing[contender], None)
+            if setting is None:
+                del climbing[contender]
+                continue
+            record = attempt(contender, scene, setting, truth, effort)
+            records.append(record)
+            if record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience:
+                del climbing[contender]
+            if progress is not None:
+                progress(min(time.monotonic() - begin, seconds))
+    return _in_order(records, contenders)
+
+
+def _in_order(records: list[Record], contenders: Sequence[Contender]) -> list[Record]:
+    """By solver, each from loose to tight."""
+    names = [contender.name for contender in contenders]
+    return sorted(records, key=lambda record: names.index(record.method))
+
+
+def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
+    """Records of each method, in the order of their settings."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        groups.setdefault(record.method, []).append(record)
+    return groups
+
+
+def fastest(records: Iterable[Record], error: float) -> Record | None:
+    """The sound record that reaches an error in the least time."""
+    reached = [record for record in records if record.sound and record.error is not None and record.error <= error]
+    return min(reached, key=lambda record: record.time, default=None)
+
+
+def advise(records: Iterable[Record], error: float) -> Advice:
+    """The fastest setting that reaches an error; runs that miss touches or stop early are no choice.
+
+    Raises
+    ------
+    Refused
+        If the error is not positive, or nothing has a result.
+    """
+    if not error > 0.0:
+        raise Refused(f"--error {error!r} is not allowed; allowed: a number > 0")
+    groups = by_method(record for record in records if record.sound)
+    if not groups:
+        raise Refused("no method has a result on this scene")
+    best = sorted((found for group in groups.values() if (found := fastest(group, error))), key=lambda r: r.time)
+    sound = [record for group in groups.values() for record in group]
+    return Advice(best[0] if best else None, best[1 : 1 + OTHERS], min(sound, key=lambda r: r.error or 0.0))

@@ -1,0 +1,66 @@
+"""What a solver must look like to be measured, and the methods of `grasp simulate` in that shape."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+from grasp_ros.exact.integrator import Status
+from grasp_ros.methods.registry import METHODS, check
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.simulation.simulate import simulate
+
+DONE = "done"
+
+
+class Answer(NamedTuple):
+    """What a solver delivers."""
+
+    state: Array  # (n, 6), m and m/s; fewer rows than asked for if it failed
+    touches: tuple[int, int] | None  # left and right; None: it does not look for them
+    status: str  # DONE, or why it stopped
+    steps: int | None = None  # None: the solver does not say
+    right_hand_sides: int | None = None
+
+
+Solve = Callable[[Array], Answer]  # from the output times, of which the last is the horizon
+
+
+class Contender(NamedTuple):
+    """A solver with the settings to try."""
+
+    family: str  # the package that it comes from
+    name: str
+    knob: str
+    ladder: tuple[float, ...]  # loose to tight
+    build: Callable[[Scene, float], Solve]  # raises ImportError if the solver is not installed
+
+
+def own_contenders(scene: Scene) -> tuple[list[Contender], dict[str, str]]:
+    """The methods of `grasp simulate` that can treat a scene, and why the others cannot, by name."""
+    found, others = [], {}
+    for name, method in METHODS.items():
+        try:
+            check(name, scene, None, sampled=scene.sampled)
+        except Refused as refusal:
+            others[name] = str(refusal)
+            continue
+        ladder = tuple(setting for setting in method.ladder if setting <= scene.duration)
+        found.append(Contender(method.package or "grasp_ros", name, method.knob, ladder, partial(_simulated, name)))
+    return found, others
+
+
+def _simulated(name: str, scene: Scene, setting: float) -> Solve:
+    def solve(grid: Array) -> Answer:
+        run = simulate(scene, grid=grid, method=name, setting=setting)
+        left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
+        counts = run.counters
+        steps = sum(counts.get(counter, 0) for counter in ("steps", "flights", "contact steps"))
+        return Answer(run.state, (left, right) if METHODS[name].events else None,
+                      DONE if run.status is Status.DONE else run.status.value, steps, counts.get("right hand sides"))
+
+    return solve

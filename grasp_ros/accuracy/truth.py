@@ -1,0 +1,65 @@
+"""What solvers are held against: the exact method at its finest, with an estimate of its own error.
+
+A motion in double precision is known no better than the scene amplifies roundings. So the estimate is the largest
+difference to runs that begin one rounding beside the initial state; or, if that is more, a tenth of the difference to a
+run with ten times the first neglected term.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Status
+from grasp_ros.physics.accuracy import FINEST
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import NAMES
+from grasp_ros.scene import Scene
+from grasp_ros.simulation.simulate import GRID_POINTS, simulate
+from grasp_ros.simulation.trajectory import Trajectory
+
+FINER = 10.0
+SECTIONS = {name: name if name == "object" else f"{name}_arm" for name in NAMES.values()}
+
+
+class Truth(NamedTuple):
+    """A motion that is known."""
+
+    grid: Array  # (n,), s
+    state: Array  # (n, 6), m and m/s
+    touches: tuple[int, int]
+    uncertainty: float  # of the states, m and m/s
+
+
+def finest(scene: Scene) -> Truth:
+    """The motion of a scene, and how well it is known.
+
+    Raises
+    ------
+    Refused
+        If the run does not reach its end.
+    """
+    grid = np.linspace(0.0, scene.duration, GRID_POINTS)
+    run = simulate(scene, grid=grid, accuracy=FINEST)
+    if run.status is not Status.DONE:
+        raise Refused(f"{scene.name}: {run.stop}; allowed here: a scene that runs to its end")
+    apart = [distance(run, simulate(scene, grid=grid, accuracy=FINER * FINEST).state) / FINER, *(
+        distance(run, simulate(_beside(scene, section), grid=grid, accuracy=FINEST).state)
+        for section in SECTIONS.values() if section in scene.values)]
+    left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
+    return Truth(grid, run.state, (left, right), max(apart))
+
+
+def _beside(scene: Scene, section: str) -> Scene:
+    """A scene whose body begins one rounding of the scene's length farther right."""
+    length = max(abs(scene.initial_state[0::2]).max(), np.finfo(float).tiny)
+    place = scene.values[section]["position_m"]
+    return scene.changed({f"{section}.position_m": float(place + np.spacing(length))})
+
+
+def distance(truth: Truth | Trajectory, state: Array) -> float:
+    """Largest difference of states (n, 6) to the last n of a motion that is known, m and m/s; without absent bodies."""
+    return float(np.nanmax(np.abs(state - truth.state[-len(state) :]), initial=0.0))

@@ -1,0 +1,109 @@
+"""`grasp accuracy`: what accuracy costs on a scene and on this machine, and the setting to take."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from typing import Any
+
+from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, compare, fastest
+from grasp_ros.accuracy.contender import own_contenders
+from grasp_ros.accuracy.measure import Record
+from grasp_ros.accuracy.truth import Truth, finest
+from grasp_ros.cli.arguments import (
+    add_command,
+    add_force,
+    add_json,
+    add_output,
+    add_scene,
+    check_output,
+    load_scene,
+    prepare,
+)
+from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.output import STDOUT, bar, destination, show
+from grasp_ros.methods.contract import UNITS
+from grasp_ros.physics.errors import Refused
+
+TARGETS = (1e-3, 1e-6, 1e-9)
+MOST_SECONDS = 3600.0
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommand."""
+    sub = add_command(commands, "accuracy", _accuracy, COMMANDS["accuracy"].text)
+    add_scene(sub)
+    sub.add_argument("--error", type=float, metavar="E", help="largest error that you accept, in all states (m, m/s)")
+    sub.add_argument("--seconds", type=float, default=SECONDS, metavar="S",
+                     help=f"after which no measurement begins (default {SECONDS:g})")
+    add_output(sub, "FIGURE", "draw error against time, .png, .svg or .pdf; - is the standard output")
+    add_force(sub)
+    add_json(sub)
+
+
+def _accuracy(options: argparse.Namespace) -> int:
+    scene = load_scene(options.scene, options.settings)
+    if not 0.0 < options.seconds <= MOST_SECONDS:
+        raise Refused(f"--seconds {options.seconds!r} is not allowed; allowed: > 0 and <= {MOST_SECONDS:g}")
+    if options.error is not None and not options.error > 0.0:
+        raise Refused(f"--error {options.error!r} is not allowed; allowed: a number > 0")
+    if options.output is not None:
+        check_output(options.output, options.force, [options.scene])
+    contenders, others = own_contenders(scene)
+    prepare()
+    truth = finest(scene)
+    with bar(options.seconds, "s", scene.name) as told:
+        records = compare(scene, contenders, truth, seconds=options.seconds, progress=told)
+    advice = None if options.error is None else advise(records, options.error)
+    again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
+    text = [*_table(truth, records), *(f"not here: {reason}" for reason in others.values()),
+            *([] if advice is None else _advice(again, options.error, truth, advice))]
+    show(options, "\n".join(text), {
+        "scene": scene.name, "uncertainty": truth.uncertainty, "touches": truth.touches, "not_here": others,
+        "records": [record._asdict() for record in records],
+        "take": None if advice is None or advice.choice is None else advice.choice._asdict()})
+    if options.output is not None:
+        from grasp_ros.accuracy.figure import error_against_time
+        from grasp_ros.simulation.plots import format_of, write
+
+        figure = error_against_time(scene, truth, records, advice, options.error)
+        ending = "png" if options.output == STDOUT else format_of(figure, options.output)
+        with destination(options.output) as file:
+            write(figure, file, ending)
+    return 0 if advice is None or advice.choice is not None else 1
+
+
+def _table(truth: Truth, records: Sequence[Record]) -> list[str]:
+    """A line for each method: milliseconds to some errors, its best error, and what it missed."""
+    heads = "".join(f"{f'<= {target:.0e}':>11}" for target in TARGETS)
+    lines = [
+        f"truth: exact at its finest, known to {truth.uncertainty:.1e} m and m/s in double precision",
+        f"{'ms to an error of':<20}{heads}{'best error':>12}  at",
+    ]
+    for name, group in by_method(records).items():
+        found = [fastest(group, target) for target in TARGETS]
+        cells = "".join(f"{'-' if record is None else f'{1e3 * record.time:.3g}':>11}" for record in found)
+        best = min((record for record in group if record.sound), key=lambda record: record.error or 0.0, default=None)
+        end = f"{'-':>12}  {group[-1].status}" if best is None else (
+            f"{max(best.error or 0.0, truth.uncertainty):>12.1e}  {best.knob} {best.setting:g}{UNITS[best.knob]}")
+        unsound = sum(not record.sound for record in group)
+        lines.append(f"{name:<20}{cells}{end}" + (f"; {unsound} of {len(group)} runs stop or miss touches" if unsound
+                                                  else ""))
+    return lines
+
+
+def _advice(scene: str, error: float, truth: Truth, advice: Advice) -> list[str]:
+    """What to take."""
+    if advice.choice is None:
+        return [f"no method reaches an error of {error:g}; closest: {_in_words(advice.closest, truth)}"]
+    choice = advice.choice
+    return [
+        f"take: {_in_words(choice, truth)}", *(f"or:   {_in_words(record, truth)}" for record in advice.others),
+        f"grasp simulate {scene} --method {choice.method} --{choice.knob} {choice.setting:g}",
+    ]
+
+
+def _in_words(record: Record, truth: Truth) -> str:
+    reached = max(record.error or 0.0, truth.uncertainty)
+    setting = f"{record.knob} {record.setting:g}{UNITS[record.knob]}"
+    return f"{record.method}, {setting}: error {reached:.1e} in {1e3 * record.time:.3g} ms"

@@ -1,0 +1,124 @@
+"""What accuracy costs: measurements, the truth they are held against, and the setting to take."""
+
+from __future__ import annotations
+
+import json
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from documents import case_of
+
+from grasp_ros import scene as scenes
+from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest
+from grasp_ros.accuracy.contender import Answer, Contender, own_contenders
+from grasp_ros.accuracy.measure import NOT_INSTALLED, Record, attempt
+from grasp_ros.accuracy.truth import Truth, finest
+from grasp_ros.physics.errors import Refused
+
+LAST = [-0.008512122262300985, -0.011087931065097529, -0.005641499599319586, 0.0034325068122038564,
+        -0.0008363089547169395, 0.0033174261285577183]  # case 1 at 20 s, from the reference with 25 digits
+
+
+def record(method: str, error: float | None, seconds: float | None, **other: Any) -> Record:
+    values: dict[str, Any] = {
+        "scene": "s", "family": "f", "method": method, "knob": "tolerance", "setting": 1e-6, "error": error,
+        "seconds": seconds, "least": seconds, "repeats": 3, "first": 1.0, "steps": 10, "right_hand_sides": 60,
+        "found": (3, 2), "there_are": (3, 2), "status": "done",
+    }
+    return Record(**{**values, **other})
+
+
+def test_the_truth_knows_its_own_error() -> None:
+    truth = finest(scenes.load("case_01"))
+    error = np.abs(truth.state[-1] - LAST).max()
+    assert error <= truth.uncertainty < 1e-11
+    assert truth.touches == (22, 22)
+    wild = finest(scenes.load("case_03"))
+    assert wild.uncertainty > 10.0 * truth.uncertainty  # it amplifies what it is given 1e4 times as much
+
+
+def test_error_and_touches_are_measured_not_believed() -> None:
+    scene = case_of()
+    truth, (contenders, others) = finest(scene), own_contenders(scene)
+    assert others == {}
+    by_name = {contender.name: contender for contender in contenders}
+    exact, paper = (attempt(by_name[name], scene, setting, truth, QUICK)
+                    for name, setting in (("exact", 1e-16), ("paper", 1e-3)))
+    assert exact.error == 0.0
+    assert paper.error is not None
+    assert 1e-8 < paper.error < 1e-2
+    assert exact.found == exact.there_are == truth.touches
+    assert exact.sound
+    assert paper.first >= paper.time > 0.0
+
+
+def test_solvers_take_turns_within_the_time_and_leave_when_they_are_slow() -> None:
+    scene, truth = case_of(), Truth(np.array([0.0, 2.0]), np.zeros((2, 6)), (0, 0), 1e-14)
+    calls: list[tuple[str, float]] = []
+
+    def solver(name: str, seconds: float) -> Contender:
+        def build(_: Any, setting: float) -> Any:
+            def solve(grid: Any) -> Answer:
+                calls.append((name, setting))
+                end = time.perf_counter() + seconds
+                while time.perf_counter() < end:
+                    pass
+                return Answer(np.zeros((len(grid), 6)), None, "done")
+
+            return solve
+
+        return Contender("f", name, "step", (3.0, 2.0, 1.0), build)
+
+    def absent(*_: Any) -> Any:
+        raise ImportError("no such solver")
+
+    slow, fast = solver("slow", 0.05), solver("fast", 0.0)
+    missing = Contender("f", "missing", "step", (1.0, 0.5), absent)
+    found = compare(scene, [slow, fast, missing], truth, QUICK._replace(patience=0.02))
+    assert [(r.method, r.setting, r.status) for r in found] == [
+        ("slow", 3.0, "done"), *(("fast", setting, "done") for setting in (3.0, 2.0, 1.0)),
+        ("missing", 1.0, NOT_INSTALLED)]
+    assert list(dict.fromkeys(calls)) == [("slow", 3.0), ("fast", 3.0), ("fast", 2.0), ("fast", 1.0)]
+    assert len(compare(scene, [slow], truth, seconds=0.0)) <= 1
+
+
+def test_advice_is_the_fastest_sound_run_within_the_error() -> None:
+    lucky, cut = record("lucky", 1e-9, 0.1, found=(2, 2)), record("cut", 1e-9, 0.1, status="stopped: something")
+    good, slow = record("good", 1e-7, 1.0), record("slow", 1e-10, 5.0)
+    advice = advise([lucky, cut, slow, good], 1e-6)
+    assert (advice.choice, advice.others) == (good, [slow])
+    nobody = advise([slow, good], 1e-12)
+    assert (nobody.choice, nobody.closest) == (None, slow)
+    assert fastest([lucky, good, slow], 1e-9) is slow
+    for error in (0.0, float("nan")):
+        with pytest.raises(Refused, match="allowed: a number > 0"):
+            advise([good], error)
+    with pytest.raises(Refused, match="no method has a result"):
+        advise([cut], 1.0)
+
+
+def test_methods_that_do_not_know_a_scene_are_named() -> None:
+    contenders, others = own_contenders(scenes.load("everything"))
+    assert [contender.name for contender in contenders] == ["exact"]
+    assert "only continuous feedback" in others["rk4"]
+
+
+@pytest.mark.slow
+def test_the_command_answers_with_a_command_and_a_picture(command: Any, tmp_path: Path) -> None:
+    words = ("accuracy", "case_01", "--set", "time.duration_s=0.5", "--seconds", "8")
+    result = command(*words, "--error", "1e-6", "-o", "a.png")
+    assert result.returncode == 0, result.stderr
+    last = result.stdout.splitlines()[-1]
+    assert last.startswith("grasp simulate case_01 --set time.duration_s=0.5 --method ")
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    assert command(*last.split()[1:]).returncode == 0
+    too_much = command(*words, "--error", "1e-30")
+    assert too_much.returncode == 1
+    assert "no method reaches an error of 1e-30; closest: exact" in too_much.stdout
+    found = json.loads(command("accuracy", "noise", "--set", "time.duration_s=0.5", "--json").stdout)
+    assert {entry["method"] for entry in found["records"]} == {"exact"}
+    assert command(*words, "--error", "0").returncode == 2
+    assert command(*words[:-1], "inf").returncode == 2
