@@ -21,7 +21,7 @@ from grasp_ros.cli.arguments import (
     warn,
 )
 from grasp_ros.cli.commands import COMMANDS
-from grasp_ros.cli.output import STDOUT, destination
+from grasp_ros.cli.output import STDOUT, destination, note
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
@@ -43,11 +43,16 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
     add_output(sub, "FILE", "image, .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     add_force(sub)
+    sub.add_argument("--animate", action="store_true",
+                     help="a moving picture of one source instead, .gif, .html or .mp4 (default: .gif beside it)")
+    sub.add_argument("--speed", type=float, default=1.0, metavar="R", help="its seconds in a second (default 1)")
 
 
 def _plot(options: argparse.Namespace) -> int:
     span = _span(options)
-    output = options.output or _beside(options.sources[0])
+    output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
+    if options.animate and (len(options.sources) > 1 or output == STDOUT):
+        raise Refused("--animate: allowed: one source, and a file")
     check_output(output, options.force, options.sources)
     motions, captions = [], []
     for source in options.sources:
@@ -61,6 +66,12 @@ def _plot(options: argparse.Namespace) -> int:
         if math.isfinite(span[1]) and span[1] > longest:
             raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
         span = span[0], min(span[1], longest)
+    if options.animate:
+        from grasp_ros.simulation.animation import animate
+
+        animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
+        note(f"written to {output}")
+        return 0
     figure = plots.compose(motions, captions, width_mm=options.width, span=span)
     with destination(output) as file:
         plots.write(figure, file, "png" if output == STDOUT else plots.format_of(figure, output))
@@ -109,10 +120,10 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
     return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step)
 
 
-def _beside(source: str) -> Path:
+def _beside(source: str, ending: str) -> Path:
     """Where the figure goes if nothing else is said."""
     path = Path(source)
     with reading(path):
         if not path.exists():
-            return Path(f"{path.stem}.png")
-        return Path(f"{path.resolve()}.png") if path.is_dir() else path.with_suffix(".png")
+            return Path(f"{path.stem}{ending}")
+        return Path(f"{path.resolve()}{ending}") if path.is_dir() else path.with_suffix(ending)

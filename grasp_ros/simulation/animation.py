@@ -1,0 +1,156 @@
+"""A motion that moves: arms and object on their line, with springs, contacts and the recent past."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.animation import FuncAnimation, writers
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+
+from grasp_ros.physics.energy import pairs_of
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.model import Array, Contact, impact_force
+from grasp_ros.physics.system import COLUMN
+from grasp_ros.scene.files import writing
+from grasp_ros.simulation.plots import LEFT_COLOR, MM, OBJECT_COLOR, RIGHT_COLOR, Motion
+
+COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_COLOR}
+FRONTS: dict[int, float] = {LEFT: 1.5, OBJECT: 0.5, RIGHT: -0.5}  # lengths from the begin of a body to its position
+WRITERS = {".gif": "pillow", ".html": "html", ".mp4": "ffmpeg"}
+RATE = 25  # pictures in a second
+MOST_PICTURES = 2000
+WIDTH_MM, HEIGHT_MM, DPI = 150.0, 75.0, 96
+THICK = 0.06  # of a body, relative to the range of the motion
+PRESSED = "#f0e442"  # an object that is touched
+COILS = np.array([0.0, 0.0, *([1.0, -1.0] * 5), 0.0, 0.0])
+
+
+def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float, float] | None = None,
+            width_mm: float | None = None) -> None:
+    """Write a motion as a moving picture.
+
+    Parameters
+    ----------
+    motion : Motion
+        Between its output times states are interpolated linearly.
+    path : Path
+        .gif, .html (with its pictures inside) or .mp4.
+    speed : float
+        Seconds of the motion in a second.
+    span : tuple of float, optional
+        First and last time in s; default: the whole motion.
+    width_mm : float, optional
+        Default: 150 mm.
+
+    Raises
+    ------
+    Refused
+        If the ending is another, its program is not there, the motion is empty, the speed is not allowed, or the file
+        cannot be written.
+    """
+    times = _times(motion, speed, span)
+    writer = _writer(path)
+    figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
+    animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
+    part = path.with_name(f".{path.stem[:200]}.part{path.suffix}")
+    try:
+        with writing(path):
+            if path.suffix == ".html":
+                part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
+            else:
+                animation.save(part, writer=writer, fps=RATE, dpi=DPI)
+            part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+        plt.close(figure)
+
+
+def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Array:
+    """Times of the pictures."""
+    if not len(motion.t):
+        raise Refused("nothing to draw: the motion has no output times")
+    if not 0.0 < speed < np.inf:
+        raise Refused(f"--speed {speed!r} is not allowed; allowed: a number > 0")
+    first, last = span or (float(motion.t[0]), float(motion.t[-1]))
+    count = int((last - first) / speed * RATE) + 1
+    if count > MOST_PICTURES:
+        raise Refused(f"--speed {speed!r}: {count} pictures; allowed: at most {MOST_PICTURES}, with a higher --speed or"
+                      " a shorter time")
+    return np.minimum(first + np.arange(count) * speed / RATE, last)
+
+
+def _writer(path: Path) -> str:
+    """The writer of matplotlib for a file."""
+    name = WRITERS.get(path.suffix.lower())
+    if name is None:
+        raise Refused(f"{path}: {path.suffix or 'no ending'} is not allowed; allowed: {', '.join(WRITERS)}")
+    if not writers.is_available(name):
+        raise Refused(f"{path}: needs the program {name}, which is not installed; allowed without: .gif, .html")
+    return name
+
+
+def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
+    """The figure, and what draws its picture k."""
+    system = motion.scene.system
+    positions = {body: np.interp(times, motion.t, motion.state[:, COLUMN[body]]) for body in system.present}
+    forces = {}
+    for side, u, d in pairs_of(system, motion.state):
+        force = impact_force(Contact(*system.pairs[side]), u, d)
+        forces[side] = np.maximum.reduceat(force, np.searchsorted(motion.t, times, side="right").clip(1) - 1)
+    figure: Figure
+    figure, (line, past) = plt.subplots(2, 1, figsize=(width_mm / MM, width_mm / MM * HEIGHT_MM / WIDTH_MM),
+                                        height_ratios=(2, 3), layout="constrained")
+    low, high = (float(pick(list(positions.values()))) for pick in (np.min, np.max))
+    reach = max(high - low, 1e-12)
+    bodies, coils = _draw_line(line, list(positions), low - 0.25 * reach, high + 0.25 * reach, THICK * reach)
+    line.set_title(motion.scene.title, fontsize="small", parse_math=False)
+    for body, x in positions.items():
+        past.plot(times, x, color=COLORS[body], linewidth=1.0)
+    past.set(xlim=(times[0], max(times[-1], times[0] + 1e-12)), xlabel="time, s", ylabel="position, m")
+    past.grid(alpha=0.3)
+    now = past.axvline(times[0], color="black", linewidth=0.8)
+
+    def update(k: int) -> Sequence[Any]:
+        for body, x in positions.items():
+            bodies[body].set_x(x[k] - FRONTS[body] * THICK * reach)
+            if body in coils:
+                wall = line.get_xlim()[0 if body == LEFT else 1]
+                back = x[k] - FRONTS[body] * THICK * reach + (0.0 if body == LEFT else THICK * reach)
+                coils[body].set_xdata(np.linspace(wall, back, len(COILS)))
+        if OBJECT in bodies:
+            touched = any(force[k] > 0.0 for force in forces.values())
+            bodies[OBJECT].set_facecolor(PRESSED if touched else OBJECT_COLOR)
+        now.set_xdata([times[k], times[k]])
+        return ()
+
+    update(0)
+    figure.canvas.draw()
+    figure.set_layout_engine("none")  # it has its layout, which takes longer than a picture
+    return figure, update
+
+
+def _draw_line(axes: Axes, present: Sequence[int], low: float, high: float, thick: float
+               ) -> tuple[dict[int, Rectangle], dict[int, Any]]:
+    """Bodies and springs on their line; they are put in their place later."""
+    axes.set(xlim=(low, high), ylim=(-1.0, 1.0), xticks=[], yticks=[])
+    for side in ("left", "right", "top"):
+        axes.spines[side].set_visible(False)
+    bodies: dict[int, Rectangle] = {}
+    coils: dict[int, Any] = {}
+    for body in present:
+        height = 1.2 if body == OBJECT else 0.8
+        bodies[body] = Rectangle((0.0, -height / 2.0), thick, height, facecolor=COLORS[body], edgecolor="black")
+        axes.add_patch(bodies[body])
+        if body != OBJECT:
+            (coils[body],) = axes.plot(np.zeros(len(COILS)), 0.25 * COILS, color=COLORS[body], linewidth=0.9)
+    return bodies, coils
