@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
-from matplotlib.figure import Figure
-
 from grasp_ros.accuracy.compare import Advice, by_method
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.scene import Scene
+from grasp_ros.simulation import canvas
+from grasp_ros.simulation.canvas import Figure, colormaps, style
 
 COLORS, MARKS = "tab20", "osD^v<>Pp*hX8"
 CHOSEN = "#d55e00"
@@ -22,9 +18,8 @@ CHOSEN = "#d55e00"
 def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], advice: Advice | None,
                        error: float | None) -> Figure:
     """A figure of all sound records, with the limit of what can be known, the error that is wanted, and the choice."""
-    figure: Figure
-    figure, axes = plt.subplots(figsize=(8.0, 5.2), layout="constrained")
-    colors = plt.get_cmap(COLORS)
+    figure, axes = canvas.subplots(figsize=(8.0, 5.2), layout="constrained")
+    colors = colormaps[COLORS]
     for place, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
         errors = [max(record.error or 0.0, truth.uncertainty) for record in group]
         axes.loglog(errors, [1e3 * record.time for record in group], color=colors(place % 20),

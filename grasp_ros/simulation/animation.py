@@ -6,14 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.animation import FuncAnimation, writers
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from grasp_ros.physics.energy import pairs_of
@@ -22,6 +16,8 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.files import writing
+from grasp_ros.simulation import canvas
+from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.plots import LEFT_COLOR, MM, OBJECT_COLOR, RIGHT_COLOR, Motion
 
 COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_COLOR}
@@ -60,11 +56,11 @@ def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float
     """
     times = _times(motion, speed, span)
     writer = _writer(path)
-    figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
-    animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
     part = path.with_name(f".{path.stem[:200]}.part{path.suffix}")
     try:
-        with writing(path):
+        with writing(path), canvas.style():
+            figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
+            animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
             if path.suffix == ".html":
                 part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
             else:
@@ -72,7 +68,6 @@ def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float
             part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-        plt.close(figure)
 
 
 def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Array:
@@ -107,8 +102,7 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
     for side, u, d in pairs_of(system, motion.state):
         force = impact_force(Contact(*system.pairs[side]), u, d)
         forces[side] = np.maximum.reduceat(force, np.searchsorted(motion.t, times, side="right").clip(1) - 1)
-    figure: Figure
-    figure, (line, past) = plt.subplots(2, 1, figsize=(width_mm / MM, width_mm / MM * HEIGHT_MM / WIDTH_MM),
+    figure, (line, past) = canvas.subplots(2, 1, figsize=(width_mm / MM, width_mm / MM * HEIGHT_MM / WIDTH_MM),
                                         height_ratios=(2, 3), layout="constrained")
     low, high = (float(pick(list(positions.values()))) for pick in (np.min, np.max))
     reach = max(high - low, 1e-12)

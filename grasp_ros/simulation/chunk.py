@@ -143,8 +143,10 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
         runs.seen[i], runs.state[i], runs.touches[i], runs.growth[i] = row[:4]
         if row.status is not Status.DONE:
             status[i], stops[i] = STATUSES.index(row.status.name), row.stop
-    for place in (place for body in variants.scene.system.absent for place in (COLUMN[body], COLUMN[body] + 1)):
-        runs.state[:, place] = runs.seen[:, Seen.LOW + place] = runs.seen[:, Seen.HIGH + place] = np.nan
+    for body in variants.scene.system.absent:
+        runs.seen[:, Seen.OUTSIDE + body] = np.nan
+        for place in (COLUMN[body], COLUMN[body] + 1):
+            runs.state[:, place] = runs.seen[:, Seen.LOW + place] = runs.seen[:, Seen.HIGH + place] = np.nan
     found = {column.name: np.array(column.read(runs)) for column in columns}
     for name, values in found.items():
         values[status != 0 if name not in LAST else status == STATUSES.index(REFUSED)] = np.nan

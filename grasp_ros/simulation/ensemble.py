@@ -16,6 +16,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,8 +25,12 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import Chunk, Setup, check, compute, taken
-from grasp_ros.simulation.variants import Variants
+from grasp_ros.scene.files import opened
+from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, compute, taken
+from grasp_ros.simulation.outcomes import OUTCOMES
+from grasp_ros.simulation.progress import showing
+from grasp_ros.simulation.tables import frame_of, write_rows
+from grasp_ros.simulation.variants import Variants, parameter_of
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]
@@ -61,6 +66,42 @@ class Table(Frozen):
         """Rows (n,) that reached the end of the horizon."""
         return np.asarray(self.status == 0)
 
+    @property
+    def status_names(self) -> np.ndarray:
+        """How each row ended, (n,): "DONE", "REFUSED", or the name of a `Status`."""
+        return np.asarray(np.array(STATUSES)[self.status])
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Units of the numbers and of the outcomes, by column."""
+        numbers = {name: parameter_of(self.scene, name).unit for name in self.changes}
+        return {**numbers, **{name: OUTCOMES[name].unit for name in self.columns}}
+
+    def dataframe(self) -> Any:
+        """A `pandas.DataFrame`, a row for each run: numbers, outcomes and `status`; units in its `attrs["units"]`.
+
+        Raises
+        ------
+        Refused
+            If pandas is not installed.
+        """
+        frame = frame_of({**self.changes, **self.columns, "status": self.status_names})
+        frame.attrs = {"scene": self.scene.name, "scene_yaml": self.scene.to_yaml(), "units": self.units}
+        return frame
+
+    def to_csv(self, path: str | os.PathLike[str] | BinaryIO) -> None:
+        """The same as a text file, by its path or open; units in brackets behind the names of the columns.
+
+        Raises
+        ------
+        Refused
+            If the file cannot be written.
+        """
+        units = self.units
+        heads = [*(f"{name} [{unit}]" for name, unit in units.items()), "status"]
+        with opened(path) as file:
+            write_rows(file, heads, [*self.changes.values(), *self.columns.values(), self.status_names])
+
 
 def ensemble(
     scene: Scene,
@@ -69,7 +110,7 @@ def ensemble(
     *,
     setup: Setup | None = None,
     threads: int | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int], object] | bool | None = None,
 ) -> Table:
     """Run variants of a scene, and keep their outcomes.
 
@@ -84,8 +125,8 @@ def ensemble(
         All that the rows depend on beside; its outcomes give way to those above.
     threads : int, optional
         Default: one for each core. The result does not depend on it.
-    progress : callable, optional
-        Called with the number of rows of each chunk that is done.
+    progress : callable or True, optional
+        True: a bar, in a terminal or in a notebook. A callable is told the number of rows of each chunk that is done.
 
     Raises
     ------
@@ -101,13 +142,18 @@ def ensemble(
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(variants.part(*span), setup, stop)
 
-    for (first, last), chunk in in_threads(work, spans, threads):
-        for name, values in chunk.columns.items():
-            found[name][first:last] = values
-        status[first:last] = chunk.status
-        stops.update({first + i: stop for i, stop in chunk.stops.items()})
-        if progress is not None:
-            progress(last - first)
+    reached = 0
+    with showing(progress if isinstance(progress, bool) else None, variants.rows, "run", scene.name) as bar:
+        for (first, last), chunk in in_threads(work, spans, threads):
+            for name, values in chunk.columns.items():
+                found[name][first:last] = values
+            status[first:last] = chunk.status
+            stops.update({first + i: stop for i, stop in chunk.stops.items()})
+            reached += last - first
+            if bar is not None:
+                bar(reached)
+            elif callable(progress):
+                progress(last - first)
     return Table(scene, setup, variants.changes, found, status, stops)
 
 

@@ -15,6 +15,7 @@ from grasp_ros.observe.sight import Quantity, Seen, Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import U, V, X
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.suggestion import allowed
 
 NOTHING = Wanted(0)
@@ -41,6 +42,12 @@ class Outcome(NamedTuple):
 
 def _seen(place: int, factor: float = 1.0) -> Callable[[Runs], Array]:
     return lambda runs: factor * runs.seen[:, place]
+
+
+def _settled(body: int) -> Callable[[Runs], Array]:
+    """Of one body, where it is known that all have settled."""
+    return lambda runs: np.where(np.isfinite(runs.seen[:, Seen.SETTLED]), runs.seen[:, Seen.OUTSIDE + body],
+                                 runs.seen[:, Seen.SETTLED])
 
 
 def _low(q: int) -> Callable[[Runs], Array]:
@@ -78,6 +85,9 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, for"
         " good: V_c proves it, for which the run goes on; inf: not within so many horizons; nan: V_c proves nothing"
         " where it can rise, or where a mass is not driven to 0", Wanted.SETTLING, _seen(Seen.SETTLED)),),
+    "settling_times": tuple(
+        Outcome(f"settling_time_{name}", "s", f"the same of the {name} mass alone, where all settle", Wanted.SETTLING,
+                _settled(body)) for body, name in NAMES.items()),
     "touches": tuple(
         Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _touch(side))
         for side, name in enumerate(_SIDES)),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, BinaryIO, NamedTuple, Protocol
 
 import numpy as np
@@ -124,11 +124,7 @@ def dataset_of(motion: Motion) -> Any:
 
 def dataframe_of(motion: Motion) -> Any:
     """See `trajectory.Trajectory.dataframe`."""
-    try:
-        import pandas
-    except ModuleNotFoundError as error:
-        raise Refused(f"dataframe() needs {error.name}; pip install 'grasp_ros[data]'") from None
-    frame = pandas.DataFrame(values_of(motion), index=pandas.Index(motion.t, name=TIME[0]))
+    frame = frame_of({TIME[0]: motion.t, **values_of(motion)}).set_index(TIME[0])
     frame.attrs = {**about(motion), "units": {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}}
     return frame
 
@@ -136,6 +132,26 @@ def dataframe_of(motion: Motion) -> Any:
 def write_csv(motion: Motion, file: BinaryIO) -> None:
     """See `trajectory.Trajectory.to_csv`; numbers have all their digits."""
     heads = [TIME[0] + _ENDINGS[TIME[1]], *(column.name + _ENDINGS[column.unit] for column in COLUMNS)]
+    write_rows(file, heads, [motion.t, *values_of(motion).values()])
+
+
+def frame_of(columns: Mapping[str, np.ndarray]) -> Any:
+    """A `pandas.DataFrame`.
+
+    Raises
+    ------
+    Refused
+        If pandas is not installed.
+    """
+    try:
+        import pandas
+    except ModuleNotFoundError as error:
+        raise Refused(f"dataframe() needs {error.name}; pip install 'grasp_ros[data]'") from None
+    return pandas.DataFrame(dict(columns))
+
+
+def write_rows(file: BinaryIO, heads: Sequence[str], columns: Sequence[np.ndarray]) -> None:
+    """Comma-separated rows below their heads; numbers with all their digits."""
     file.write((",".join(heads) + "\n").encode())
-    for row in zip(motion.t.tolist(), *(column.tolist() for column in values_of(motion).values()), strict=True):
-        file.write((",".join(map(repr, row)) + "\n").encode())
+    for row in zip(*(column.tolist() for column in columns), strict=True):
+        file.write((",".join(map(str, row)) + "\n").encode())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
 from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.quantities import settling_times
 from grasp_ros.simulation.variants import PLACES, Variants
 
 OUTCOMES = ("settling_time", "touches", "last_state")
@@ -117,3 +119,32 @@ def test_what_cannot_be_varied_is_refused() -> None:
     ):
         with pytest.raises(Refused, match=words):
             ensemble(scene, changes)
+
+
+def test_each_mass_settles_at_its_own_time() -> None:
+    scene = scenes.load("case_01")
+    table = ensemble(scene, {"object.mass_kg": [5.0, 2.0]}, ["settling_times", "settling_time"])
+    times = np.stack([table.columns[f"settling_time_{name}"] for name in ("left", "object", "right")], axis=1)
+    assert times.max(axis=1).tolist() == table.columns["settling_time"].tolist()
+    single = settling_times(simulate(scene))
+    assert times[0].tolist() == single.tolist()
+    alone = ensemble(scenes.load("arm_alone"), {}, ["settling_times"]).columns
+    assert np.isnan([alone["settling_time_object"][0], alone["settling_time_right"][0]]).all()
+
+
+def test_a_table_for_pandas_and_for_other_programs(tmp_path: Path) -> None:
+    gains = [5.0, -50.0]
+    table = ensemble(scenes.load("case_01", ["time.duration_s=2"]), {"left_feedback.position_gain_N_per_m": gains},
+                     ["touches", "peak_impact"])
+    assert table.status_names.tolist() == ["DONE", REFUSED]
+    assert table.units["left_feedback.position_gain_N_per_m"] == "N/m"
+    assert table.units["peak_impact_left"] == "N"
+    frame = table.dataframe()
+    assert frame[frame.status == "DONE"].touches_left.tolist() == [table.columns["touches_left"][0]]
+    assert frame.attrs["units"] == table.units
+    table.to_csv(tmp_path / "table.csv")
+    heads, first, second = (line.split(",") for line in (tmp_path / "table.csv").read_text().splitlines())
+    assert heads[0] == "left_feedback.position_gain_N_per_m [N/m]"
+    assert heads[-1] == "status"
+    assert float(first[heads.index("peak_impact_left [N]")]) == table.columns["peak_impact_left"][0]
+    assert second[-1] == REFUSED
