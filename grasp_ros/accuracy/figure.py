@@ -9,7 +9,7 @@ from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import canvas
-from grasp_ros.simulation.canvas import Figure, colormaps, style
+from grasp_ros.simulation.canvas import Axes, Figure, colormaps
 
 COLORS, MARKS = "tab20", "osD^v<>Pp*hX8"
 CHOSEN = "#d55e00"
@@ -18,7 +18,25 @@ CHOSEN = "#d55e00"
 def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], advice: Advice | None,
                        error: float | None) -> Figure:
     """A figure of all sound records, with the limit of what can be known, the error that is wanted, and the choice."""
-    figure, axes = canvas.subplots(figsize=(8.0, 5.2), layout="constrained")
+    with canvas.style():
+        figure, axes = canvas.subplots(figsize=(8.0, 5.2), layout="constrained")
+        _draw_methods(axes, truth, records)
+        if error is not None:
+            axes.axvline(error, color=CHOSEN, linewidth=0.8, linestyle="--")
+        if advice is not None and advice.choice is not None:
+            choice = advice.choice
+            axes.plot(max(choice.error or 0.0, truth.uncertainty), 1e3 * choice.time, "o", markersize=13,
+                      fillstyle="none", color=CHOSEN, label=f"take {choice.method}, {choice.knob} {choice.setting:g}")
+        axes.set_xlabel("largest error of all states and output times, m and m/s")
+        axes.set_ylabel("time of a run, ms")
+        axes.set_title(scene.title, fontsize="medium", parse_math=False)
+        axes.grid(alpha=0.3)
+        axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False)
+    return figure
+
+
+def _draw_methods(axes: Axes, truth: Truth, records: Sequence[Record]) -> None:
+    """A line for each method, and where nothing can be known."""
     colors = colormaps[COLORS]
     for place, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
         errors = [max(record.error or 0.0, truth.uncertainty) for record in group]
@@ -28,15 +46,3 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
     axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8)
     axes.annotate(" not known better\n in double precision", (truth.uncertainty, 1.0), va="top", fontsize="x-small",
                   xycoords=("data", "axes fraction"), color="0.4")
-    if error is not None:
-        axes.axvline(error, color=CHOSEN, linewidth=0.8, linestyle="--")
-    if advice is not None and advice.choice is not None:
-        choice = advice.choice
-        axes.plot(max(choice.error or 0.0, truth.uncertainty), 1e3 * choice.time, "o", markersize=13, fillstyle="none",
-                  color=CHOSEN, label=f"take {choice.method}, {choice.knob} {choice.setting:g}")
-    axes.set_xlabel("largest error of all states and output times, m and m/s")
-    axes.set_ylabel("time of a run, ms")
-    axes.set_title(scene.title, fontsize="medium", parse_math=False)
-    axes.grid(alpha=0.3)
-    axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize="small", frameon=False)
-    return figure
