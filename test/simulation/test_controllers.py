@@ -21,7 +21,7 @@ from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import plots, simulate
+from grasp_ros.simulation import plots, simulate, summary
 
 SHORT = "time.duration_s=2"
 
@@ -111,7 +111,7 @@ def test_an_arm_without_feedback_takes_one_and_the_energy_is_that_of_the_plant(t
     assert not balance.alarm.any()
     own = 10.0 * run.state[0, 0] ** 2 + 10.0 * run.state[0, 4] ** 2  # at rest, without Kp x^2
     assert run.energy.V_c[0] == pytest.approx(own)
-    table = dict(describe_trajectory(run))
+    table = dict(describe_trajectory(run, summary(run)))
     assert table["left controller"].endswith(":paper")
     assert "V_c of the plant alone" in table
     assert "V_c at" not in table
