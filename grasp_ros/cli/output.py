@@ -6,7 +6,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -50,7 +50,7 @@ def show(options: argparse.Namespace, text: str, data: Any) -> None:
 
 def plain(data: Any) -> Any:
     """Data as JSON has it: numbers that are not finite are null."""
-    if isinstance(data, dict):
+    if isinstance(data, Mapping):
         return {str(key): plain(value) for key, value in data.items()}
     if isinstance(data, np.ndarray):
         return plain(data.tolist())
