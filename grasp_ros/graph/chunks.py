@@ -18,7 +18,7 @@ from mcap.writer import Writer
 
 from grasp_ros.graph.rosbag2 import BagError
 
-HEAD = struct.Struct("<BQ")  # opcode and length of every record
+HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record
 RECORD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
 ENTRY = struct.Struct("<QQ")  # time of a message, and its place in the content of its chunk
 _OWN_BYTES = RECORD.size - HEAD.size  # of a message, beside its data
