@@ -24,9 +24,9 @@ from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.host import place
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.messages import Level
 from grasp_ros.graph.parameters import TEXTS
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import Level
 from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
