@@ -32,9 +32,8 @@ from grasp_ros.scene.topics import (
     LYAPUNOV,
     LYAPUNOV_NAMES,
     TIMING,
+    Numbers,
     Topic,
-    announcement_number,
-    between,
     state_of,
 )
 
@@ -215,14 +214,13 @@ class _Changes(dict[int, dict[str, float]]):
 
     def __init__(self) -> None:
         self._now: dict[str, float] = {}
-        self._numbers: dict[Topic, int] = {}
+        self._numbers = {topic: Numbers() for topic in CHANGES.values()}
         self.unheard: Counter[str] = Counter()
 
     def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
         message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
-        before, self._numbers[topic] = self._numbers.get(topic, 0), announcement_number(message)
-        self.unheard[topic.name] += between(before, self._numbers[topic])
+        self.unheard[topic.name] += self._numbers[topic].take(message)
         known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}
         if not numbers.keys() <= known.keys():
             raise BagError(f"{stored.topic}: {numbers} at tick {tick}; allowed: {', '.join(known)}")

@@ -48,15 +48,18 @@ MOST_DIGITS = 10  # of a number of an announcement
 LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm", "V_plant", "work", "closed"]
 
 
-def announcement_number(message: Any) -> int:
-    """Which announcement of its controller a message is, from 1 on; 0: it does not say."""
-    word = message.header.frame_id
-    return int(word) if word.isascii() and word.isdecimal() and len(word) < MOST_DIGITS else 0
+class Numbers:
+    """Counts the announcements of a controller that are missing: they are numbered from 1 on, where it numbers them."""
 
+    def __init__(self) -> None:
+        self._last = 0
 
-def between(before: int, number: int) -> int:
-    """How many announcements are missing between two that came one after the other."""
-    return max(number - before - 1, 0) if before and number else 0
+    def take(self, message: Any) -> int:
+        """How many are missing between the message before and this one."""
+        word = message.header.frame_id
+        number = int(word) if word.isascii() and word.isdecimal() and len(word) < MOST_DIGITS else 0
+        before, self._last = self._last, number
+        return max(number - before - 1, 0) if before and number else 0
 
 
 def state_of(message: Any, many: tuple[int, ...] = ()) -> tuple[Array, Array]:

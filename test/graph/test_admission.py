@@ -18,8 +18,8 @@ from std_msgs.msg import String
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.ticks import PATIENCE_TICKS, Arrival, Ticks
+from grasp_ros.graph.lockstep.ticks import PATIENCE_TICKS, Arrival, Ticks
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
 

@@ -22,7 +22,7 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
 

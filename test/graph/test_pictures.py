@@ -24,9 +24,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes import messages
 from grasp_ros.graph.nodes.picture import ASIDE, NEWTONS_PER_METRE, TOUCHING, markers
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.view import SIGNS, TRACK, Moment, View
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
@@ -113,7 +113,7 @@ from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from grasp_ros import scene
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.running import Running
 from grasp_ros.scene.topics import *
 rclpy.init()

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from grasp_ros import scene
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
 from grasp_ros.simulation import simulate
 

@@ -22,7 +22,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills import steering
 

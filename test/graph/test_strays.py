@@ -15,8 +15,8 @@ from processes import DEADLINE, START, wait_for
 from rclpy.serialization import serialize_message
 
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.ticks import DOUBT_SECONDS, GIVE_UP_SECONDS, Arrival, Ticks
+from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, GIVE_UP_SECONDS, Arrival, Ticks
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT

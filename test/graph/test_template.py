@@ -10,7 +10,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from grasp_ros.graph import rosbag2
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.template import Template
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import NAMES

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from grasp_ros.graph.nodes import watchdog
-from grasp_ros.graph.nodes.beats import BEAT_SECONDS
-from grasp_ros.graph.nodes.watchdog import EVERY_SECONDS, Watchdog
+from grasp_ros.graph.health import watchdog
+from grasp_ros.graph.health.beats import BEAT_SECONDS
+from grasp_ros.graph.health.watchdog import EVERY_SECONDS, Watchdog
 
 PATIENCE, LAW_PATIENCE = 2.1, 60.0
 

@@ -1,1 +1,1 @@
-"""The ROS 2 graph: the only room that imports rclpy."""
+"""The nodes of the graph, and how they start."""

@@ -14,13 +14,13 @@ from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.law import OwnLaw
-from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import Phase
-from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
-from grasp_ros.graph.nodes.priority import Priority
-from grasp_ros.graph.nodes.states import State, StateReader
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import Phase
+from grasp_ros.graph.ros.priority import Priority
+from grasp_ros.graph.ros.states import State, StateReader
 from grasp_ros.graph.rosbag2 import force_template
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused

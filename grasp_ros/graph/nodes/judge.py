@@ -8,13 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.graph.lockstep.ticks import Tick
+from grasp_ros.graph.ros import messages
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import WINDOW
+from grasp_ros.scene.topics import COMMANDS, WINDOW, state_of
 
 MOST_WAITING = WINDOW + 100  # announcements of a controller: it makes at most one for a command
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
@@ -162,3 +164,9 @@ class Judge:
                 if not abs(force - expected) <= EXPLAINED * (size + abs(law.feed_forward)):
                     return False
         return True
+
+
+def seen_of(tick: Tick) -> Seen:
+    """State, inputs and commands of a tick from its messages."""
+    forces = {side: messages.raw_force(tick.found[topic]) for side, topic in COMMANDS.items() if topic in tick.found}
+    return Seen(tick.time_ns, *state_of(tick.state), forces)

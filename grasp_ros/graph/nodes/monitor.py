@@ -17,15 +17,15 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.bag import BagError, Recorder
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.admission import Limits, Sources
-from grasp_ros.graph.nodes.beats import digest
-from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen
-from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, Phase
-from grasp_ros.graph.nodes.peers import Gone, Need, PeerNode
+from grasp_ros.graph.health.beats import digest
+from grasp_ros.graph.health.peers import Gone, Need, PeerNode
+from grasp_ros.graph.lockstep.admission import Limits, Sources
+from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
+from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen, seen_of
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.nodes.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
 from grasp_ros.graph.rosbag2 import lyapunov_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
@@ -45,10 +45,8 @@ from grasp_ros.scene.topics import (
     SCENE,
     TIMING,
     WINDOW,
+    Numbers,
     Topic,
-    announcement_number,
-    between,
-    state_of,
 )
 from grasp_ros.scene.versions import versions
 
@@ -81,7 +79,7 @@ class Monitor(PeerNode):
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._values: list[float] = []  # of the last tick
-        self._numbers = dict.fromkeys(CHANGES, 0)  # of the last announcements
+        self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._leaving = 0  # after a signal: ticks to which it still records, what was on the way with them
         self._plant = ""  # identity of the one that is recorded
@@ -196,8 +194,7 @@ class Monitor(PeerNode):
                 raise Refused(f"{side}/parameters: {len(cdr)} bytes; allowed: at most {MOST_BYTES}")
             message = deserialize_message(cdr, JointState)
             numbers = dict(zip(message.name, message.position, strict=True))
-            before, self._numbers[side] = self._numbers[side], announcement_number(message)
-            self.count("lost announcements", between(before, self._numbers[side]))
+            self.count("lost announcements", self._numbers[side].take(message))
             self._judge.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", CHANGES[side])
@@ -256,7 +253,7 @@ class Monitor(PeerNode):
             return
         assert self._recorder is not None
         self._soon.cancel()
-        seen = [_seen(tick) for _, tick, _ in due]
+        seen = [seen_of(tick) for _, tick, _ in due]
         for (bag_ns, tick, beside), row, values in zip(due, seen, self._judge.judge(seen), strict=True):
             self.count("ticks")
             self._picture.show(tick.time_ns, row.state)
@@ -291,12 +288,6 @@ class Monitor(PeerNode):
                 self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._output)
-
-
-def _seen(tick: Tick) -> Seen:
-    """State, inputs and commands of a tick from its messages."""
-    forces = {side: messages.raw_force(tick.found[topic]) for side, topic in COMMANDS.items() if topic in tick.found}
-    return Seen(tick.time_ns, *state_of(tick.state), forces)
 
 
 def main(_: str, received: Sequence[int]) -> int:

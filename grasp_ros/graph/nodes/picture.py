@@ -10,8 +10,8 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES

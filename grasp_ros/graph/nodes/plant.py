@@ -18,16 +18,16 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.beats import digest
-from grasp_ros.graph.nodes.free_running import FreeRunning
-from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.lockstep import Lockstep
-from grasp_ros.graph.nodes.node import Phase
-from grasp_ros.graph.nodes.peers import Need
-from grasp_ros.graph.nodes.priority import Priority
-from grasp_ros.graph.nodes.steering import Steering
-from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.health.beats import digest
+from grasp_ros.graph.health.peers import Need
+from grasp_ros.graph.lockstep.free_running import FreeRunning
+from grasp_ros.graph.lockstep.lockstep import Lockstep
+from grasp_ros.graph.lockstep.steering import Steering
+from grasp_ros.graph.lockstep.stepped import SteppedNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import Phase
+from grasp_ros.graph.ros.priority import Priority
 from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.accuracy import ACCURACY

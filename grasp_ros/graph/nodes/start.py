@@ -19,7 +19,7 @@ from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
 
 NODES = ("plant", "left_controller", "right_controller", "monitor")
-TOOLS = ("together", "watch", "player", "remote")  # which commands of `grasp` become
+TOOLS = ("watch", "player", "remote")  # which commands of `grasp` become
 
 
 def main(name: str, child: bool = False) -> int:
@@ -49,7 +49,8 @@ def main(name: str, child: bool = False) -> int:
     os.environ.update(this_host(os.environ))  # before rclpy looks
     if name == "plant":
         _spare_the_plant()
-    module = import_module(f"grasp_ros.graph.nodes.{'controller' if name.endswith('controller') else name}")
+    room = "tools" if name in TOOLS else "nodes"
+    module = import_module(f"grasp_ros.graph.{room}.{'controller' if name.endswith('controller') else name}")
     status: int = module.main(name, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)
@@ -80,7 +81,7 @@ def start() -> int:
     is_child = sys.argv[1:2] == ["child"]
     del sys.argv[1 : 1 + is_child]
     name = sys.argv.pop(1) if len(sys.argv) > 1 else ""
-    if name not in (*NODES, *TOOLS):
+    if name not in (*NODES, *TOOLS, "together"):
         print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
         return 2
     try:

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from grasp_ros.graph.nodes.controller import Controller
-from grasp_ros.graph.nodes.life import run
 from grasp_ros.graph.nodes.monitor import Monitor
-from grasp_ros.graph.nodes.node import GraspNode
 from grasp_ros.graph.nodes.plant import Plant
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import GraspNode
 
 NODES: dict[str, Callable[[], GraspNode]] = {
     "plant": Plant,

@@ -16,7 +16,7 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.physics.system import BODIES
 from grasp_ros.scene.topics import (
     CLOCK,

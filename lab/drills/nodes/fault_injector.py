@@ -22,7 +22,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import COMMANDS, DEPTH, DIAGNOSTICS, JOINT_STATES, Topic
 
 SPIN_SECONDS = 0.01

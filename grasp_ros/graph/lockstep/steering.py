@@ -13,8 +13,8 @@ from typing import Any
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from std_srvs.srv import Trigger
 
-from grasp_ros.graph.nodes.node import Phase
-from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.lockstep.stepped import SteppedNode
+from grasp_ros.graph.ros.node import Phase
 
 MOST_STEPS = 10**9
 PAUSED, STEPPING = "paused", "stepping"  # beside the phases of a node

@@ -17,10 +17,10 @@ from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.subscription import Subscription
 
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.messages import Command
-from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, GraspNode
-from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.lockstep.stepped import SteppedNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import Command
+from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, COMMANDS, LYAPUNOV, WINDOW, Topic
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from rclpy.serialization import serialize_message
 
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.states import State, StateReader
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.states import State, StateReader
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead

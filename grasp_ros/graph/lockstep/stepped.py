@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 
-from grasp_ros.graph.nodes.peers import PeerNode
+from grasp_ros.graph.health.peers import PeerNode
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from grasp_ros.graph.nodes.beats import BEAT_SECONDS
+from grasp_ros.graph.health.beats import BEAT_SECONDS
 from grasp_ros.graph.stopping import tell_parent
 
 EVERY_SECONDS = 5.0  # from one sentence to the next

@@ -18,9 +18,9 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph.host import place
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.life import init
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.life import init
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.topics import Topic

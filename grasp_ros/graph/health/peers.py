@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 from rclpy.subscription import Subscription
 
-from grasp_ros.graph.nodes.beats import ENDED, Beats, digest
-from grasp_ros.graph.nodes.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
-from grasp_ros.graph.nodes.watchdog import Watchdog
+from grasp_ros.graph.health.beats import ENDED, Beats, digest
+from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.processes import PEER_SECONDS
+from grasp_ros.graph.ros.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
 from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros.graph import bag
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import GraspNode, Phase
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 

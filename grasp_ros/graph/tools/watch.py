@@ -14,9 +14,9 @@ from rich.live import Live
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.host import place
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.life import run
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.graph.view import Moment, View, named
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of

@@ -6,7 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.physics.errors import Refused
 
 MOST = 99  # of Linux

@@ -13,7 +13,7 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused, place_of
 

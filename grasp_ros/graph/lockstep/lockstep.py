@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.admission import Limits, Recorded, Sources
-from grasp_ros.graph.nodes.node import UNKNOWN
-from grasp_ros.graph.nodes.peers import Gone, Need
-from grasp_ros.graph.nodes.steering import Steering
-from grasp_ros.graph.nodes.stepped import SteppedNode
+from grasp_ros.graph.health.peers import Gone, Need
+from grasp_ros.graph.lockstep.admission import Limits, Recorded, Sources
+from grasp_ros.graph.lockstep.steering import Steering
+from grasp_ros.graph.lockstep.stepped import SteppedNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.node import UNKNOWN
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 

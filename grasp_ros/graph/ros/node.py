@@ -4,35 +4,26 @@ from __future__ import annotations
 
 import os
 import time
-from array import array
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from enum import Enum
 from functools import partial
 from itertools import islice
 from typing import Any
 
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
-from rclpy.exceptions import ParameterException
-from rclpy.impl.implementation_singleton import rclpy_implementation
-from rclpy.node import Node
-from rclpy.parameter import Parameter as RosParameter
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.host import place
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.messages import Level
-from grasp_ros.graph.parameters import TEXTS
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import Level
+from grasp_ros.graph.ros.parameter_node import ParameterNode
 from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import DIAGNOSTICS, Topic
 
-RCLError = rclpy_implementation.RCLError
 PEER_SECONDS = 0.05
 REPORT_SECONDS = 1.0
 PATIENCE_SECONDS = 5.0
@@ -52,8 +43,8 @@ class Phase(Enum):
     FAILED = "failed"
 
 
-class GraspNode(Node):
-    """A node with parameters, counters on /diagnostics and an end.
+class GraspNode(ParameterNode):
+    """A node with counters on /diagnostics and an end.
 
     Parameters
     ----------
@@ -74,12 +65,10 @@ class GraspNode(Node):
         The values of its /diagnostics.
     """
 
-    why_read_only = "set at the start only, with -p or a parameter file"
     stays = False  # whether it goes on when a run is over
 
     def __init__(self, name: str, **options: Any) -> None:
-        with _refusing():
-            super().__init__(name, **options)
+        super().__init__(name, **options)
         self.finished = False
         self.exit_code = 0
         self.counters: dict[str, int | float | str] = {}
@@ -93,74 +82,6 @@ class GraspNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
         self.wall_timer(REPORT_SECONDS, self.report)
-
-    def read_only(self, name: str, default: Any) -> Any:
-        """Declare a parameter that is set at start only, and return its value."""
-        number = isinstance(default, float)  # for which an integer will do as well
-        descriptor = ParameterDescriptor(description=TEXTS[name], read_only=True, dynamic_typing=number)
-        value = self._declare(name, default, descriptor)
-        if not number:
-            return value
-        if not isinstance(value, (float, int)) or isinstance(value, bool):
-            raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
-        return float(value)
-
-    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
-        """The value that the start has given, or the default."""
-        with _refusing():
-            return _plain(self.declare_parameter(name, default, descriptor).value)
-
-    def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
-        """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
-
-        The types are dynamic so that an integer will do for a floating-point number.
-
-        Raises
-        ------
-        Refused
-            If the start has given a number that is not allowed, or one that is not there.
-        """
-        given = {}
-        for effect in scene.effects:
-            for parameter in effect.parameters if effect.node == executable else ():
-                if parameter.key not in scene.values[effect.section]:
-                    continue
-                name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
-                found = self._declare(name, list(value) if parameter.several else value, messages.descriptor(parameter))
-                if not parameter.accepts(found):
-                    raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
-                if (found := parameter.read(found)) != value:
-                    given[name] = found
-        unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
-        if unknown:  # rclpy itself would not say a word
-            raise Refused(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
-        return given
-
-    def forget_scene(self) -> None:
-        """Take back what `declare_scene` declared; rclpy itself does not let go of what is read-only."""
-        for name in [name for name in self._parameters if "." in name]:
-            del self._parameters[name], self._descriptors[name]
-
-    def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
-        """Set parameters; integers become floating-point numbers, and a refusal says why.
-
-        What is fixed may be set to what it is, so that a node takes its own dump.
-        """
-        numbers = []
-        for parameter in parameter_list:
-            if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
-                if _plain(parameter.value) == _plain(self.get_parameter(parameter.name).value):
-                    continue
-                return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
-            whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
-            numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
-        return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
-
-    def _is_whole(self, name: str) -> bool:
-        """Whether a parameter was declared as an integer for good."""
-        if not self.has_parameter(name) or self.describe_parameter(name).dynamic_typing:
-            return False
-        return bool(self.get_parameter(name).type_ == RosParameter.Type.INTEGER)
 
     def publisher(self, topic: Topic) -> Publisher:
         """Create the publisher of a topic of the graph."""
@@ -317,17 +238,3 @@ class GraspNode(Node):
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
-
-
-def _plain(value: Any) -> Any:
-    """Value of a parameter, a list where rclpy has an array."""
-    return list(value) if isinstance(value, array) else value
-
-
-@contextmanager
-def _refusing() -> Iterator[None]:
-    """Refuse what rclpy refuses of the parameters that the start has given, and what DDS cannot be, secure for one."""
-    try:
-        yield
-    except (ParameterException, RCLError) as error:
-        raise Refused(" ".join(str(error).split())) from None

@@ -20,8 +20,8 @@ from typing import Any
 
 from rclpy.duration import Duration
 
-from grasp_ros.graph.nodes import messages
-from grasp_ros.graph.nodes.node import GraspNode
+from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.scene.topics import ALIVE
 
 BEAT_SECONDS = 0.4

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
-from grasp_ros.graph.nodes import messages
+from grasp_ros.graph.ros import messages
 
 _HEAD, _STAMP_END = 4, 12  # bytes: of CDR, and with the stamp behind it
 

@@ -1,0 +1,120 @@
+"""Parameters of a node: fixed ones, those of a scene, and what is refused in a sentence."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.exceptions import ParameterException
+from rclpy.impl.implementation_singleton import rclpy_implementation
+from rclpy.node import Node
+from rclpy.parameter import Parameter as RosParameter
+
+from grasp_ros.graph.parameters import TEXTS
+from grasp_ros.graph.ros import messages
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene
+
+RCLError = rclpy_implementation.RCLError
+
+
+class ParameterNode(Node):
+    """A node whose parameters are fixed at its start, but for numbers of a scene that may be set while it runs.
+
+    Parameters
+    ----------
+    name : str
+    options
+        As in `rclpy.node.Node`.
+    """
+
+    why_read_only = "set at the start only, with -p or a parameter file"
+
+    def __init__(self, name: str, **options: Any) -> None:
+        with _refusing():
+            super().__init__(name, **options)
+
+    def read_only(self, name: str, default: Any) -> Any:
+        """Declare a parameter that is set at start only, and return its value."""
+        number = isinstance(default, float)  # for which an integer will do as well
+        descriptor = ParameterDescriptor(description=TEXTS[name], read_only=True, dynamic_typing=number)
+        value = self._declare(name, default, descriptor)
+        if not number:
+            return value
+        if not isinstance(value, (float, int)) or isinstance(value, bool):
+            raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
+        return float(value)
+
+    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
+        """The value that the start has given, or the default."""
+        with _refusing():
+            return _plain(self.declare_parameter(name, default, descriptor).value)
+
+    def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
+        """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
+
+        The types are dynamic so that an integer will do for a floating-point number.
+
+        Raises
+        ------
+        Refused
+            If the start has given a number that is not allowed, or one that is not there.
+        """
+        given = {}
+        for effect in scene.effects:
+            for parameter in effect.parameters if effect.node == executable else ():
+                if parameter.key not in scene.values[effect.section]:
+                    continue
+                name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
+                found = self._declare(name, list(value) if parameter.several else value, messages.descriptor(parameter))
+                if not parameter.accepts(found):
+                    raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
+                if (found := parameter.read(found)) != value:
+                    given[name] = found
+        unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        if unknown:  # rclpy itself would not say a word
+            raise Refused(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
+        return given
+
+    def forget_scene(self) -> None:
+        """Take back what `declare_scene` declared; rclpy itself does not let go of what is read-only."""
+        for name in [name for name in self._parameters if "." in name]:
+            del self._parameters[name], self._descriptors[name]
+
+    def set_parameters_atomically(self, parameter_list: list[RosParameter]) -> SetParametersResult:
+        """Set parameters; integers become floating-point numbers, and a refusal says why.
+
+        What is fixed may be set to what it is, so that a node takes its own dump.
+        """
+        numbers = []
+        for parameter in parameter_list:
+            if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
+                if _plain(parameter.value) == _plain(self.get_parameter(parameter.name).value):
+                    continue
+                return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
+            whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
+            numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
+        return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
+
+    def _is_whole(self, name: str) -> bool:
+        """Whether a parameter was declared as an integer for good."""
+        if not self.has_parameter(name) or self.describe_parameter(name).dynamic_typing:
+            return False
+        return bool(self.get_parameter(name).type_ == RosParameter.Type.INTEGER)
+
+
+def _plain(value: Any) -> Any:
+    """Value of a parameter, a list where rclpy has an array."""
+    return list(value) if isinstance(value, array) else value
+
+
+@contextmanager
+def _refusing() -> Iterator[None]:
+    """Refuse what rclpy refuses of the parameters that the start has given, and what DDS cannot be, secure for one."""
+    try:
+        yield
+    except (ParameterException, RCLError) as error:
+        raise Refused(" ".join(str(error).split())) from None
