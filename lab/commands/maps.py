@@ -15,7 +15,7 @@ def add_maps(commands: Any) -> argparse.ArgumentParser:
     sub = add_command(commands, "maps", _maps, text)
     sub.add_argument("--docs", type=Path, default=Path("docs"), metavar="DIRECTORY", help="default: docs")
     sub.add_argument("--quick", action="store_true", help="few pixels and rows: to see that it works")
-    sub.add_argument("--pixels", type=whole(32), default=1000, metavar="N", help="of a side of the map (default 1000)")
+    sub.add_argument("--pixels", type=whole(32), default=200, metavar="N", help="of a side of the map (default 200)")
     add_study_directory(sub)
     return sub
 

@@ -19,6 +19,8 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
+from lab.paper.scatter import Median
+
 ALMOST_ALL, HALF = 0.95, 0.5  # of the random starts
 
 
@@ -70,6 +72,7 @@ class Part(NamedTuple):
     why: str  # the physics behind it, a sentence
     checks: Sequence[Check]
     reading: bool = False  # of another reading of the sentence
+    curve: Sequence[tuple[float, Median]] = ()  # the sweep: value of its parameter, and median ratio
 
     @property
     def verdict(self) -> Verdict:

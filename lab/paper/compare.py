@@ -118,7 +118,8 @@ class Comparison(NamedTuple):
         for pair in self.decisive:
             checks += [self._printed(cases, *pair), *self._alike(cases, *pair)]
             checks.append(self._random(cases, starts, self.measure, *pair))
-        checks += self._sweep(cases, starts)
+        curve = self.curve(cases, starts)
+        checks += self._sweep(cases, starts, curve)
         for pair in self.decisive:
             checks += [*self._readings(cases, *pair), self._at_all(cases, starts, *pair)]
         checks += [self._random(cases, starts, word, self.changed, self.other) for word in self.words]
@@ -126,7 +127,7 @@ class Comparison(NamedTuple):
             self._random(cases, starts, self.measure, self.changed, other)._replace(kind=Kind.READING)
             for other in self.beside
         ]
-        return Part(self.statement, self.threshold, self.why, checks, self.reading)
+        return Part(self.statement, self.threshold, self.why, checks, self.reading, curve)
 
     def _check(self, kind: Kind, text: str, changed: Scene, other: Scene) -> Check:
         pairs = list(zip(self._several(changed), self._several(other), strict=True))
@@ -195,14 +196,13 @@ class Comparison(NamedTuple):
         text = f"by whatever amount, {changed} and {other}, random starts"
         return Check(Kind.WORD, text, f"{_percent(share)} of {len(found)}", share, almost_all(share))
 
-    def _sweep(self, cases: Cases, starts: Sequence[Start]) -> list[Check]:
+    def _sweep(self, cases: Cases, starts: Sequence[Start], curve: Sequence[tuple[float, Median]]) -> list[Check]:
         """The parameter alone, changed from the other case, at several values: the median over the random starts.
 
         A value counts where the whole interval of its median lies on one side.
         """
-        if not self.values:
+        if not curve:
             return []
-        curve = self.curve(cases, starts)
         share = sum(self.true_of(found.low) and self.true_of(found.high) for _, found in curve) / len(curve)
         standard = value_of(self.other.scene(cases), self.letter)
         text = f"{self.letter} beside {standard:g}, median ratio of {len(starts)} random starts (95 % interval)"
@@ -221,6 +221,8 @@ class Comparison(NamedTuple):
 
     def curve(self, cases: Cases, starts: Sequence[Start]) -> list[tuple[float, Median]]:
         """Value of the parameter and median ratio, over the sweep."""
+        if not self.values:
+            return []
         other = self.other.scene(cases)
         before = over(other, starts, self.measure)
         return [

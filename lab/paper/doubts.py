@@ -80,6 +80,16 @@ def doubts(cases: Cases) -> list[tuple[str, str]]:
             "Not printed; what it does to the figures stands above, under the paper's own method.",
         ),
         (
+            "Lyapunov's method in noncontact (p. 245)",
+            (
+                "The text says that the method cannot decide there, since V_o of (33) does not see x_o, and goes on"
+                " part by part, (29) to (37). It can: where both pairs are apart x_l < x_o < x_r, so that V of (28)"
+                " is 0 only where x_l = x_r = 0 encloses x_o = 0 and nothing moves; and where one separates faster than"
+                " 1/p something moves, so that V > 0. (28) is positive definite as it is printed; (29) to (37) are a"
+                " detour."
+            ),
+        ),
+        (
             '"In Fig. 1"',
             "The sentence on where x_l is larger than x_o (p. 246) can only mean Fig. 2: Fig. 1 is the model.",
         ),

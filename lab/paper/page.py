@@ -14,8 +14,10 @@ import jinja2
 from markupsafe import Markup
 
 from grasp_ros.scene.files import writing
+from lab.paper.answer import FIGURE
 from lab.paper.claims import Claim, Verdict
 from lab.paper.equations import CROSSING
+from lab.paper.printed import PRINTED
 from lab.paper.results import Result
 from lab.paper.sample import ALGEBRA, Equation
 from lab.studies.document import write
@@ -47,6 +49,7 @@ class Report(NamedTuple):
 
     title: str
     subtitle: str
+    answer: Sequence[str]  # ten lines
     definitions: Sequence[tuple[str, str]]
     summary: str
     claims: Sequence[Claim]
@@ -107,6 +110,8 @@ def write_html(report: Report, path: Path) -> None:
             runs=Markup(runs),
             model=_figure(template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
             figure=lambda key, text: _figure(report.images[key].svg, text),
+            beside=FIGURE,
+            printed=PRINTED,
         ),
     )
 
@@ -127,7 +132,7 @@ def write_markdown(report: Report, path: Path) -> None:
         for key, image in report.images.items():
             (directory / f"{key}.png").write_bytes(image.png)
         (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
-    text = environment.from_string(template("paper.md")).render(report=report)
+    text = environment.from_string(template("paper.md")).render(report=report, beside=FIGURE, printed=PRINTED)
     write(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
 
 

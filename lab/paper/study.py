@@ -6,7 +6,7 @@ import io
 import multiprocessing
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import PIL.Image
@@ -17,6 +17,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import canvas, simulate
 from lab.paper import arms, beyond, beyond_figures, figures
+from lab.paper.answer import answer
 from lab.paper.cases import (
     FIGURES,
     SYMMETRIC,
@@ -29,6 +30,7 @@ from lab.paper.cases import (
     started,
     value_of,
 )
+from lab.paper.claims import Claim
 from lab.paper.compare import Comparison, Variant
 from lab.paper.definitions import SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
@@ -194,20 +196,20 @@ def _same_V(run: Any) -> bool:
     return bool((run.energy.V_c == run.energy.V).all())
 
 
-def _curves(cases: Cases, drawn: list[Start]) -> list[beyond_figures.Curve]:
+def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]:
     found: list[beyond_figures.Curve] = []
     seen: set[tuple[str, str, Variant]] = set()
-    for key, statement in statements().items():
-        for part in statement.parts:
+    known_as = statements()
+    for claim in claims:
+        key = claim.key
+        for part, judged_part in zip(known_as[key].parts, claim.parts, strict=True):
             known = isinstance(part, Comparison) and (part.letter, part.measure, part.other) in seen
             if isinstance(part, Comparison) and part.values and key.startswith("O") and not known:
                 seen.add((part.letter, part.measure, part.other))
                 value = value_of(part.changed.scene(cases), part.letter)
                 label = f"{part.letter}, {UNIT_OF[part.letter[:2].rstrip('_')]}"
-                curve = part.curve(cases, drawn)
-                found.append(
-                    beyond_figures.Curve(f"{key} {part.changed}", label, SHORT[part.measure], value, part.higher, curve)
-                )
+                title, measure = f"{key} {part.changed}", SHORT[part.measure]
+                found.append(beyond_figures.Curve(title, label, measure, value, part.higher, judged_part.curve))
     return found
 
 
@@ -218,15 +220,17 @@ def _put_together(
     claims = sorted(done["claim"], key=lambda claim: order.index(claim.key))
     found = {key: value for key, value, _ in done["found"]}
     images = {**dict(done["image"]), **{key: each for key, _, each in done["found"]}}
-    images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, drawn)))
+    images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, claims)))
     [rows], [heads_and_rows], [doubtful], [replays] = (
         done[key] for key in ("equations", "quantities", "doubts", "replays")
     )
     heads, amounts = heads_and_rows
+    further = Beyond(**found)
     return Report(
-        title=TITLE, subtitle=SUBTITLE, definitions=definitions(len(drawn)), summary=summary(claims), claims=claims,
+        title=TITLE, subtitle=SUBTITLE, answer=answer(claims, further), definitions=definitions(len(drawn)),
+        summary=summary(claims), claims=claims,
         sweeps=SWEEPS, pictures=[picture(figure, cases[figure.case]) for figure in FIGURES], quantity_heads=heads,
-        quantities=amounts, agreement=agreement(rows), equations=rows, results=results(Beyond(**found)),
+        quantities=amounts, agreement=agreement(rows), equations=rows, results=results(further),
         doubts=doubtful, replays=replays, graph_heads=HEADS, graph=graph, images=images,
         origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
     )

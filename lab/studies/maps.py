@@ -23,7 +23,7 @@ from grasp_ros.simulation.ensemble import ensemble
 
 GAINS = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
 LOSSES = "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"
-PIXELS = 200
+PIXELS = 200  # of a side; a run goes on for some ten horizons
 SETTLED, MAP_ACCURACY, CHECKED, HORIZONS = 0.05, 1e-10, 2000, 10
 JUMP = 0.1  # of a settling time
 TICKS, FIRST_S, LAST_S, GROWN = 300, 0.01, 0.4, 3.0

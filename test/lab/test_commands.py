@@ -53,7 +53,7 @@ def test_maps_quick_writes_its_page_and_figures(lab_command: Any, tmp_path: Path
         result = lab_command("maps", "--quick", "--docs", "docs", "-o", "runs")
         assert result.returncode == 0, result.stderr
     text = (tmp_path / "docs" / "maps.md").read_text()
-    for title in ("Where the grasp of case 3 settles", "Control period, delay and noise", "Robustness"):
+    for title in ("When the grasp of case 3 settles", "Control period, delay and noise", "Robustness"):
         assert title in text
     for name in ("settling", "limits", "robustness"):
         assert (tmp_path / "docs" / "maps" / f"{name}.png").stat().st_size > 1000

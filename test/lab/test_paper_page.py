@@ -21,7 +21,8 @@ pytestmark = pytest.mark.slow  # the whole study, with few random starts
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 A4 = 718  # px, the width of the sheet of paper less the margins of the browser
 CONTENT = (
-    "Judgement", "Replay", "Figures 2 to 12", "Quantities", "Equations (1) to (37)", "What the paper could not show",
+    "The answer", "Judgement", "Replay", "Figures 2 to 12", "Quantities", "Equations (1) to (37)",
+    "What the paper could not show",
     "Doubts about the source", "Definitions",
 )
 

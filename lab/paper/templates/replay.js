@@ -181,6 +181,13 @@
     stop();
     seek(row);
   });
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || /^(INPUT|SELECT|BUTTON|SUMMARY|A)$/.test(event.target.tagName)) return;
+    const pressed = { " ": "play", ArrowLeft: "back", ArrowRight: "forth" }[event.key];
+    if (!pressed) return;
+    event.preventDefault();
+    get(pressed).click();
+  });
   window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((each) => { each.open = true; }));
   choose(0);
 })();
