@@ -7,9 +7,11 @@ SLOWER ?= 30%
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
-PAGES := accuracy paper hard effects certificate maps fuzz faults
+# Studies that write a page, those first that take longest; what one of them is asked beside.
+PAGES := accuracy maps fuzz hard paper faults effects certificate domain
+fuzz_options := --draws 5000 --jobs 2
 
-.PHONY: demo test quick lint install study benchmark mutants lowest clean
+.PHONY: demo test quick lint install study laboratory benchmark mutants lowest clean
 
 demo: install
 	$(BIN)/grasp run case_01
@@ -30,19 +32,19 @@ lint: install
 install: $(VENV)/ready
 	$(BIN)/pip install --quiet --no-deps --no-build-isolation --force-reinstall .
 
-# Everything that the laboratory writes, some hours. Its peers are large and only wanted here.
-study: install
-	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
-	for name in $(PAGES); do $(BIN)/python -m lab $$name || exit 1; done
+# Every page that the laboratory writes, some hours on a quiet machine; one of them with, say, `make study-paper`.
+study: $(PAGES:%=study-%)
+.NOTPARALLEL:
 
-# One of them, say `make study-paper`.
-study-%: install
+study-%: laboratory
+	$(BIN)/python -m lab $* --docs docs $($*_options)
+
+# Its peers are large and only wanted here.
+laboratory: install
 	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
-	$(BIN)/python -m lab $*
 
 # Saves a result in runs/benchmarks, and fails if the fastest run of a benchmark is slower than in the last one there.
-benchmark: install
-	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
+benchmark: laboratory
 	$(BIN)/pytest lab/benchmarks -W default --benchmark-storage=runs/benchmarks --benchmark-autosave \
 	    --benchmark-columns=min,median,rounds \
 	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))

@@ -13,13 +13,13 @@ from grasp_ros.physics.errors import Refused
 from lab.commands import accuracy, costs, graph, maps, proofs
 
 # names of modules of the extra `lab`
-PACKAGES = ("gmpy2", "heyoka", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
+PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
+ABOUT = "Measure, and print what was measured. Those with --docs write a page; `make study` writes all pages."
 COMMANDS = (
-    proofs.add_paper, proofs.add_certificate, proofs.add_hard,
-    accuracy.add_accuracy, accuracy.add_advise, accuracy.add_prediction, accuracy.add_page, accuracy.add_speed,
-    costs.add_loop, costs.add_effects, costs.add_recorder, maps.add_maps, maps.add_many,
-    graph.add_graph, graph.add_free_running, graph.add_steering,
-    proofs.add_faults, proofs.add_fuzz, proofs.add_doors,
+    proofs.add_paper, proofs.add_domain, proofs.add_certificate, proofs.add_hard, proofs.add_fuzz,
+    accuracy.add_accuracy, accuracy.add_advise, accuracy.add_prediction, accuracy.add_speed,
+    costs.add_effects, costs.add_loop, costs.add_recorder, maps.add_maps, maps.add_many,
+    graph.add_graph, graph.add_free_running, graph.add_steering, proofs.add_faults, proofs.add_doors,
 )
 
 
@@ -29,8 +29,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="python -m lab", description="Measure, and print what was measured.")
-    names = parser.add_subparsers(required=True, metavar="name")
+    program = "python -m lab"
+    parser = argparse.ArgumentParser(usage=f"{program} NAME [options]", description=ABOUT)
+    names = parser.add_subparsers(prog=program, title="studies", required=True, metavar="name, and what")
     for add in COMMANDS:
         sub = add(names)
         sub.set_defaults(command=partial(with_packages, sub.get_default("command")))

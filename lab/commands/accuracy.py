@@ -1,4 +1,4 @@
-"""The studies of error against time: `accuracy`, `advise`, `prediction`, `page` and `speed`."""
+"""The studies of error against time: `accuracy`, `advise`, `prediction` and `speed`."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from grasp_ros.cli.arguments import (
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
+from lab.commands.docs import add_docs, page_directory
 
 DRIFT_QUICK_S = 20.0
 Parser = argparse.ArgumentParser
@@ -27,10 +28,11 @@ Parser = argparse.ArgumentParser
 
 def add_accuracy(commands: Any) -> Parser:
     """`python -m lab accuracy`."""
-    text = "error against time of every method: records, tables, figures; resumes"
+    text = "error against time of every method; resumes"
     sub = add_command(commands, "accuracy", _accuracy, text)
     _add_scenes(sub)
     sub.add_argument("--quick", action="store_true", help="few settings, our own compiled methods only")
+    add_docs(sub)
     return sub
 
 
@@ -39,6 +41,8 @@ def _accuracy(options: argparse.Namespace) -> int:
     from lab.studies.contenders import all_contenders
 
     subjects = _subjects(options)
+    if docs := page_directory(options, "accuracy"):
+        return _accuracy_page(options, docs)
     prepare()
     effort = measure.QUICK if options.quick else measure.FULL
     contenders = accuracy.quick_contenders() if options.quick else all_contenders()
@@ -54,9 +58,19 @@ def _accuracy(options: argparse.Namespace) -> int:
     return 0
 
 
+def _accuracy_page(options: argparse.Namespace, docs: Path) -> int:
+    from lab.studies import accuracy_page
+
+    if options.scenes:
+        raise Refused("--docs: allowed: without a SCENE, because the page has its own")
+    prepare()
+    print(f"written to {accuracy_page.write(docs, options.output, options.quick)}")
+    return 0
+
+
 def add_advise(commands: Any) -> Parser:
     """`python -m lab advise`."""
-    sub = add_command(commands, "advise", _advise, "which method, with which setting, measured on this machine")
+    sub = add_command(commands, "advise", _advise, "which method, with which setting, on this machine")
     add_scene(sub)
     sub.add_argument("--error", type=float, help="largest error that is acceptable, in all states (m, m/s)")
     sub.add_argument("--budget", type=float, metavar="SECONDS", help="longest time that a simulation may take")
@@ -77,7 +91,7 @@ def _advise(options: argparse.Namespace) -> int:
 
 def add_prediction(commands: Any) -> Parser:
     """`python -m lab prediction`."""
-    text = "how far ahead each scene can be predicted in double precision"
+    text = "how far ahead a scene can be predicted in doubles"
     sub = add_command(commands, "prediction", _prediction, text)
     _add_scenes(sub)
     return sub
@@ -97,27 +111,9 @@ def _prediction(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_page(commands: Any) -> Parser:
-    """`python -m lab page`."""
-    text = "run all studies and write docs/accuracy.md with its figures; resumes"
-    sub = add_command(commands, "page", _page, text)
-    sub.add_argument("--docs", type=Path, default=Path("docs"), metavar="DIRECTORY", help="default: docs")
-    sub.add_argument("--quick", action="store_true", help="few settings, short runs, no graph: to see that it works")
-    add_study_directory(sub)
-    return sub
-
-
-def _page(options: argparse.Namespace) -> int:
-    from lab.studies import page
-
-    prepare()
-    print(f"written to {page.write(options.docs, options.output, options.quick)}")
-    return 0
-
-
 def add_speed(commands: Any) -> Parser:
     """`python -m lab speed`."""
-    text = "time to one given error, solvers in turn, beside the outside peers"
+    text = "time to one given error, beside the outside peers"
     sub = add_command(commands, "speed", _speed, text)
     add_scene(sub)
     sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")

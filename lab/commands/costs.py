@@ -7,20 +7,20 @@ from typing import Any
 
 from grasp_ros.cli.arguments import (
     add_command,
-    add_output,
     add_scene,
     add_study_directory,
     load_scene,
     prepare,
     whole,
 )
+from lab.commands.docs import add_docs, page_directory
 
 Parser = argparse.ArgumentParser
 
 
 def add_loop(commands: Any) -> Parser:
     """`python -m lab loop`."""
-    text = "control period against deviation and wall time; largest stable period"
+    text = "control period against deviation, time and stability"
     sub = add_command(commands, "loop", _loop, text)
     add_scene(sub)
     sub.add_argument("--no-graph", action="store_true", help="one process only, without ROS")
@@ -48,24 +48,23 @@ def _loop(options: argparse.Namespace) -> int:
 
 def add_effects(commands: Any) -> Parser:
     """`python -m lab effects`."""
-    sub = add_command(commands, "effects", _effects, "what each effect costs: time and size of the bag")
-    add_scene(sub)
-    add_output(sub, "FILE.md", "put table and figure into this text")
+    sub = add_command(commands, "effects", _effects, "what each effect costs: counts of work, times, bytes")
+    add_docs(sub)
     return sub
 
 
 def _effects(options: argparse.Namespace) -> int:
     from lab.studies import effects
 
-    scene = load_scene(options.scene, options.settings)
+    docs = page_directory(options, effects.PAGE)
     prepare()
-    effects.run(scene, options.output)
+    effects.run(docs)
     return 0
 
 
 def add_recorder(commands: Any) -> Parser:
     """`python -m lab recorder`."""
-    sub = add_command(commands, "recorder", _recorder, "bytes and time per tick of a bag; recordings that are killed")
+    sub = add_command(commands, "recorder", _recorder, "bytes and time a tick of a bag; recordings are killed")
     add_scene(sub)
     sub.add_argument("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)")
     sub.add_argument("--seed", type=whole(0), default=0, help="another seed kills at other moments (default 0)")

@@ -15,7 +15,7 @@ Parser = argparse.ArgumentParser
 
 def add_graph(commands: Any) -> Parser:
     """`python -m lab graph`."""
-    text = "lockstep ticks per second in four processes and one, beside bare rclpy; time to start and to verify"
+    text = "ticks a second beside bare rclpy; time to start, to verify"
     sub = add_command(commands, "graph", _graph, text)
     add_scene(sub)
     sub.add_argument("--rounds", type=whole(1), default=5, metavar="N", help="of all graphs in turn (default 5)")
@@ -33,7 +33,7 @@ def _graph(options: argparse.Namespace) -> int:
 
 def add_steering(commands: Any) -> Parser:
     """`python -m lab steering`."""
-    text = "random pause, step, resume and reset calls, each checked against the status, and the bag at the end"
+    text = "random pause, step, resume and reset calls, each checked"
     sub = add_command(commands, "steering", _steering, text)
     add_scene(sub)
     sub.add_argument("--calls", type=whole(1), default=1000, metavar="N", help="how many (default 1000)")
@@ -51,7 +51,7 @@ def _steering(options: argparse.Namespace) -> int:
 
 def add_free_running(commands: Any) -> Parser:
     """`python -m lab free-running`."""
-    text = "a long run with the wall clock: states lost, and the age of commands, jitter and overruns that it publishes"
+    text = "a run with the wall clock: states lost, age, jitter"
     sub = add_command(commands, "free-running", _free_running, text)
     add_scene(sub)
     sub.add_argument("--seconds", type=float, default=60.0, metavar="S", help="simulated (default 60)")

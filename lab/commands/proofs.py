@@ -1,4 +1,4 @@
-"""The studies of what is promised: `certificate`, `paper`, `hard`, `fuzz` and `doors`."""
+"""The studies of what is promised: `domain`, `certificate`, `paper`, `hard`, `fuzz`, `doors` and `faults`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Any
 
 from grasp_ros.cli.arguments import add_command, add_output, prepare, whole
 from grasp_ros.physics.errors import Refused
+from lab.commands.docs import add_docs, page_directory
 
 Parser = argparse.ArgumentParser
 QUICK_STARTS = 4
@@ -17,29 +18,44 @@ LONG_SCENE = "case_01"
 PAPER_PAGE = Path("runs") / "paper.html"
 
 
+def add_domain(commands: Any) -> Parser:
+    """`python -m lab domain`."""
+    sub = add_command(commands, "domain", _domain, "which scenes are simulated: every bound and its reason")
+    add_docs(sub)
+    return sub
+
+
+def _domain(options: argparse.Namespace) -> int:
+    from lab.studies import domain
+
+    domain.run(page_directory(options, "domain"))
+    return 0
+
+
 def add_certificate(commands: Any) -> Parser:
     """`python -m lab certificate`."""
-    text = "where the paper's V jumps, from which p on, and limits of the period"
+    text = "where the paper's V jumps; limits of the control period"
     sub = add_command(commands, "certificate", _certificate, text)
-    add_output(sub, "FILE.md", "put tables and figure into this text")
+    add_docs(sub)
     return sub
 
 
 def _certificate(options: argparse.Namespace) -> int:
     from lab.studies import certificate
 
+    docs = page_directory(options, certificate.PAGE)
     prepare()
-    certificate.run(options.output)
+    certificate.run(docs)
     return 0
 
 
 def add_paper(commands: Any) -> Parser:
     """`python -m lab paper`."""
-    text = "the paper reproduced and judged: equations, figures, quantities, verdicts, and what it lacks, on one page"
+    text = "the paper reproduced and judged, with what it lacks"
     sub = add_command(commands, "paper", _paper, text)
     sub.add_argument("--ros", action="store_true", help="run the eleven cases through the graph as well, some minutes")
     sub.add_argument("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out")
-    sub.add_argument("--docs", type=Path, metavar="FILE.md", help="write it as Markdown too, with figures beside it")
+    add_docs(sub)
     add_output(sub, "FILE.html", f"the page, in one file (default {PAPER_PAGE})", PAPER_PAGE)
     return sub
 
@@ -48,9 +64,10 @@ def _paper(options: argparse.Namespace) -> int:
     from grasp_ros.graph.processes import GraphError
     from lab.paper import page, study
     from lab.paper.definitions import RANDOM_STARTS
+    from lab.studies import pages
 
-    for path in filter(None, (options.output, options.docs)):
-        page.claim(path)
+    docs = page_directory(options, "paper")
+    pages.claim(options.output)
     prepare()
     try:
         found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
@@ -62,17 +79,17 @@ def _paper(options: argparse.Namespace) -> int:
     for claim in found.claims:
         print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
     print(f"written to {options.output}")
-    if options.docs is not None:
-        page.write_markdown(found, options.docs)
-        print(f"written to {options.docs}")
+    if docs is not None:
+        page.write_markdown(found, docs / "paper.md")
+        print(f"written to {docs / 'paper.md'}")
     return 0
 
 
 def add_hard(commands: Any) -> Parser:
     """`python -m lab hard`."""
-    text = "hard cases, family by family: the error reached, and other solvers beside it"
+    text = "hard cases: the error reached, and what others reach"
     sub = add_command(commands, "hard", _hard, text)
-    add_output(sub, "FILE.md", "put table and figure into this text")
+    add_docs(sub)
     sub.add_argument("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten")
     return sub
 
@@ -80,8 +97,9 @@ def add_hard(commands: Any) -> Parser:
 def _hard(options: argparse.Namespace) -> int:
     from lab.studies import hard
 
+    docs = page_directory(options, "hard")
     prepare()
-    return hard.run(options.output, alone=options.alone)
+    return hard.run(docs, alone=options.alone)
 
 
 def add_fuzz(commands: Any) -> Parser:
@@ -92,9 +110,9 @@ def add_fuzz(commands: Any) -> Parser:
     sub.add_argument("--first", type=int, default=0, help="number of the first draw (default 0)")
     sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
     sub.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
-    sub.add_argument("--page", type=Path, metavar="FILE.md", help="write the counts as a page, too; what is known from"
-                                                                  " an earlier run into DIRECTORY is not drawn again")
-    add_output(sub, "DIRECTORY", "where scenes that fail are written (default fuzz)", Path("fuzz"))
+    add_docs(sub)
+    text = "where scenes that fail are written (default runs/fuzz); with --docs what is known there is not drawn again"
+    add_output(sub, "DIRECTORY", text, Path("runs") / "fuzz")
     return sub
 
 
@@ -106,12 +124,13 @@ def _fuzz(options: argparse.Namespace) -> int:
         value = getattr(options, name)
         if value is not None and value < least:
             raise Refused(f"--{name} {value} is not allowed; allowed: a whole number >= {least}")
+    docs = page_directory(options, "fuzz")
     prepare()
-    memory = None if options.page is None else random_scenes.Kept(options.output, options.seed)
+    memory = None if docs is None else random_scenes.Kept(options.output, options.seed)
     book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
                     jobs=options.jobs, memory=memory)
-    if options.page is not None:
-        random_scenes.write_page(options.page, options.seed, options.first, book)
+    if docs is not None:
+        random_scenes.write_page(docs, options.seed, options.first, book)
     return 1 if book.broken else 0
 
 
@@ -125,12 +144,13 @@ def _seconds(seconds: float | None, count: int | None) -> float | None:
 
 def add_doors(commands: Any) -> Parser:
     """`python -m lab doors`."""
-    sub = add_command(commands, "doors", _doors, "damaged scenes, results, bags and journals against their readers")
+    sub = add_command(commands, "doors", _doors, "damaged files of all kinds against their readers")
     sub.add_argument("--seconds", type=float, help="how long (default 60, or until --count files are tried)")
     sub.add_argument("--count", type=whole(1), help="how many files")
     sub.add_argument("--first", type=whole(0), default=0, help="number of the first file (default 0)")
     sub.add_argument("--seed", type=whole(0), default=0, help="another seed makes other files (default 0)")
-    add_output(sub, "DIRECTORY", "where files that break a reader are written (default doors)", Path("doors"))
+    text = "where files that break a reader are written (default runs/doors)"
+    add_output(sub, "DIRECTORY", text, Path("runs") / "doors")
     return sub
 
 
@@ -145,13 +165,13 @@ def _doors(options: argparse.Namespace) -> int:
 
 def add_faults(commands: Any) -> Parser:
     """`python -m lab faults`."""
-    text = "accidents done to graphs of real processes, and what comes of them, some minutes"
+    text = "accidents done to graphs of real processes, some minutes"
     sub = add_command(commands, "faults", _faults, text)
     sub.add_argument("--only", nargs="+", default=[], metavar="NAME", help="these drills alone")
     sub.add_argument("--quick", action="store_true", help="a handful of drills")
     sub.add_argument("--ticks", type=whole(1000), metavar="N",
                      help=f"in place of drills, {LONG_SCENE} in lockstep for N ticks: losses, and memory of processes")
-    add_output(sub, "FILE.md", "write the table as a page too")
+    add_docs(sub)
     return sub
 
 
@@ -162,5 +182,6 @@ def _faults(options: argparse.Namespace) -> int:
         prepare()
         return 0 if endurance.run(LONG_SCENE, options.ticks) else 1
     drills = run.chosen(options.only, options.quick)
+    docs = page_directory(options, "faults")
     prepare()
-    return 0 if run.run(drills, options.output) else 1
+    return 0 if run.run(drills, docs) else 1

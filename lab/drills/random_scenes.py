@@ -10,7 +10,7 @@ from typing import NamedTuple
 from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.scene.versions import versions
 from lab.drills.fuzz import Book, Tally
-from lab.studies.document import prose, table, write
+from lab.studies import pages
 from lab.studies.records import Journal, digest
 
 # what a draw depends on beside the kernels and the physics
@@ -61,7 +61,7 @@ class Kept:
         self._journal.put(self._key(numbers), Line(*map(json.dumps, parts)))
 
 
-def write_page(path: Path, seed: int, first: int, book: Book) -> None:
+def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
     """Write what was counted.
 
     Raises
@@ -69,43 +69,16 @@ def write_page(path: Path, seed: int, first: int, book: Book) -> None:
     Refused
         If it cannot be written.
     """
-    draws = book.ends.total()
-    command = f"python -m lab fuzz --seed {seed} --first {first} --draws {draws} --page {path.as_posix()}"
-    machine = ", ".join(f"{name} {version}" for name, version in versions().items())
-    blocks = [
-        "# Random scenes",
-        prose(f"""Written by `{command}`, with {machine}. A draw depends on its seed and number alone; [the hard
-        cases](hard.md#random-scenes) say how scenes are drawn and what is checked."""),
-        f"{book.broken} of {draws} scenes fail." if book.broken else f"All {draws} scenes hold.",
-        _failures(seed, book), "## How the runs ended", _ends(book), "## Properties",
-        prose("""`checked` counts scenes, or pairs of arm and object; `skipped`, pieces of runs that the quadrature does
-        not resolve. `worst` is the largest error, in roundings where the property is not one of bits or counts, and
-        `draw` where it was."""),
-        _properties(book), "## Habits", _habits(book),
-    ]
-    write(path, "\n\n".join(block for block in blocks if block) + "\n")
+    failures = [[f"`--seed {seed} --first {number} --draws 1`", yaml.splitlines()[0].split(": ", 1)[1]]
+                for number, yaml in sorted(book.scenes.items())]
+    properties = [[name, *map(str, (tally.checked, tally.skipped, tally.failures)), f"{tally.worst:.2g}",
+                   str(tally.where)] for name, tally in book.by_failures()]
+    habits = [[name, str(number), str(book.broken_habits[name])] for name, number in _ordered(book.habits)]
+    ends = [[str(number), text] for text, number in _ordered(book.ends)]
+    pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, ends=ends,
+                properties=properties, habits=habits)
 
 
-def _failures(seed: int, book: Book) -> str:
-    rows = []
-    for number, yaml in sorted(book.scenes.items()):
-        found = yaml.splitlines()[0].split(": ", 1)[1]
-        rows.append([f"`--seed {seed} --first {number} --draws 1`", found])
-    return table(("draw", "what does not hold, and by how much"), rows) if rows else ""
-
-
-def _ends(book: Book) -> str:
-    rows = sorted(book.ends.items(), key=lambda item: (-item[1], item[0]))
-    return table(("scenes", "end"), [[str(number), text] for text, number in rows])
-
-
-def _properties(book: Book) -> str:
-    rows = [[name, *map(str, (tally.checked, tally.skipped, tally.failures)), f"{tally.worst:.2g}", str(tally.where)]
-            for name, tally in book.by_failures()]
-    return table(("property", "checked", "skipped", "failures", "worst", "draw"), rows)
-
-
-def _habits(book: Book) -> str:
-    rows = sorted(book.habits.items(), key=lambda item: (-item[1], item[0]))
-    return table(("habit", "drawn", "failures"), [[name, str(number), str(book.broken_habits[name])]
-                                                  for name, number in rows])
+def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:
+    """The largest first; equal ones by their names."""
+    return sorted(counts.items(), key=lambda item: (-item[1], item[0]))

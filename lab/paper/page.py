@@ -20,7 +20,7 @@ from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.results import Result
 from lab.paper.sample import ALGEBRA, Equation
-from lab.studies.document import write
+from lab.studies import pages
 
 Row = tuple[str, ...]
 FIGURES = "paper"  # directory of the figures beside the Markdown page
@@ -73,22 +73,6 @@ def template(name: str) -> str:
     return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
-def claim(path: Path) -> None:
-    """Make sure, before the work, that a page can be written to where it is to go.
-
-    Raises
-    ------
-    Refused
-        If it cannot.
-    """
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        there = path.exists()
-        path.open("a", encoding="utf-8").close()
-        if not there:
-            path.unlink()
-
-
 def write_html(report: Report, path: Path) -> None:
     """Write the page into one file that needs nothing else.
 
@@ -100,20 +84,17 @@ def write_html(report: Report, path: Path) -> None:
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False)
     page = environment.from_string(template("page.html"))
     runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
-    claim(path)
-    write(
-        path,
-        page.render(
-            report=report,
-            css=Markup(template("page.css")),
-            js=Markup(template("replay.js")),
-            runs=Markup(runs),
-            model=_figure(template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
-            figure=lambda key, text: _figure(report.images[key].svg, text),
-            beside=FIGURE,
-            printed=PRINTED,
-        ),
+    text = page.render(
+        report=report,
+        css=Markup(template("page.css")),
+        js=Markup(template("replay.js")),
+        runs=Markup(runs),
+        model=_figure(template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
+        figure=lambda key, text: _figure(report.images[key].svg, text),
+        beside=FIGURE,
+        printed=PRINTED,
     )
+    pages.put(path, text)
 
 
 def write_markdown(report: Report, path: Path) -> None:
@@ -133,7 +114,7 @@ def write_markdown(report: Report, path: Path) -> None:
             (directory / f"{key}.png").write_bytes(image.png)
         (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
     text = environment.from_string(template("paper.md")).render(report=report, beside=FIGURE, printed=PRINTED)
-    write(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
+    pages.put(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
 
 
 def short_svg(svg: bytes) -> bytes:

@@ -16,11 +16,10 @@ from grasp_ros.physics.layout import Law, Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
-from lab.studies import page_figures
-from lab.studies.document import put, read, write
+from lab.studies import page_figures, pages
 from lab.studies.stability import first_limit
 
-JUMPS, LIMITS = "the jumps", "the limits of the control period"  # marked parts of the document
+PAGE = "jumps"
 SCENES = ("v_jump_symmetric", "v_jump_one_sided", "v_jump_smallest_p")
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 HORIZON = 20.0  # s
@@ -148,71 +147,53 @@ def search(family: Family, draws: int, steps: int, seed: int) -> Found:
     return best
 
 
-def run(document: Path | None) -> None:
-    """Print jumps and limits; with a document, put them and a figure into it.
+def run(docs: Path | None) -> None:
+    """Print jumps and limits; with a directory of pages, write the page with its figure there.
 
     Raises
     ------
     Refused
-        If the document cannot be read or written, or has no marks.
+        If the page cannot be written.
     """
-    text = "" if document is None else put(document, put(document, read(document), JUMPS, ""), LIMITS, "")
-    limits = limits_table()
-    print(limits)
-    table = f"{scenes_table()}\n\n{smallest_table(DRAWS, STEPS)}"
-    print(table)
-    if document is not None:
-        figure = document.with_suffix(".png")
+    found = {"jumps": jump_rows(), "limits": limit_rows(), "smallest": smallest_rows(DRAWS, STEPS)}
+    for rows in found.values():
+        print("\n".join(" ".join(row) for row in rows), end="\n\n")
+    if docs is not None:
         shown = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 8001)) for name in SCENES[:2]]
-        page_figures.v_jumps(shown, figure)
-        block = f"{table}\n\n![V and V_c]({figure.name})"
-        write(document, put(document, put(document, text, JUMPS, block), LIMITS, limits))
+        page_figures.v_jumps(shown, docs / f"{PAGE}.png")
+        pages.write(docs, PAGE, amplitude=AMPLITUDE, horizon=HORIZON, draws=DRAWS, steps=STEPS, seed=SEED, **found)
 
 
-def limits_table() -> str:
-    """Markdown table of the first limits of the arm of Table 1."""
-    rows = ["| Kp, N/m | Kv, N s/m | delay, periods | stable for h below, s |", "|---:|---:|---:|---:|"]
+def limit_rows() -> list[list[str]]:
+    """The first limits of the arm of Table 1."""
+    rows = []
     for position_gain, velocity_gain in ((5.0, 0.5), (5.0, 0.0), (50.0, 5.0)):
         arm = STANDARD._replace(position_gain=position_gain, velocity_gain=velocity_gain)
         for delay in (0, 1, 2):
-            limit = first_limit(arm, delay)
-            rows.append(f"| {position_gain:g} | {velocity_gain:g} | {delay} | {limit:.12g} |")
-    return "\n".join(rows)
+            rows.append([f"{position_gain:g}", f"{velocity_gain:g}", str(delay), f"{first_limit(arm, delay):.12g}"])
+    return rows
 
 
-def scenes_table() -> str:
-    """Markdown table of all jumps of the scenes that show them."""
-    rows = [
-        "| scene | t, s | side | u, mm | V jumps up by, J | V_c there, J |",
-        "|---|---:|---|---:|---:|---:|",
-    ]
+def jump_rows() -> list[list[str]]:
+    """All jumps of the scenes that show them."""
+    rows = []
     for name in SCENES:
         scene = scenes.load(name)
         for jump in jumps(scene.system, scene.duration):
             level = float(simulate(scene, grid=np.array([jump.time])).energy.V_c[0])
-            side = NAMES[jump.side]
-            rows.append(f"| `{name}` | {jump.time:.6f} | {side} | {1e3 * jump.u:.4f} | {jump.height:.6f} |"
-                        f" {level:.6f} |")
-    return "\n".join(rows)
+            rows.append([f"`{name}`", f"{jump.time:.6f}", NAMES[jump.side], f"{1e3 * jump.u:.4f}", f"{jump.height:.6f}",
+                         f"{level:.6f}"])
+    return rows
 
 
-def smallest_table(draws: int, steps: int) -> str:
-    """Markdown table of the smallest p that was found in each family."""
-    rows = [
-        f"Smallest p with a jump; arms of Table 1, released at rest within {AMPLITUDE:g} m, no penetration,"
-        f" {HORIZON:g} s: {draws} random starts, then {steps} steps downhill, seed {SEED}. A jump at the p of the"
-        " third column exists; that there is none below the p of the last column is theorem 2."
-        " Between them nothing is proved.",
-        "",
-        "| starts | jump of at least, V(0) | found at p, s/m | x_l, x_o, x_r, m | m_o, kg | H | t, s | safe below p |",
-        "|---|---:|---:|---|---:|---:|---:|---:|",
-    ]
+def smallest_rows(draws: int, steps: int) -> list[list[str]]:
+    """The smallest p that was found in each family."""
+    rows = []
     for family in families():
         p, place, jump = search(family, draws, steps, SEED)
         start, mass, hertzian = family.start(place)
-        where = ", ".join(f"{x:.5f}" for x in start[0::2])
         widest = np.array([-AMPLITUDE, 0.0, 0.0, 0.0, AMPLITUDE, 0.0])
         safe = safe_p(table_one(p, 10.0 ** family.low[3], hertzian), widest)
-        rows.append(f"| {family.text} | {family.part:g} | {p:.4f} | {where} | {mass:.4g} | {hertzian:.4g} |"
-                    f" {jump.time:.4f} | {safe:.4f} |")
-    return "\n".join(rows)
+        rows.append([family.text, f"{family.part:g}", f"{p:.4f}", ", ".join(f"{x:.5f}" for x in start[0::2]),
+                     f"{mass:.4g}", f"{hertzian:.4g}", f"{jump.time:.4f}", f"{safe:.4f}"])
+    return rows

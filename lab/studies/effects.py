@@ -1,16 +1,17 @@
 """What each effect costs: the paper's standard case alone, with each effect alone, and with all together.
 
-The runs of all variants are interleaved, so that their ratios hold on a machine that is shared.
+An effect changes the motion, and with it how many flights and Taylor steps there are. So the page has both: how many,
+which is the same on every machine, and what one of them costs. Runs take turns, and the least time counts: of each
+segment by itself under continuous feedback, of the whole run with held commands.
 """
 
 from __future__ import annotations
 
-import statistics
-import subprocess
+import math
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,72 +21,68 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator
-from grasp_ros.exact.records import Loop, new_place
-from grasp_ros.graph.processes import Graph
-from grasp_ros.physics.layout import Transition
+from grasp_ros.exact.records import Integers, Loop, new_place
+from grasp_ros.physics.layout import Kind, Work
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects import EFFECTS
-from grasp_ros.scene.versions import versions
+from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.simulation import simulate
+from grasp_ros.simulation.closed_loop import drive_external
 from grasp_ros.simulation.ticks import tick_times
-from lab.studies import page_figures
-from lab.studies.document import put, read, write
+from lab.drills import recorder
+from lab.studies import page_figures, pages
+from lab.studies.segment_clock import SegmentClock
 
-BARE = "bare"
+PAGE, SCENE, BARE = "costs", "case_01", "bare"
 REPEATS, SAMPLED_REPEATS = 31, 21
+MOST_SEGMENTS = 10**5
 RECORDED_S = 1.0
 LESSER = ("hammer", "no_contact")  # scenes that name less than the paper's grasp
-REGISTRY, COSTS = "the registry", "what `python -m lab effects` measured"  # marked parts of the documentation
+
+
+class Counts(NamedTuple):
+    """How many flights and Taylor steps a motion has: under continuous feedback, and with held commands."""
+
+    continuous: tuple[int, int] | None  # None: the scene is sampled
+    sampled: tuple[int, int]
 
 
 class Cost(NamedTuple):
-    """Cost of one variant of the scene."""
+    """What they take, s."""
 
-    name: str
-    continuous: float | None  # s per simulated second; None: the scene is sampled
-    contact: float | None  # s per touch, of the same run
-    tick: float  # s per control period without ROS
-    physics: float  # s per control period of the same motion in a loop of the kernel, under forces that are given
+    flight: float  # one of continuous feedback; NaN if there is none beside the first segment
+    step: float
+    tick: float  # a control period without ROS
+    physics: float  # a control period of the same motion in a loop of the kernel, under forces that are given
     bag: float  # bytes per simulated second
 
 
-def run(scene: Scene, document: Path | None) -> None:
-    """Print the costs; with a document, put table and figure into it.
-
-    Parameters
-    ----------
-    scene : Scene
-        What the effects are added to.
-    document : Path, optional
-        Text file with marked parts; the figure is written beside it.
+def run(docs: Path | None) -> None:
+    """Print the costs; with a directory of pages, write the page with its figure there.
 
     Raises
     ------
     Refused
-        If the document cannot be read or written, or has no marks.
+        If the page cannot be written.
     """
-    text = None if document is None else read(document)
-    if text is not None and document is not None:
-        text = put(document, text, REGISTRY, registry_table())
-        put(document, text, COSTS, "")  # refuses a text without marks before the work begins
-    costs = measure(variants(scene), REPEATS, SAMPLED_REPEATS)
-    table = _cost_table(scene, costs)
-    print(table)
-    if text is not None and document is not None:
-        figure = document.with_suffix(".png")
-        page_figures.effect_costs([(cost.name, cost.tick * 1e6, cost.bag / 1e3) for cost in costs], figure)
-        block = f"{table}\n\n![costs of the effects]({figure.name})"
-        write(document, put(document, text, COSTS, block))
+    scene = scenes.load(SCENE)
+    found = variants(scene)
+    costs = measure(found)
+    keys = {name: added(scene, one) if name in BY_SECTION else [] for name, one in found.items()}
+    rows = [row(name, keys[name], counts(one), costs[name]) for name, one in found.items()]
+    print("\n".join("  ".join(cells) for cells in rows))
+    if docs is not None:
+        shown = [(name, cost.tick * 1e6, cost.bag / 1e3) for name, cost in costs.items()]
+        page_figures.effect_costs(shown, docs / f"{PAGE}.png")
+        pages.write(docs, PAGE, scene=scene, rows=rows)
 
 
-def registry_table() -> str:
-    """Markdown table of the effects; those of the right side and of other bodies stand for their twins."""
-    rows = ["| section | what it simulates | what it does to V_c |", "|---|---|---|"]
-    for effect in EFFECTS:
-        if not effect.section.startswith(("right_", "object_pulse", "object_sine", "object_table")):
-            rows.append(f"| `{effect.section}` | {effect.text} | {effect.certificate} |")
-    return "\n".join(rows)
+def registry_rows() -> list[list[str]]:
+    """What every effect does; those of the right side and of other bodies stand for their twins."""
+    return [
+        [f"`{effect.section}`", effect.text, effect.certificate] for effect in EFFECTS
+        if not effect.section.startswith(("right_", "object_pulse", "object_sine", "object_table"))
+    ]
 
 
 def variants(scene: Scene) -> dict[str, Scene]:
@@ -103,24 +100,72 @@ def variants(scene: Scene) -> dict[str, Scene]:
     return {**found, "all together": _with(scene, everything), **lesser}
 
 
-def measure(found: Mapping[str, Scene], repeats: int, sampled_repeats: int) -> list[Cost]:
-    """Time all variants in turn, and record a second of each over topics."""
-    smooth = {name: partial(_final_state, scene) for name, scene in found.items() if not scene.sampled}
-    continuous = _interleaved(smooth, repeats, "continuous")
-    sampled = _interleaved(
-        {name: partial(simulate, scene, sampled=True) for name, scene in found.items()}, sampled_repeats, "sampled"
-    )
-    physics = _interleaved({name: physics_of(scene) for name, scene in found.items()}, sampled_repeats, "physics")
-    costs = []
-    for name, scene in tqdm(found.items(), desc="recorded", file=sys.stderr):
-        seconds = continuous.get(name)
-        touches = sum(event.kind == Transition.TOUCH for event in simulate(scene).events)
-        costs.append(Cost(
-            name, None if seconds is None else seconds / scene.duration,
-            None if seconds is None or not touches else seconds / touches,
-            sampled[name] / scene.ticks, physics[name] / scene.ticks, _bag_size(scene),
-        ))
-    return costs
+def _with(scene: Scene, sections: Mapping[str, Mapping[str, Any]]) -> Scene:
+    return scenes.compose(scene.name, sections, title=scene.title, readings=scene.readings)
+
+
+def added(scene: Scene, variant: Scene) -> list[str]:
+    """The keys that a variant has and the scene has not; a section without keys by its own name."""
+    keys = []
+    for section, numbers in variant.values.items():
+        new = [key for key in numbers if key not in scene.values.get(section, {})]
+        keys += [f"{section}.{key}" for key in new] or ([section] if section not in scene.values else [])
+    return keys
+
+
+def counts(scene: Scene) -> Counts:
+    """Count the work of a scene."""
+    sampled = simulate(scene, sampled=True).work
+    continuous = None if scene.sampled else simulate(scene, grid=np.array([scene.duration])).work
+    return Counts(None if continuous is None else _pair(continuous), _pair(sampled))
+
+
+def _pair(work: np.ndarray) -> tuple[int, int]:
+    return int(work[Work.FLIGHTS]), int(work[Work.CONTACT_STEPS])
+
+
+def row(name: str, keys: Sequence[str], counted: Counts, cost: Cost) -> list[str]:
+    """The cells of a variant: its keys, work and times of continuous feedback and with held commands, and the bag."""
+    flights, steps = counted.continuous or ("-", "-")
+    times = [f"{number:.0f}" if math.isfinite(number) else "-" for number in (1e9 * cost.flight, 1e9 * cost.step)]
+    words = ", ".join(f"`{key.removeprefix(f'{name}.')}`" for key in keys)
+    return [
+        name, words, str(flights), times[0], str(steps), times[1], *map(str, counted.sampled),
+        f"{1e6 * cost.tick:.2f}", f"{1e6 * cost.physics:.2f}", f"{1e-3 * cost.bag:.0f}",
+    ]
+
+
+def measure(found: Mapping[str, Scene]) -> dict[str, Cost]:
+    """Time all variants in turn, and record a second of each."""
+    least = {name: _segments(scene) for name, scene in found.items()}
+    for _ in tqdm(range(REPEATS), desc="continuous", file=sys.stderr):
+        for name, scene in found.items():
+            np.minimum(least[name][1], _segments(scene)[1], out=least[name][1])
+    sampled = _fastest({name: partial(simulate, scene, sampled=True) for name, scene in found.items()}, "sampled")
+    physics = _fastest({name: physics_of(scene) for name, scene in found.items()}, "physics")
+    return {
+        name: Cost(_average(*least[name], Kind.FLIGHT), _average(*least[name], Kind.CONTACT),
+                   sampled[name] / scene.ticks, physics[name] / scene.ticks, _bag_size(scene))
+        for name, scene in tqdm(found.items(), desc="recorded", file=sys.stderr)
+    }
+
+
+def _segments(scene: Scene) -> tuple[Integers, Array]:
+    """Kind and seconds of every segment of a run under continuous feedback; of none where the scene is sampled."""
+    if scene.sampled:
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
+    integrator = Integrator(scene.system, continuous=True)
+    integrator.observer = clock = SegmentClock(MOST_SEGMENTS)
+    if scene.system.external:
+        drive_external(scene, np.zeros(0), integrator)
+    else:
+        integrator.advance(scene.duration)
+    return clock.segments
+
+
+def _average(kinds: Integers, seconds: Array, kind: Kind) -> float:
+    chosen = seconds[kinds == kind]
+    return float(chosen.mean()) if len(chosen) else math.nan
 
 
 def physics_of(scene: Scene) -> Callable[[], Array]:
@@ -136,53 +181,21 @@ def physics_of(scene: Scene) -> Callable[[], Array]:
     return again
 
 
-def _final_state(scene: Scene) -> None:
-    simulate(scene, grid=np.array([scene.duration]))
-
-
-def _with(scene: Scene, sections: Mapping[str, Mapping[str, Any]]) -> Scene:
-    return scenes.compose(scene.name, sections, title=scene.title, readings=scene.readings)
-
-
-def _interleaved(runs: Mapping[str, Callable[[], object]], repeats: int, what: str) -> dict[str, float]:
-    """Median time of each run in s; the first round does not count."""
-    times: dict[str, list[float]] = {name: [] for name in runs}
-    for turn in tqdm(range(repeats + 1), desc=what, file=sys.stderr):
+def _fastest(runs: Mapping[str, Callable[[], object]], what: str) -> dict[str, float]:
+    """Least time of each run in s of the processor, which counts no neighbours; they take turns."""
+    times = dict.fromkeys(runs, math.inf)
+    for _ in tqdm(range(SAMPLED_REPEATS), desc=what, file=sys.stderr):
         for name, call in runs.items():
-            begin = time.perf_counter()
+            begin = time.thread_time()
             call()
-            if turn:
-                times[name].append(time.perf_counter() - begin)
-    return {name: statistics.median(values) for name, values in times.items()}
+            times[name] = min(times[name], time.thread_time() - begin)
+    return times
 
 
 def _bag_size(scene: Scene) -> float:
+    """Bytes that a simulated second takes in a bag."""
     short = scene.changed({"time.duration_s": RECORDED_S})
     with tempfile.TemporaryDirectory() as directory:
-        graph = Graph(short, Path(directory) / "run", 1e-12, errors=subprocess.DEVNULL)
-        graph.start()
-        try:
-            graph.wait([])
-        finally:
-            graph.stop()
-        return sum(file.stat().st_size for file in graph.bag.iterdir()) / RECORDED_S
-
-
-def _cost_table(scene: Scene, costs: list[Cost]) -> str:
-    bare = costs[0]
-    lines = [
-        f"{scene.title}, {scene.duration:g} s, control period {scene.period_ns / 1e6:g} ms."
-        f" {', '.join(f'{name} {version}' for name, version in versions().items())}.", "",
-        "| scene | continuous, us per s | ratio | us per contact | sampled, us per tick | ratio | ratio to the physics"
-        " | bag, kB per s |",
-        "|---|---:|---:|---:|---:|---:|---:|---:|",
-    ]
-    for cost in costs:
-        smooth = ["-", "-"] if cost.continuous is None or bare.continuous is None else [
-            f"{cost.continuous * 1e6:.1f}", f"{cost.continuous / bare.continuous:.2f}"
-        ]
-        contact = "-" if cost.contact is None else f"{cost.contact * 1e6:.1f}"
-        cells = [cost.name, *smooth, contact, f"{cost.tick * 1e6:.2f}", f"{cost.tick / bare.tick:.2f}",
-                 f"{cost.tick / cost.physics:.2f}", f"{cost.bag / 1e3:.0f}"]
-        lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+        bag = Path(directory) / "bag"
+        recorder.write(bag, simulate(short, sampled=True))
+        return sum(file.stat().st_size for file in bag.iterdir()) / RECORDED_S

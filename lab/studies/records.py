@@ -22,7 +22,7 @@ KIND = "the journal of a study"
 LARGE = 2**63  # no count of a study is
 MOST_BYTES = 2**26  # of a journal
 T = TypeVar("T")
-PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "scipy", "scikit-sundae", "heyoka")
+PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "rclpy", "rosbags", "scipy", "scikit-sundae", "heyoka")
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
 
 

@@ -21,7 +21,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from lab.studies import accuracy, document, measure, peer_heyoka, predictability
+from lab.studies import accuracy, measure, pages, peer_heyoka, predictability
 from lab.studies.contenders import all_contenders, own_contenders
 from lab.studies.peers import Contender, Solve
 from lab.studies.records import Journal, Record, describe_machine
@@ -77,7 +77,7 @@ def run(scene: Scene, error: float, out: Path | None, directory: Path) -> None:
     if out is not None:
         record = {"scene": scene.to_yaml(), "metric": accuracy.METRIC, "error": error, "machine": describe_machine()}
         timings = {o: [{**t._asdict(), "record": t.record._asdict()} for t in rows] for o, rows in results.items()}
-        document.write(out, json.dumps({**record, "timings": timings}, indent=1) + "\n")
+        pages.put(out, json.dumps({**record, "timings": timings}, indent=1) + "\n")
 
 
 def final_state(scene: Scene, target: measure.Truth, error: float) -> list[Timing]:

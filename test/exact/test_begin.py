@@ -22,6 +22,7 @@ from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import HELD
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, Work, X
 from grasp_ros.physics.model import Contact, Grasp
+from lab.cases.impacts import TOUCHING
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 MOTION = [V.L, V.O, V.R]
@@ -261,24 +262,15 @@ def test_the_time_of_the_impulse_is_a_power_of_two_that_follows_the_units(order:
 @pytest.mark.parametrize("hertzian", [1e2, 1e4, 1e12])
 @pytest.mark.parametrize("speed", [1e-6, 1.0, 1e3])
 @pytest.mark.parametrize("mirror", [False, True])
-@pytest.mark.parametrize(
-    ("object_mass", "expected", "steps"),
-    [
-        (1.0, (-0.070952353651436871, 0.076403039071206993, 0.994549314580229878), 46),
-        (0.5, (-0.136122574012185708, 0.355827683353408662, 0.958208732335481377), 48),
-        (0.1, (-0.0475095756030004457, 0.907669860965354066, 0.956742589506465039), 58),
-    ],
-)
-def test_a_touching_chain(
-    object_mass: float, expected: tuple[float, float, float], steps: int, mirror: bool, speed: float, hertzian: float
-) -> None:
+@pytest.mark.parametrize(("object_mass", "steps"), [(1.0, 46), (0.5, 48), (0.1, 58)])
+def test_a_touching_chain(object_mass: float, steps: int, mirror: bool, speed: float, hertzian: float) -> None:
     """O11: the same for every H and every speed."""
     grasp = Grasp(FREE, FREE, Contact(hertzian, 0.0), Contact(hertzian, 0.0), object_mass)
     state = [0.0, 0.0, 0.0, 0.0, 0.0, -speed] if mirror else [0.0, speed, 0.0, 0.0, 0.0, 0.0]
     duration = 20.0 * (1.0 / (hertzian * math.sqrt(speed))) ** 0.4
     result = run(grasp, state, duration)
     found = done(result).state[1::2] / speed
-    assert (-found[::-1] if mirror else found).tolist() == pytest.approx(expected, rel=3e-15, abs=1e-14)
+    assert (-found[::-1] if mirror else found).tolist() == pytest.approx(TOUCHING[object_mass], rel=3e-15, abs=1e-14)
     assert done(result).work[Work.CONTACT_STEPS] <= steps
     assert [kind for kind, _ in kinds(result)] == ["TOUCH", "TOUCH", "RELEASE", "RELEASE"]
 

@@ -23,7 +23,7 @@ def test_accuracy_quick_writes_records_and_figures(lab_command: Any, tmp_path: P
 
 
 def test_page_quick_has_all_sections_and_figures(lab_command: Any, tmp_path: Path) -> None:
-    result = lab_command("page", "--quick", "--docs", "docs", "-o", "journal")
+    result = lab_command("accuracy", "--quick", "--docs", "docs", "-o", "journal")
     assert result.returncode == 0, result.stderr
     text = (tmp_path / "docs" / "accuracy.md").read_text()
     for title in ("Which method", "What the paper's method costs", "Energy in the elastic case", "over topics",

@@ -9,7 +9,7 @@ from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from lab.cases.case import Product
 from lab.cases.horizons import balances
-from lab.cases.impacts import TOUCHING, chain, impact_error
+from lab.cases.impacts import impact_error
 from lab.cases.modes import STARTS
 from lab.cases.scenes import grasp, library
 from lab.cases.touches import SYMMETRIC, symmetric
@@ -93,12 +93,3 @@ def test_a_release_at_rest_runs_backwards() -> None:
     product = Product()
     assert reversal(grasp(AT_REST, 5.0, left=ELASTIC, contact=Contact(1e4, 0.0)), product) < 1e-9
     assert len(product.runs[0].events) > 5
-
-
-@pytest.mark.parametrize("mass", TOUCHING)
-@pytest.mark.parametrize(("hertzian", "speed"), [(1e4, 1.0), (1e4, 1e-3), (1e8, 1e-3)])
-def test_touching_chains_of_any_stiffness_and_speed(mass: float, hertzian: float, speed: float) -> None:
-    """O11."""
-    product, contact = Product(), Contact(hertzian, 0.0)
-    assert chain(mass, 0.0, speed, contact, 10.0, TOUCHING[mass], None, product) <= 1e-12
-    assert mirror(product.runs[0].scene, product) == 0.0

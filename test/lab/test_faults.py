@@ -19,10 +19,10 @@ GOOD = Evidence(said="it is gone", noticed=0.5, exits={"grasp run": 1})
 @pytest.mark.slow
 @pytest.mark.alone
 def test_quick_drills_pass_and_are_written(lab_command: Any, tmp_path: Path) -> None:
-    result = lab_command("faults", "--quick", "-o", "faults.md")
+    result = lab_command("faults", "--quick", "--docs", "docs")
     assert result.returncode == 0, result.stdout + result.stderr
     drills = run.chosen((), quick=True)
-    text = (tmp_path / "faults.md").read_text()
+    text = (tmp_path / "docs" / "faults.md").read_text()
     assert len(drills) >= 3
     for drill in drills:
         [row] = [line for line in text.splitlines() if line.startswith(f"| {drill.fault} |")]

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.main import main
 from grasp_ros.simulation import simulate
+from lab.__main__ import main
 
 pytestmark = pytest.mark.slow  # the whole study, with few random starts
 
@@ -30,8 +30,7 @@ CONTENT = (
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     directory = tmp_path_factory.mktemp("paper")
-    page, text = directory / "page.html", directory / "docs" / "paper.md"
-    assert main(["study", "paper", "--quick", "-o", str(page), "--docs", str(text)]) == 0
+    assert main(["paper", "--quick", "-o", str(directory / "page.html"), "--docs", str(directory / "docs")]) == 0
     return directory
 
 
@@ -39,7 +38,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert main(["study", "paper", "-o", str(tmp_path / "file" / "page.html")]) == 2
+    assert main(["paper", "-o", str(tmp_path / "file" / "page.html")]) == 2
     assert "grasp: " in capsys.readouterr().err
 
 

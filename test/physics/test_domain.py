@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +16,6 @@ from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import EFFECTS
 from grasp_ros.simulation.variants import Variants
 from lab.oracles.metamorphic import scaled
-from lab.studies.domain import tables
-
-DOCUMENT = Path(__file__).parents[2] / "docs" / "domain.md"
 
 
 def grasp(seconds: float = 1.0, **numbers: dict[str, float]) -> Scene:
@@ -140,10 +136,6 @@ def test_what_is_no_number_is_outside() -> None:
     system = grasp().system
     system.state[0] = math.nan
     assert outside(system, 1.0) is not None
-
-
-def test_the_page_has_the_tables_of_the_code() -> None:
-    assert tables() in DOCUMENT.read_text(encoding="utf-8")
 
 
 def rows(scene: Scene, seconds: float | None = None) -> Systems:

@@ -20,7 +20,7 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import decoding, reading, writing
 from grasp_ros.simulation import plots, simulate
-from lab.studies import document
+from lab.studies import pages
 from lab.studies.records import Journal
 
 ROOT = Path(grasp_ros.__file__).parent
@@ -46,8 +46,7 @@ REFUSALS: dict[str, Callable[[Path], object]] = {
     "new bag": lambda path: bag.Recorder(path, scenes.load("case_01"), {}),
     "graph": lambda path: Graph(scenes.load("case_01"), path, ACCURACY).start(),
     "figure": lambda path: plots.draw(simulate(scenes.load("arm_alone")), path / "figure.nonsense", ""),
-    "marks": lambda path: document.put(path, "text", "part", "block"),
-    "document": lambda path: document.read(path),
+    "page": lambda path: pages.put(path / "file" / "page.md", ""),
     "journal": lambda path: Journal(path / "file" / "journal"),
 }
 

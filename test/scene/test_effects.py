@@ -14,7 +14,7 @@ from grasp_ros.scene import PAPER
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
 from grasp_ros.simulation import simulate
-from lab.studies.effects import registry_table, variants
+from lab.studies.effects import variants
 
 OTHERS = [name for name in scenes.names() if name not in CASES]
 
@@ -113,7 +113,3 @@ def test_every_effect_has_its_row_in_the_cost_table() -> None:
     assert found["all together"].system.delay == 2
     for scene in found.values():
         assert simulate(scene.changed({"time.duration_s": 0.1})).status is Status.DONE
-
-
-def test_the_documentation_lists_every_effect() -> None:
-    assert registry_table() in DOCUMENT.read_text(encoding="utf-8")

@@ -9,10 +9,8 @@ from pathlib import Path
 
 from lab.drills.faults.drill import Drill, lost_words
 from lab.drills.faults.verdict import LOST_SECONDS, NOTICE_SECONDS, SLACK_SECONDS, Evidence, Verdict
-from lab.studies import document
+from lab.studies import pages
 
-COMMAND = "python -m lab faults -o docs/faults.md"
-HEADS = ("fault", "what the user sees", "kept", "noticed", "exit", "left", "verdict")
 Played = tuple[Drill, Evidence]
 
 
@@ -44,7 +42,7 @@ def noticed(evidence: Evidence) -> str:
     return "" if evidence.went_on or evidence.mute else "never"
 
 
-def write(path: Path, played: Sequence[Played]) -> None:
+def write(docs: Path, played: Sequence[Played]) -> None:
     """Write the page.
 
     Raises
@@ -52,24 +50,7 @@ def write(path: Path, played: Sequence[Played]) -> None:
     Refused
         If it cannot be written.
     """
-    head = document.prose(f"""
-        Written by `{COMMAND}`, which plays {len(played)} accidents with real processes, each in a ROS domain of its
-        own, and computes every cell. A drill passes if the graph survives, which means that it goes on and that its
-        bag holds every tick and [proves itself](graph.md#a-bag-proves-itself), or if it ends with a sentence within
-        {NOTICE_SECONDS:g} s of the accident (and {SLACK_SECONDS:g} s for a machine that plays two at a time), with
-        all ticks but those of the last {LOST_SECONDS} s in the bag, no process left behind, and no traceback.
-        """)
-    parts = ["# Faults", head, f"**{summary(played)}.**"]
-    for group, members in groupby(played, key=lambda pair: pair[0].group):
-        parts += [f"## {group[0].upper()}{group[1:]}", document.table(HEADS, [row(*pair) for pair in members])]
-    parts.append("## How to read it\n\n" + document.prose("""
-        *What the user sees* is the last sentence that was printed before the run was over; of a drill that is survived,
-        before it was stopped with a Ctrl-C. DIR stands for the directory, N for numbers that differ from run to run.
-        *Kept* counts the ticks that the plant had published before the accident; where the monitor itself was hit,
-        those that it had recorded. *Noticed* is the time from the accident to the first sentence on a terminal or the
-        first report on `/diagnostics` that is not OK. *Exit* is the exit status of `grasp run`, or of the nodes that
-        ended. *Left* are processes that had to be killed, and files in /dev/shm of processes that
-        [were killed](graph.md). In four terminals, what still waits when plant and monitor have ended is ended with a
-        Ctrl-C.
-        """))
-    document.write(path, "\n\n".join(parts) + "\n")
+    groups = [(f"{group[0].upper()}{group[1:]}", [row(*pair) for pair in members])
+              for group, members in groupby(played, key=lambda pair: pair[0].group)]
+    pages.write(docs, "faults", number=len(played), summary=summary(played), groups=groups, notice=NOTICE_SECONDS,
+                slack=SLACK_SECONDS, lost=LOST_SECONDS)

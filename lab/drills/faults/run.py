@@ -46,7 +46,7 @@ def chosen(names: Sequence[str], quick: bool) -> list[Drill]:
     return [drill for drill in drills if drill.quick or not quick]
 
 
-def run(drills: Sequence[Drill], output: Path | None) -> bool:
+def run(drills: Sequence[Drill], docs: Path | None) -> bool:
     """Play drills, print a row of each and write the page; returns whether all pass.
 
     Raises
@@ -82,8 +82,8 @@ def run(drills: Sequence[Drill], output: Path | None) -> bool:
     for drill, evidence in played:
         print(f"{drill.name:<28} {evidence.verdict.value:<22} {page.row(drill, evidence)[1]}")
     print(page.summary(played))
-    if output is not None:
-        page.write(output, played)
+    if docs is not None:
+        page.write(docs, played)
     return all(evidence.verdict.passes for evidence in found.values())
 
 

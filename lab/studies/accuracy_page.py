@@ -1,4 +1,4 @@
-"""Runs all studies and writes docs/accuracy.md with its figures and records."""
+"""Runs all studies of accuracy and writes docs/accuracy.md with its figures and records."""
 
 from __future__ import annotations
 
@@ -15,22 +15,20 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 from lab.studies import (
     accuracy,
-    document,
+    accuracy_rows,
     drift,
     figures,
     loop,
     measure,
+    pages,
     predictability,
     profile,
-    sections,
     speed,
     stability,
-    time_sections,
 )
 from lab.studies.contenders import all_contenders, own_contenders
 from lab.studies.records import Journal, Record, write_csv
 
-COMMAND = "python -m lab page"
 LOOP_SCENE = "case_01"
 QUICK_S = 5.0
 QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
@@ -78,17 +76,13 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     figures.prediction(predictions, place / "prediction.png")
     figures.control_period(points, case.name, place / "control_period.png")
     figures.stability(*stability.curves(case.grasp.left, limits), place / "stability.png")
-    page = docs / "accuracy.md"
-    text = [
-        sections.head(COMMAND), sections.choice(records), sections.paper(records), sections.tolerance(records),
-        sections.missed(records), sections.energy(drifts), sections.prediction(predictions),
-        sections.topics(case.title, points, limits), time_sections.ahead(records),
-        time_sections.time_spent(records, _profiles(subjects, records)), time_sections.output(_output(subjects)),
-        *([] if quick else [time_sections.final_state(_final_states(subjects, directory))]),
-        sections.methods(), sections.details(records),
-    ]
-    document.write(page, "\n\n".join(text) + "\n")
-    return page
+    return pages.write(
+        docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
+        drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),
+        topics=accuracy_rows.topics(case.title, points, limits),
+        profiles=accuracy_rows.profiles(_profiles(subjects, records)), output=_output(subjects),
+        last=None if quick else accuracy_rows.last_state(_final_states(subjects, directory)),
+    )
 
 
 def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[profile.Profile]:
@@ -96,25 +90,25 @@ def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[prof
     found = []
     for scene in subjects:
         own = [record for record in records if (record.scene, record.method) == (scene.name, EXACT)]
-        fastest = accuracy.fastest(own, time_sections.FINAL_ERROR)
+        fastest = accuracy.fastest(own, accuracy_rows.ERROR)
         found.append(profile.profile(scene, METHODS[EXACT].default if fastest is None else fastest.setting))
     return found
 
 
 def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[speed.Timing]]:
     journal = Journal(directory)
-    error = time_sections.FINAL_ERROR
-    return {scene.name: speed.final_state(scene, measure.truth(scene, journal), error) for scene in subjects}
+    return {scene.name: speed.final_state(scene, measure.truth(scene, journal), accuracy_rows.ERROR)
+            for scene in subjects}
 
 
-def _output(subjects: Sequence[Scene]) -> dict[str, tuple[float, float]]:
-    """Seconds of `exact` with all output times and with the last alone, in turn."""
+def _output(subjects: Sequence[Scene]) -> list[list[str]]:
+    """Times of `exact` with all output times and with the last alone, in turn, and their ratio."""
     exact = next(contender for contender in own_contenders() if contender.name == EXACT)
-    costs = {}
+    rows = []
     for scene in subjects:
         solve = exact.build(scene, METHODS[EXACT].default)
         grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
         pairs = [(measure.seconds(solve, grid), measure.seconds(solve, grid[-1:])) for _ in range(OUTPUT_RUNS)]
-        both, last = zip(*pairs, strict=True)
-        costs[scene.name] = (statistics.median(both), statistics.median(last))
-    return costs
+        both, last = map(statistics.median, zip(*pairs, strict=True))
+        rows.append([scene.name, f"{1e3 * both:.3g} ms", f"{1e3 * last:.3g} ms", f"{both / last:.2f}"])
+    return rows

@@ -1,0 +1,170 @@
+"""The numbers of docs/accuracy.md: tables, and what its sentences need, from what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from grasp_ros.methods.contract import TOLERANCE
+from grasp_ros.methods.registry import EXACT, METHODS
+from lab.studies import accuracy, predictability
+from lab.studies.drift import Drift
+from lab.studies.loop import Point
+from lab.studies.profile import Profile
+from lab.studies.records import Record, by_scene, milliseconds
+from lab.studies.speed import Timing
+from lab.studies.stability import Limit
+
+SAME_TOLERANCE = 1e-8
+LOOSE, ERROR = 1e-3, 1e-9
+RIVALS = {
+    "`solve_ivp` at its best": [name for name, method in METHODS.items() if method.package == "scipy"],
+    "`odeint`": ["odeint"],
+    "SUNDIALS at its best": [f"cvode_{kind}{events}" for kind in ("adams", "bdf") for events in ("", "_events")],
+    "heyoka at its best": ["heyoka", "heyoka_fast_math"],
+}
+
+
+def by_error(records: Sequence[Record]) -> dict[str, Any]:
+    """What follows from the records of error against time."""
+    scenes = by_scene(records)
+    return {
+        "targets": [f"error <= {target:.0e}" for target in accuracy.TARGETS], "choice": _choice(scenes),
+        "paper": [_paper(name, here) for name, here in scenes.items()], "tolerance": _tolerance(records, list(scenes)),
+        "missed": _missed(records), "ahead": {"error": ERROR, "rivals": list(RIVALS), "rows": _ahead(scenes)},
+        "methods": [[f"`{m.name}`", m.order, m.at_touch, m.source] for m in METHODS.values()],
+        "details": [(name, "\n".join(accuracy.summary(here))) for name, here in scenes.items()],
+    }
+
+
+def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
+    """Which method for which error."""
+    rows, ahead, ratios, finest = [], 0, [], []
+    for name, here in scenes.items():
+        mine = [record for record in here if record.method == EXACT]
+        others = [record for record in here if record.method != EXACT]
+        pairs = [(accuracy.fastest(mine, error), accuracy.fastest(others, error)) for error in accuracy.TARGETS]
+        rows.append([name, *(f"{_cell(own)}; {_cell(other)}" for own, other in pairs)])
+        own, other = pairs[accuracy.TARGETS.index(ERROR)]
+        if own is not None:
+            ahead += other is None or own.time < other.time
+            ratios += [] if other is None else [other.time / own.time]
+        loose, tight = pairs[accuracy.TARGETS.index(LOOSE)][0], min(mine, key=lambda record: record.setting)
+        finest += [] if loose is None else [tight.time / loose.time]
+    return {"rows": rows, "ahead": ahead, "ratios": ratios, "finest": finest, "error": ERROR, "loose": LOOSE}
+
+
+def _paper(name: str, here: Sequence[Record]) -> list[str]:
+    """What the paper's method costs on a scene."""
+    runs = [record for record in here if record.method == "paper"]
+    found, own = accuracy.fastest(runs, LOOSE), _fastest(here, [EXACT], LOOSE)
+    best = min((record for record in runs if record.good), key=lambda record: record.error or 0.0, default=None)
+    return [
+        name, "not reached" if found is None else f"step {found.setting:g} s, {milliseconds(found)}",
+        "-" if found is None or own is None else f"{found.time / own.time:.3g}",
+        "-" if best is None else f"{best.error:.1e} with steps of {best.setting:g} s in {milliseconds(best)}",
+    ]
+
+
+def _tolerance(records: Sequence[Record], names: list[str]) -> dict[str, Any]:
+    """The errors at one tolerance."""
+    chosen = [r for r in records if r.knob == TOLERANCE and abs(r.setting / SAME_TOLERANCE - 1.0) < 1e-6]
+    factors = [record.error / SAME_TOLERANCE for record in chosen if record.error is not None]
+    rows = []
+    for method, group in accuracy.by_method(chosen).items():
+        there = {record.scene: record for record in group}
+        rows.append([method, *(_error(there.get(name)) for name in names)])
+    return {"setting": SAME_TOLERANCE, "scenes": names, "rows": rows if factors else [],
+            "low": min(factors, default=0.0), "high": max(factors, default=0.0)}
+
+
+def _missed(records: Sequence[Record]) -> dict[str, Any]:
+    """Contacts missed, and runs that failed."""
+    wrong = [record for record in records if record.missed]
+    failed = [[r.scene, r.method, f"{r.knob} {r.setting:.0e}", r.status] for r in records if not r.good]
+    return {"wrong": len(wrong), "runs": len(records), "silent": sum(record.status == "done" for record in wrong),
+            "failed": failed}
+
+
+def _ahead(scenes: dict[str, list[Record]]) -> list[list[str]]:
+    """How far ahead of each kind of rival `exact` is."""
+    rows = []
+    for name, here in scenes.items():
+        own = _fastest(here, [EXACT], ERROR)
+        others = [_fastest(here, names, ERROR) for names in RIVALS.values()]
+        rows.append([name, *(f"{o.time / own.time:.3g} ({o.method})" if o and own else "not reached" for o in others)])
+    return rows
+
+
+def drift(drifts: Sequence[Drift]) -> dict[str, Any]:
+    """Energy drift in the elastic case."""
+    rows = [
+        [row.method, row.setting, f"{row.worst:.1e}" if row.t else "-", f"{row.seconds:.2g} s", row.status]
+        for row in sorted(drifts, key=lambda row: row.worst)
+    ]
+    return {"rows": rows, "seconds": max((row.t[-1] for row in drifts if row.t), default=0.0)}
+
+
+def prediction(predictions: Sequence[predictability.Prediction]) -> dict[str, Any]:
+    """How far ahead a scene can be predicted."""
+    rows = []
+    for row in predictions:
+        ends = [row.until(level) for level in predictability.LEVELS]
+        times = [f"> {row.t[-1]:g} s" if end is None else f"{end:.1f} s" for end in ends]
+        rows.append([row.scene, f"{row.growth:.0e}", *times])
+    levels = [f"below {level:.0e} until" for level in predictability.LEVELS]
+    return {"rows": rows, "levels": levels, "roundings": predictability.ROUNDINGS, "runs": predictability.RUNS}
+
+
+def topics(title: str, points: Sequence[Point], limits: Sequence[Limit]) -> dict[str, Any]:
+    """What accuracy costs over topics, and where the sampled loop loses stability."""
+    rows = []
+    for point in points:
+        walls = ["-" if w is None else f"{w:.3g}" for w in (point.one_process, point.four_processes, point.bare)]
+        rows.append([f"{point.period_ms:g} ms", f"{point.deviation:.1e} m", *walls])
+    finest = points[-4:]
+    order = np.polyfit(np.log([p.period_ms for p in finest]), np.log([p.deviation for p in finest]), 1)[0]
+    edges = []
+    for limit in limits:
+        growth = ", ".join(f"{g:.5f} at {1e3 * h:.2f} ms" for h, _, g in limit.checks)
+        edges.append([f"{limit.delay} periods", f"{1e3 * limit.period:.10g} ms", growth])
+    return {"scene": title, "rows": rows, "order": order, "limits": edges}
+
+
+def profiles(found: Sequence[Profile]) -> list[list[str]]:
+    """Where the time of `exact` goes."""
+    rows = []
+    for p in found:
+        shares = [p.call - p.outputs, p.outputs - p.end, p.expansions, p.end - p.expansions]
+        rows.append([p.scene, f"{p.accuracy:.0e}", f"{1e3 * p.call:.3g} ms", *(f"{s / p.call:.0%}" for s in shares),
+                     f"{p.contact_steps}, with one side of order {p.order}, {1e9 * p.expansion:.0f} ns each"])
+    return rows
+
+
+def last_state(timings: dict[str, list[Timing]]) -> dict[str, Any]:
+    """The last state alone, where a rival has less to do."""
+    rows, ratios = [], []
+    for name, row in timings.items():
+        times = {timing.record.method == EXACT: timing for timing in row}
+        own, other = times.get(True), times.get(False)
+        ratio = other.median / own.median if own is not None and other is not None else None
+        ratios += [] if ratio is None else [ratio]
+        cells = [f"{1e3 * t.median:.3g} ms, error {t.record.error:.0e}" if t else "not reached" for t in (own, other)]
+        rows.append([name, *cells, "-" if ratio is None else f"{ratio:.2f}"])
+    return {"rows": rows, "ahead": sum(ratio > 1.0 for ratio in ratios)}
+
+
+def _fastest(records: Sequence[Record], names: Sequence[str], error: float) -> Record | None:
+    return accuracy.fastest([record for record in records if record.method in names], error)
+
+
+def _cell(record: Record | None) -> str:
+    return "not reached" if record is None else f"{record.method} {milliseconds(record)}"
+
+
+def _error(record: Record | None) -> str:
+    if record is None or record.error is None:
+        return "-" if record is None else record.status
+    return f"{record.error:.0e}" + (f" ({record.missed} touches wrong)" if record.missed else "")

@@ -1,0 +1,99 @@
+"""Pages: a template has the words, a study gives the numbers, and a stamp says when, from which commit, and where."""
+
+from __future__ import annotations
+
+import subprocess
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import jinja2
+
+from grasp_ros.scene.files import writing
+from lab.studies.records import describe_machine
+
+HOME = Path(__file__).parents[2]
+TEMPLATES = Path(__file__).with_name("templates")
+PRODUCT = "grasp_ros", "config"  # what is measured
+
+
+def write(docs: Path, name: str, **numbers: object) -> Path:
+    """Write docs/NAME.md from its template with these numbers and a stamp; returns it.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written.
+    """
+    page = docs / f"{name}.md"
+    put(page, render(name, stamp=stamp(), **numbers))
+    return page
+
+
+def put(path: Path, text: str) -> None:
+    """Write a text into a file, and make the directory that it needs.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written.
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def render(name: str, **numbers: object) -> str:
+    """The text of a page; a number that its template names and that is missing is an error."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(TEMPLATES), undefined=jinja2.StrictUndefined, autoescape=False,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True,
+    )
+    environment.globals["table"] = table
+    environment.filters["f"] = format
+    return environment.get_template(f"{name}.md").render(numbers)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table."""
+    return "\n".join(f"| {' | '.join(row)} |" for row in (heads, ["---"] * len(heads), *rows))
+
+
+def claim(path: Path) -> None:
+    """Make sure, before the work, that a file can be written to where it is to go.
+
+    Raises
+    ------
+    Refused
+        If it cannot.
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        there = path.exists()
+        path.open("a", encoding="utf-8").close()
+        if not there:
+            path.unlink()
+
+
+def stamp() -> str:
+    """The sentence that every measured page carries: date, commit and machine."""
+    machine = {name: text for name, text in describe_machine().items() if text != "not installed"}
+    system, cpu = machine.pop("system"), machine.pop("cpu")
+    versions = ", ".join(f"{name} {version}" for name, version in machine.items())
+    return f"Measured on {time.strftime('%Y-%m-%d')} from commit {_commit()}: {system}, {cpu}, {versions}."
+
+
+def _commit() -> str:
+    """The commit of this checkout, and whether what is measured differs from it."""
+    commit = _git("rev-parse", "--short", "HEAD")
+    changed = commit and _git("status", "--porcelain", "--", *PRODUCT)
+    return f"{commit or 'unknown'}{' with changes' if changed else ''}"
+
+
+def _git(*words: str) -> str:
+    """What git answers; empty if there is no git, or no repository."""
+    try:
+        answer = subprocess.run(["git", "-C", HOME, *words], capture_output=True, text=True, check=False)
+    except FileNotFoundError:
+        return ""
+    return answer.stdout.strip() if answer.returncode == 0 else ""

@@ -1,0 +1,48 @@
+"""What every flight and every Taylor step of a run takes: an observer that reads the clock after each segment."""
+
+from __future__ import annotations
+
+import ctypes
+import time
+
+import numpy as np
+from numba import cfunc
+
+from grasp_ros.exact.driver.callback import integers_at
+from grasp_ros.exact.records import Integers, Tables
+from grasp_ros.observe.observer import SIGNATURE
+from grasp_ros.physics.model import Array
+from grasp_ros.scene.effects.base import NANOSECONDS
+
+COUNT, FIRST = 2, 3  # places, behind the seconds and nanoseconds of the clock; from the last on kind and time in turn
+MONOTONIC = time.CLOCK_MONOTONIC
+clock_gettime = ctypes.CDLL(None).clock_gettime
+clock_gettime.argtypes = ctypes.c_int, ctypes.c_size_t
+
+
+@cfunc(SIGNATURE)  # type: ignore[untyped-decorator]
+def read_clock(context: int, kind: int, t: float, s: float, degree: int) -> int:
+    """Note the kind of a segment, and when it was over."""
+    place = integers_at(context)
+    clock_gettime(MONOTONIC, context)
+    row = FIRST + 2 * place[COUNT]
+    place[row], place[row + 1] = kind, place[0] * NANOSECONDS + place[1]
+    place[COUNT] += 1
+    return 0
+
+
+class SegmentClock:
+    """Times the segments of one run; `most` is how many it has at most."""
+
+    def __init__(self, most: int) -> None:
+        self._places: Integers = np.zeros(FIRST + 2 * most, dtype=np.int64)
+
+    def attach(self, tables: Tables) -> Integers:
+        """What a run calls after each segment."""
+        return np.array([read_clock.address, self._places.ctypes.data])
+
+    @property
+    def segments(self) -> tuple[Integers, Array]:
+        """Kind, and length in s of wall time, of every segment but the first, whose begin is not known."""
+        noted = self._places[FIRST : FIRST + 2 * self._places[COUNT]].reshape(-1, 2)
+        return noted[1:, 0], np.diff(noted[:, 1]) / NANOSECONDS
