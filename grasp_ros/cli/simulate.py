@@ -50,6 +50,8 @@ def add_to(commands: Any) -> None:
                      help=f"budget of flights, Taylor steps and event evaluations (default {MAX_WORK})")
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
                      help="a callable of tick, time, x and v in place of the scene's feedback; see docs/api.md")
+    sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
+                     help="print derivatives by a number of the scene, section.key, through all impacts; repeatable")
     add_output(sub, "FILE.npz", "write states, events, V and counters")
     add_force(sub)
 
@@ -74,6 +76,8 @@ def _simulate(options: argparse.Namespace) -> int:
     setting, controllers = _setting(options), load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
+    if options.sensitivity and (controllers or options.method != EXACT):
+        raise Refused(f"--sensitivity: allowed: --method {EXACT}, without --controller")
     if options.output is not None:
         check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
@@ -89,6 +93,12 @@ def _simulate(options: argparse.Namespace) -> int:
     if options.output is not None:
         trajectory.save(options.output)
         print(f"written to {options.output}")
+    if options.sensitivity:
+        from grasp_ros.cli.sensitivity import describe_sensitivity
+        from grasp_ros.sensitivity.sensitivities import sensitivities
+
+        found = sensitivities(scene, options.sensitivity, sampled=sampled, accuracy=options.accuracy)
+        print(table(describe_sensitivity(found)))
     return 0 if trajectory.status is Status.DONE else 1
 
 
