@@ -44,6 +44,8 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
                      help="a callable of tick, time, x and v in place of the scene's feedback; see docs/api.md")
+    sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
+                     help="print derivatives by a number of the scene, section.key, through all impacts; repeatable")
     result = sub.add_argument_group("result")
     add_output(result, "FILE", "write states, forces, V and, as .npz, events and counters; .csv, or - for the standard"
                                " output, writes a table")
@@ -81,6 +83,8 @@ def _simulate(options: argparse.Namespace) -> int:
     setting, controllers = _setting(options), load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
+    if options.sensitivity and (controllers or options.method != EXACT):
+        raise Refused(f"--sensitivity: allowed: --method {EXACT}, without --controller")
     if options.output is not None:
         check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
@@ -92,7 +96,14 @@ def _simulate(options: argparse.Namespace) -> int:
             progress=None if METHODS[options.method].knob == STEP else told,
         )
     found = summary(trajectory)
-    show(options, table(describe_trajectory(trajectory, found)), found)
+    rows = describe_trajectory(trajectory, found)
+    if options.sensitivity:
+        from grasp_ros.cli.sensitivity import describe_sensitivity, last_rates
+        from grasp_ros.sensitivity.sensitivities import sensitivities
+
+        rates = sensitivities(scene, options.sensitivity, sampled=sampled, accuracy=options.accuracy)
+        rows, found = [*rows, *describe_sensitivity(rates)], {**found, "sensitivity": last_rates(rates)}
+    show(options, table(rows), found)
     if options.output is not None:
         _write(trajectory, options.output)
     return 0 if trajectory.status is Status.DONE else 1

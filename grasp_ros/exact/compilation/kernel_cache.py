@@ -11,7 +11,7 @@ from pathlib import Path
 COMPILING = "compiling the kernels; this happens once after an installation and takes up to a minute"
 
 PACKAGE = Path(__file__).parents[2]
-COMPILED_ROOMS = "physics", "exact", "observe", "methods"
+COMPILED_ROOMS = "physics", "exact", "observe", "methods", "sensitivity"
 
 
 @cache

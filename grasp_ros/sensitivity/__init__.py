@@ -1,0 +1,1 @@
+"""Derivatives of a motion through its impacts, and what they are for."""

@@ -1,0 +1,130 @@
+"""Directions: how a number of a scene changes what is simulated, to the last digits.
+
+Nearly every number enters the arrays of a system linearly, and angles enter by their sine: a central difference over
+any width is exact for the first, one over half a turn for the second.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.control import Column
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, OBJECT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.parameter import Parameter
+
+NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
+    "s": "it moves ticks, which are whole", "Hz": "its effect grows with the time; allowed: phase_rad",
+    "1": "it is a seed", "control periods": "it is whole",
+}
+STEPS = (Column.POSITION_STEP, Column.VELOCITY_STEP)
+
+
+class Directions(NamedTuple):
+    """How n numbers change a system; each array has the directions last. One number: the same without the last axis."""
+
+    bodies: Array  # (3, 4, n), with the continuous feedback where it is continuous
+    pairs: Array  # (2, 2, n)
+    state: Array  # (6, n)
+    coulomb: Array  # (n,)
+    laws: Array  # (2, k, n)
+    external: Array  # (ticks, 3, n); no tick if no direction changes a force
+
+
+def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
+    """How numbers of a scene change it.
+
+    Parameters
+    ----------
+    scene : Scene
+    keys : sequence of str
+        "section.key": initial values, and every number that enters smoothly.
+    sampled : bool
+        Whether commands are held; otherwise the feedback is a part of the bodies.
+
+    Raises
+    ------
+    Refused
+        If the scene does not name a number, or it does not enter smoothly, or a sensor measures in steps.
+    """
+    if not keys:
+        raise Refused(f"{scene.name}: sensitivity: no number; allowed: one at least, such as object.position_m")
+    for side, law in scene.system.laws.items():
+        if sampled and law.row[[*STEPS]].any():
+            raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
+                          " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
+    forced = any(key.partition(".")[0].endswith(("_pulse", "_sine", "_table")) for key in keys)
+    found = [_derivative(scene, key, sampled, forced) for key in keys]
+    return Directions(*(np.ascontiguousarray(np.stack(arrays, axis=-1)) for arrays in zip(*found, strict=True)))
+
+
+def check_key(scene: Scene, key: str) -> Parameter:
+    """The number behind a key.
+
+    Raises
+    ------
+    Refused
+        If the scene does not name it, or it does not enter smoothly.
+    """
+    section, _, name = key.partition(".")
+    if name not in scene.values.get(section, {}):
+        raise Refused(f"{scene.name}: {key}: not in this scene; allowed: what it names")
+    (parameter,) = (parameter for parameter in BY_SECTION[section].parameters if parameter.key == name)
+    if parameter.several:
+        raise Refused(f"{scene.name}: {key}: it is a list; allowed: single numbers")
+    if parameter.unit in NOT_SMOOTH or parameter.whole:
+        raise Refused(f"{scene.name}: {key} has no derivative: {NOT_SMOOTH.get(parameter.unit, 'it is whole')}")
+    return parameter
+
+
+def _derivative(scene: Scene, key: str, sampled: bool, forced: bool) -> Directions:
+    """Derivatives of all arrays of a system by one number."""
+    parameter, (section, _, name) = check_key(scene, key), key.partition(".")
+    value = scene.values[section][name]
+    width, divisor = (0.5 * math.pi, 2.0) if parameter.unit == "rad" else (0.5 * abs(value) or 1.0, 0.0)
+    above, below = value + width, value - width
+    high, low = (_numbers(_moved(scene, section, name, at), scene.ticks if forced else 0, sampled)
+                 for at in (above, below))
+    return Directions(*((b - a) / (divisor or above - below) for a, b in zip(low, high, strict=True)))
+
+
+def _moved(scene: Scene, section: str, name: str, value: float) -> System:
+    """The system with another number, which need not be in its range."""
+    numbers = {**scene.values[section], name: value}
+    return replace(scene, values={**scene.values, section: numbers}).system
+
+
+def _numbers(system: System, ticks: int, sampled: bool) -> Directions:
+    laws = np.zeros((2, len(Column)))
+    if sampled:
+        laws[:] = law_rows(system)
+        laws[:, Column.LIMIT] = np.minimum(laws[:, Column.LIMIT], 1e300)
+    external = system.external_over(np.arange(ticks)) if ticks else np.zeros((0, 3))
+    return Directions(system.bodies if sampled else system.closed_loop, system.pairs, system.state,
+                    np.array(system.coulomb), laws, external)
+
+
+def law_rows(system: System) -> Array:
+    """Laws of the sampled controllers, rows of `physics.control` by side; without one a row that answers 0."""
+    rows = np.zeros((2, len(Column)))
+    rows[:, Column.LIMIT] = np.inf
+    for side, law in system.laws.items():
+        rows[side] = law.row
+    return rows
+
+
+def closing(side: int, state: Array) -> tuple[Array, Array]:
+    """u in m and u' in m/s of a pair, (8), from states (m, 6), or their derivatives from those of states (m, 6, n)."""
+    arm, sign = COLUMN[side], 1.0 if side == LEFT else -1.0
+    front, back = state[:, arm : arm + 2], state[:, COLUMN[OBJECT] : COLUMN[OBJECT] + 2]
+    u, rate = np.moveaxis(sign * (front - back), 1, 0)
+    return u, rate

@@ -1,0 +1,183 @@
+"""Tangents of motions that obey linear equations: a body in free flight, and a grasp at rest.
+
+In flight x'' = a - K x - C x' with K = k / m, C = c / m, a = f / m. The flow of (x, v, 1) is the exponential of a
+matrix, and its derivatives by K and C are Frechet derivatives of that exponential: all of them come from scaling and
+squaring, so that no case of damping is special.
+
+Source: N. J. Higham, Functions of Matrices (SIAM 2008), sections 10.3 (scaling and squaring) and 10.6 (the derivative).
+"""
+
+from __future__ import annotations
+
+import math
+
+from grasp_ros.exact.compensated import velocity_lane
+from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.impact import elastic_force, elastic_slope
+from grasp_ros.exact.records import Array
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V
+from grasp_ros.sensitivity.tangents import STATES, Motion, Rates, put
+
+SERIES = 16  # terms of an exponential whose argument is below HALF
+HALF = 0.25
+SMALL = 1e-20  # terms of a flow behind which those of its derivatives are below rounding, too
+FLOW, BY_STIFFNESS, BY_DAMPING, NEXT, SPARE = range(5)  # matrices
+STEADY = 2  # column of what a constant acceleration of 1 m/s^2 does
+
+
+@kernel
+def halvings(rate: float, t: float) -> int:
+    """How often a time in s is halved until an exponential series of so few terms covers it."""
+    reach = rate * t / HALF
+    return max(math.ceil(math.log2(reach)), 0) if reach > 1.0 else 0
+
+
+@kernel
+def product_2x3(a: Array, b: Array, out: Array, steady: float) -> None:
+    """Add a b to out, for affine maps (2, 3) of the plane; `steady` is the last row's own entry of b."""
+    for i in range(2):
+        for j in range(3):
+            out[i, j] += a[i, 0] * b[0, j] + a[i, 1] * b[1, j]
+        out[i, STEADY] += steady * a[i, STEADY]
+
+
+@kernel
+def flow_of_body(stiffness: float, damping: float, t: float, m: Array) -> None:
+    """Write the flow of a body over t s and its derivatives by K and C to the matrices (5, 6, 6), (2, 3) of each."""
+    times = halvings(max(math.sqrt(stiffness), abs(damping)), t)
+    h = t / 2.0**times
+    m[:, :2, :3] = 0.0
+    m[FLOW, 0, 0] = m[FLOW, 1, 1] = m[NEXT, 0, 0] = m[NEXT, 1, 1] = 1.0
+    term, by_k, by_c = m[NEXT], m[SPARE], m[SPARE, 2:]  # (2, 3) each
+    by_c[:2, :3] = 0.0
+    for k in range(1, SERIES):
+        share = h / k
+        for j in range(3):
+            x, v, x_k, v_k, x_c, v_c = term[0, j], term[1, j], by_k[0, j], by_k[1, j], by_c[0, j], by_c[1, j]
+            steady = 1.0 if k == 1 and j == STEADY else 0.0
+            term[0, j], term[1, j] = share * v, share * (steady - stiffness * x - damping * v)
+            by_k[0, j], by_k[1, j] = share * v_k, share * (-x - stiffness * x_k - damping * v_k)
+            by_c[0, j], by_c[1, j] = share * v_c, share * (-v - stiffness * x_c - damping * v_c)
+            for i in range(2):
+                m[FLOW, i, j] += term[i, j]
+                m[BY_STIFFNESS, i, j] += by_k[i, j]
+                m[BY_DAMPING, i, j] += by_c[i, j]
+        if abs(term[0, 1]) <= SMALL * h and abs(term[1, 1]) <= SMALL and k > 4:
+            break
+    for _ in range(times):
+        for which in (BY_DAMPING, BY_STIFFNESS, FLOW):
+            m[NEXT, :2, :3] = 0.0
+            product_2x3(m[which], m[FLOW], m[NEXT], 1.0)
+            if which != FLOW:
+                product_2x3(m[FLOW], m[which], m[NEXT], 0.0)
+            put(m[which], m[NEXT, :2, :3])
+
+
+@kernel
+def fly_tangent(motion: Motion, rates: Rates, m: Array, body: Body, span: float) -> None:
+    """Write the tangents of a body after `span` s of flight to `at`."""
+    row, own, v = motion.bodies[body], rates.acting[body], velocity_lane(body)
+    mass, begin, end = row[Of.MASS], rates.x[v - 1 : v + 1], rates.at[v - 1 : v + 1]
+    stiffness, damping, steady = row[Of.STIFFNESS] / mass, row[Of.DAMPING] / mass, row[Of.FORCE] / mass
+    flow_of_body(stiffness, damping, span, m)
+    x_0, v_0 = motion.before[v - 1], motion.before[v]
+    for i in range(2):
+        by_k = m[BY_STIFFNESS, i, 0] * x_0 + m[BY_STIFFNESS, i, 1] * v_0 + m[BY_STIFFNESS, i, STEADY] * steady
+        by_c = m[BY_DAMPING, i, 0] * x_0 + m[BY_DAMPING, i, 1] * v_0 + m[BY_DAMPING, i, STEADY] * steady
+        for j in range(begin.shape[1]):
+            heavier = own[Of.MASS, j]
+            change = (by_k * (own[Of.STIFFNESS, j] - stiffness * heavier)
+                      + by_c * (own[Of.DAMPING, j] - damping * heavier)
+                      + m[FLOW, i, STEADY] * (own[Of.FORCE, j] - steady * heavier)) / mass
+            end[i, j] = m[FLOW, i, 0] * begin[0, j] + m[FLOW, i, 1] * begin[1, j] + change
+
+
+@kernel
+def couple(motion: Motion, side: Body, a: Array) -> float:
+    """Add the slope of the impact force of a pair in contact at rest to the matrix; returns a bound of its rates."""
+    u, hertzian, loss = motion.before[U.L + side], motion.pairs[side, Law.HERTZIAN], motion.pairs[side, Law.DISSIPATION]
+    slope, drag = elastic_slope(hertzian, max(u, 0.0)), loss * elastic_force(hertzian, max(u, 0.0))
+    arm, middle = velocity_lane(side), velocity_lane(OBJECT)
+    for body in (side, OBJECT):
+        own, inverse = velocity_lane(body), 1.0 / motion.bodies[body, Of.MASS]
+        other = arm + middle - own
+        a[own, own - 1] -= slope * inverse
+        a[own, own] -= drag * inverse
+        a[own, other - 1] += slope * inverse
+        a[own, other] += drag * inverse
+    lightest = 1.0 / min(motion.bodies[side, Of.MASS], motion.bodies[OBJECT, Of.MASS])
+    return max(math.sqrt(2.0 * slope * lightest), 2.0 * drag * lightest)
+
+
+@kernel
+def square(a: Array, b: Array, out: Array) -> None:
+    """Write the product of two matrices (6, 6) to a third one."""
+    for i in range(STATES):
+        for j in range(STATES):
+            total = 0.0
+            for k in range(STATES):
+                total += a[i, k] * b[k, j]
+            out[i, j] = total
+
+
+@kernel
+def rate_at_rest(motion: Motion, a: Array) -> float:
+    """Write the matrix of the tangents' equations at rest; returns a bound of its rates, 1/s."""
+    a[:] = 0.0
+    rate = 0.0
+    for body in (LEFT, OBJECT, RIGHT):
+        row, v = motion.bodies[body], velocity_lane(body)
+        a[v - 1, v] = 1.0
+        a[v, v - 1], a[v, v] = -row[Of.STIFFNESS] / row[Of.MASS], -row[Of.DAMPING] / row[Of.MASS]
+        rate = max(rate, math.sqrt(-a[v, v - 1]), abs(a[v, v]))
+    for side in (LEFT, RIGHT):
+        if motion.mode[side] == Pair.CONTACT:
+            rate += couple(motion, side, a)
+    return rate
+
+
+@kernel
+def drive_at_rest(motion: Motion, rates: Rates, body: Body, j: int) -> float:
+    """What accelerates the tangent of a body at rest by itself, m/s^2 by the unit of a direction."""
+    row, v = rates.acting[body], velocity_lane(body)
+    push = row[Of.FORCE, j] - row[Of.STIFFNESS, j] * motion.before[v - 1]
+    for side in (LEFT, RIGHT):
+        if motion.mode[side] == Pair.CONTACT and body in (side, OBJECT):
+            sign = (1.0 if side == LEFT else -1.0) * (1.0 if body == OBJECT else -1.0)
+            push += sign * elastic_force(rates.law[side, Law.HERTZIAN, j], max(motion.before[U.L + side], 0.0))
+    return push / motion.bodies[body, Of.MASS]
+
+
+@kernel
+def rest_tangent(motion: Motion, rates: Rates, m: Array, span: float) -> None:
+    """Write the tangents after `span` s at rest to `at`."""
+    a, flow, whole, term, spare = m[0], m[1], m[2], m[3], m[4]
+    times = halvings(rate_at_rest(motion, a), span)
+    h = span / 2.0**times
+    flow[:] = whole[:] = term[:] = 0.0  # exp(a t) and its integral
+    for i in range(STATES):
+        flow[i, i] = term[i, i] = 1.0
+        whole[i, i] = h
+    for k in range(1, SERIES):
+        square(a, term, spare)
+        for i in range(STATES):
+            for j in range(STATES):
+                term[i, j] = spare[i, j] * h / k
+                flow[i, j] += term[i, j]
+                whole[i, j] += term[i, j] * h / (k + 1)
+    for _ in range(times):
+        square(flow, whole, spare)
+        for i in range(STATES):
+            for j in range(STATES):
+                whole[i, j] += spare[i, j]
+        square(flow, flow, spare)
+        put(flow, spare)
+    for j in range(rates.x.shape[1]):
+        left, right = drive_at_rest(motion, rates, LEFT, j), drive_at_rest(motion, rates, RIGHT, j)
+        middle = drive_at_rest(motion, rates, OBJECT, j)
+        for i in range(STATES):
+            total = whole[i, V.L] * left + whole[i, V.O] * middle + whole[i, V.R] * right
+            for k in range(STATES):
+                total += flow[i, k] * rates.x[k, j]
+            rates.at[i, j] = total
+

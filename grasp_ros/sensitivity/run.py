@@ -1,0 +1,117 @@
+"""A run with its tangents: the observer that carries them along, with its memory."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from grasp_ros.exact.compilation.jit import compiled_address
+from grasp_ros.exact.integrator import Integrator
+from grasp_ros.exact.records import Integers, Tables
+from grasp_ros.physics.control import Column, normals_over
+from grasp_ros.physics.layout import LANES
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.sensitivity.directions import Directions, law_rows
+from grasp_ros.sensitivity.propagate import FINISH, UNSEEN, propagate
+from grasp_ros.sensitivity.series import padded
+from grasp_ros.sensitivity.tangents import MATRIX, NUMBERS, ROWS, STATES, TERMS, Count, Number, Place
+
+SIGNATURE = "int64(int64, int64, float64, float64, int64)"
+
+
+class Carrier:
+    """Carries the tangents of one run along; an observer of `exact`.
+
+    Parameters
+    ----------
+    integrator : Integrator
+    directions : Directions
+    grid : array (m,), s
+        Ascending output times.
+
+    Attributes
+    ----------
+    x : array (6, n)
+        Derivatives of the state now.
+    out : array (m, 6, n)
+        At the output times.
+    forces : array (m, 3, n + 1)
+        Derivatives of the constant forces that act on the bodies there, and behind them these forces, N.
+    """
+
+    def __init__(self, integrator: Integrator, directions: Directions, grid: Array) -> None:
+        n, plant, state = directions.state.shape[1], integrator.plant, integrator.records
+        self.x, self.out = np.array(directions.state, order="C"), np.zeros((len(grid), STATES, n))
+        self.forces = np.zeros((len(grid), 3, n + 1))
+        self.counts, self.numbers = np.zeros(len(Count), dtype=np.int64), np.zeros(NUMBERS)
+        self.counts[Count.DIRECTIONS], self.counts[Count.OUTPUTS] = n, len(grid)
+        self.counts[Count.TICK], self.counts[Count.SLIDE] = -1, UNSEEN
+        self.numbers[Number.CORNER] = math.inf
+        stride, wide = padded(STATES * n), padded(n)
+        self.counts[Count.STRIDE], self.counts[Count.WIDE] = stride, wide
+        self.before = state.y.copy()
+        self._arrays: dict[Place, Array | Integers] = {
+            Place.Y: state.y, Place.MODE: state.mode, Place.CLOCK: state.clock, Place.BODIES: plant.bodies,
+            Place.PAIRS: plant.pairs, Place.COUNTS: self.counts, Place.NUMBERS: self.numbers,
+            Place.BEFORE: self.before, Place.X: self.x, Place.AT: np.zeros((STATES, n)),
+            Place.GIVEN: directions.bodies, Place.ACTING: np.zeros((3, 4, n)), Place.FORCE: np.zeros((3, n)),
+            Place.LAW: directions.pairs, Place.COULOMB: directions.coulomb, Place.GRID: grid,
+            Place.OUT: self.out, Place.FORCES: self.forces,
+            Place.SERIES: np.zeros(stride * TERMS), Place.CLOSING: np.zeros(4 * wide * TERMS),
+            Place.TOTAL: np.zeros(stride + 2 * wide), Place.ROWS: np.zeros((ROWS, TERMS)),
+            Place.FACTORS: np.zeros((2, LANES * TERMS)), Place.PRODUCTS: np.zeros((3, LANES * TERMS)),
+            Place.MATRICES: np.zeros((5, MATRIX)),
+            Place.CONTROL: np.zeros((2, len(Column))), Place.CONTROL_RATES: np.zeros((2, len(Column), n)),
+            Place.NORMALS: np.zeros((1, 2, 2)), Place.WAITING: np.zeros((0, 2, n)),
+            Place.EXTERNAL: directions.external,
+        }
+        self.counts[Count.NORMALS], self.counts[Count.TICKS] = 1, len(directions.external)
+        self.context: NDArray[np.int64] = np.zeros(len(Place), dtype=np.int64)
+        self._place()
+
+    def _place(self) -> None:
+        for place, array in self._arrays.items():
+            self.context[place] = array.ctypes.data
+
+    def drive_by(self, scene: Scene, directions: Directions, sampled: bool) -> None:
+        """Let inputs change at ticks: commands that are held, and external forces."""
+        system, n = scene.system, self.x.shape[1]
+        self.counts[Count.DRIVEN], self.numbers[Number.PERIOD] = 1, scene.period_ns / NANOSECONDS
+        if sampled:
+            normals = np.zeros((scene.ticks + 1, 2, 2))
+            for side, law in system.laws.items():
+                if law.seed is not None:
+                    normals[:, side] = normals_over(law.seed, 0, scene.ticks + 1)
+            self.counts[Count.NORMALS], self.counts[Count.DELAY] = len(normals), system.delay
+            self._arrays |= {
+                Place.CONTROL: law_rows(system), Place.CONTROL_RATES: directions.laws, Place.NORMALS: normals,
+                Place.WAITING: np.zeros((system.delay, 2, n)),
+            }
+        self._place()
+
+    def attach(self, tables: Tables) -> Integers:
+        """What a run with this workspace calls after each segment."""
+        self.context[Place.C] = tables.c.ctypes.data
+        return np.array([address(), self.context.ctypes.data])
+
+    def finish(self, time: float) -> None:
+        """After a run, at its end in s."""
+        address()
+        propagate(self.context.ctypes.data, FINISH, float(time), 0.0, 0)
+
+    @property
+    def corner(self) -> float | None:
+        """First time in s at which one-sided derivatives differ; None: there is none."""
+        corner = float(self.numbers[Number.CORNER])
+        return corner if math.isfinite(corner) else None
+
+
+@cache
+def address() -> int:
+    """Address of the observer, which is compiled where it has not been."""
+    return compiled_address(propagate, SIGNATURE)

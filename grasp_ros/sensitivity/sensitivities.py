@@ -1,0 +1,158 @@
+"""Derivatives of a run: of its states, of V_c and of the times of its events, by numbers of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.physics.energy import energy
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import Law, Of
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.scene import Scene
+from grasp_ros.sensitivity.directions import Directions, closing, directions
+from grasp_ros.sensitivity.event_times import Moments, event_rates
+from grasp_ros.sensitivity.run import Carrier
+from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """A run with its derivatives by n numbers.
+
+    Attributes
+    ----------
+    scene : Scene
+    keys : tuple of str
+        The numbers, "section.key"; each derivative is by the unit of its key.
+    t : array (m,), s
+    state : array (m, 6), m and m/s
+        As `simulate` gives it; NaN for a body that is not there.
+    V_c : array (m,), J
+    event_table : array (e, 5)
+        As in a trajectory: time in s, body, kind, u in m and u' in m/s.
+    state_rates : array (m, 6, n)
+        Derivatives of the states at fixed times.
+    V_c_rates : array (m, n)
+    event_rates : array (e, n), s
+        Derivatives of the times of the events; infinite at a touch without speed, 0 where an input that changes makes
+        the event.
+    corner : float or None
+        Time in s from which on one-sided derivatives differ, because an object under dry friction turns where it could
+        as well stay; None: nowhere.
+    """
+
+    scene: Scene
+    keys: tuple[str, ...]
+    t: Array
+    state: Array
+    V_c: Array
+    event_table: Array
+    state_rates: Array
+    V_c_rates: Array
+    event_rates: Array
+    corner: float | None
+
+
+def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None, *, sampled: bool = False,
+                  accuracy: float = ACCURACY) -> Sensitivity:
+    """Simulate a scene with `exact`, and differentiate the motion through its impacts.
+
+    The motion is that of `simulate`, bit for bit; it runs twice, because the times of events are outputs of the second
+    run.
+
+    Parameters
+    ----------
+    scene : Scene
+    keys : sequence of str
+        "section.key": initial values, and any number of the scene that enters smoothly.
+    times : array (m,), s, optional
+        Ascending output times within the horizon. Default: its end.
+    sampled : bool
+        As in `simulate`.
+    accuracy : float
+        As in `simulate`.
+
+    Raises
+    ------
+    Refused
+        If a number has no derivative, a sensor measures in steps, or the run does not reach its end.
+    """
+    sampled = sampled or scene.sampled
+    changes = directions(scene, keys, sampled)
+    grid = np.array([scene.duration] if times is None else times, dtype=float)
+    if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration and (np.diff(grid) >= 0.0).all()):
+        raise Refused(f"times: allowed: ascending, within [0, {scene.duration!r}] s")
+    first = Integrator(scene.system, continuous=not sampled, accuracy=accuracy)
+    drive(scene, first, sampled, grid[:0])
+    events = first.event_table
+    both = np.concatenate([grid, events[:, 0]])
+    order = np.argsort(both, kind="stable")
+    second = Integrator(scene.system, continuous=not sampled, accuracy=accuracy)
+    carrier = carry(scene, second, changes, both[order], sampled)
+    states = drive(scene, second, sampled, both[order])
+    carrier.finish(scene.duration)
+    back = np.argsort(order, kind="stable")
+    at, late = back[: len(grid)], back[len(grid) :]
+    system, state, rates = scene.system, states[at], carrier.out[at]
+    level = energy(system, state).V_c
+    for body in system.absent:
+        state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
+    return Sensitivity(
+        scene, tuple(keys), grid, state, level, events, rates,
+        level_rates(system, directions(scene, keys, False), states[at], rates),
+        event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late])),
+        carrier.corner,
+    )
+
+
+def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array, sampled: bool) -> Carrier:
+    """Let a run carry its tangents along, for output times (m,) in s."""
+    carrier = Carrier(integrator, changes, grid)
+    if sampled or scene.system.external:
+        carrier.drive_by(scene, changes, sampled)
+    integrator.observer = carrier
+    return carrier
+
+
+def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
+    """Run a scene to its end, as `simulate` does; states (m, 6) at the output times.
+
+    Raises
+    ------
+    Refused
+        If the run does not get there.
+    """
+    if sampled:
+        states = SampledLoop(scene, grid, {}, None, {}).drive(integrator)
+    elif scene.system.external:
+        states = drive_external(scene, grid, integrator)
+    else:
+        states = integrator.advance(scene.duration, grid)
+    if integrator.status is not Status.DONE:
+        raise Refused(f"{scene.name}: no derivatives of a run that {integrator.stop}")
+    return states
+
+
+def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:
+    """Derivatives (m, n) of V_c at states (m, 6) with derivatives (m, 6, n); of bodies with the feedback in them."""
+    total: Array = np.zeros((len(state), rates.shape[2]))
+    for body in system.present:
+        place, own = COLUMN[body], changes.bodies[body]
+        x, v = state[:, place, None], state[:, place + 1, None]
+        mass, stiffness, _, force = system.closed_loop[body]
+        total += 2.0 * mass * v * rates[:, place + 1] + own[Of.MASS] * v * v
+        total += 2.0 * (stiffness * x - force) * rates[:, place] + own[Of.STIFFNESS] * x * x - 2.0 * own[Of.FORCE] * x
+        if stiffness > 0.0:
+            away = force / stiffness
+            total += 2.0 * away * own[Of.FORCE] - away * away * own[Of.STIFFNESS]
+    for side in system.contacts:
+        deeper, pressed = closing(side, rates)[0], np.maximum(closing(side, state)[0], 0.0)[:, None]
+        hertzian = system.pairs[side, Law.HERTZIAN]
+        total += 2.0 * hertzian * pressed**1.5 * deeper + 0.8 * pressed**2.5 * changes.pairs[side, Law.HERTZIAN]
+    return total

@@ -1,0 +1,216 @@
+"""Derivatives through impacts: against differences in 25 and more digits, exact relations, and the motion itself."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import gmpy2
+import numpy as np
+import pytest
+
+from grasp_ros import scene as scenes
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.scene import Scene, compose
+from grasp_ros.sensitivity.sensitivities import sensitivities
+from grasp_ros.sensitivity.spectrum import spectrum
+from grasp_ros.simulation import simulate
+from lab.reference import integrate_scene
+
+P = "left_contact.dissipation_s_per_m"
+STEP = 2.0**-44  # so small that the derivative does not change over it; sums of the scene stay exact
+DIGITS = 30
+
+# Scene, number, time in s, tolerance: the derivative there of x_l, v_l, x_o, v_o, x_r, v_r, by `difference`.
+FROM_REFERENCE: list[tuple[str, str, float, float, list[float]]] = [
+    ("case_01", P, 20.0, 1e-10, [1.9880362641581995, -9.177033352694915, 1.922265171331475, 4.1547139514509,
+                                 0.18462671862163085, 1.1414727344251359]),
+    ("case_09", P, 20.0, 2e-7, [-5862.296714300924, 114080.39094874446, -12194.934644430334, -4258.480461918836,
+                                29475.201373716973, 24320.854194861502]),
+    ("case_03", P, 20.0, 1e-9, [-1805.6847805734087, -7701.671919032983, 419.42676504673, -5935.053688257526,
+                                729.2826958784613, 28993.064570219154]),
+    ("v_jump_symmetric", P, 2.0, 1e-10, [0.0012987149231477504, -0.012716308340747917, -0.014297516229988039,
+                                          -0.04028464470670711, 0.0013009082026472882, -0.012576725193915709]),
+    ("friction", P, 40.0, 1e-10, [0.11958460925071542, -2.1526540094168045e-05, 0.12268154530779884, 0.0,
+                                  -6.149544201860378e-07, 1.3100233309641512e-06]),
+    ("delay", P, 3.0, 1e-10, [0.29372444457343894, 1.5229152788878912, 0.013253293487082419, -0.14281507949707958,
+                              -0.013411953347469457, 2.251685233715378]),
+]
+
+
+def short(name: str, seconds: float) -> Scene:
+    return scenes.load(name).changed({"time.duration_s": seconds})
+
+
+def difference(scene: Scene, key: str) -> tuple[np.ndarray, dict[tuple[int, int], list[float]]]:
+    """Derivatives of the last state (6,), and of the times of events by body and kind, in many digits."""
+    section, _, name = key.partition(".")
+    value = scene.values[section][name]
+    step = STEP * max(1.0, 2.0 ** round(np.log2(abs(value) or 1.0)))
+    low, high = value - step, value + step
+    runs = [integrate_scene(scene.changed({key: at}), [scene.duration], DIGITS) for at in (low, high)]
+    with gmpy2.context(precision=250):
+        width = gmpy2.mpq(Fraction(high) - Fraction(low))
+        state = np.array([float((b - a) / width) for a, b in zip(runs[0].state[-1], runs[1].state[-1], strict=True)])
+        times: dict[tuple[int, int], list[float]] = {}
+        for kind, place in ((Transition.TOUCH, 2), (Transition.RELEASE, 3)):
+            for side in (0, 1):
+                pairs = zip(runs[0][place][side], runs[1][place][side], strict=True)
+                times[side, int(kind)] = [float((b - a) / width) for a, b in pairs]
+    return state, times
+
+
+def differences(scene: Scene, key: str, width: float, **settings: Any) -> np.ndarray:
+    """Derivative of the last state by a central difference of runs in double precision, for what has no reference."""
+    section, _, name = key.partition(".")
+    value = scene.values[section][name]
+    low, high = (simulate(scene.changed({key: at}), grid=[scene.duration], **settings).state[-1]
+                 for at in (value - width, value + width))
+    return np.asarray((high - low) / (2.0 * width))
+
+
+@pytest.mark.parametrize(("name", "key", "seconds", "tolerance", "expected"), FROM_REFERENCE,
+                         ids=lambda value: value if isinstance(value, str) else "")
+def test_derivatives_are_those_of_the_reference(
+    name: str, key: str, seconds: float, tolerance: float, expected: list[float]
+) -> None:
+    found = sensitivities(short(name, seconds), [key]).state_rates[-1, :, 0]
+    assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", [
+    "left_arm.mass_kg", "left_arm.stiffness_N_per_m", "left_arm.damping_Ns_per_m", "object.mass_kg",
+    "left_contact.hertz_N_per_m1_5", "right_contact.dissipation_s_per_m", "right_feedback.position_gain_N_per_m",
+    "right_feedback.velocity_gain_Ns_per_m", "left_arm.position_m", "object.position_m", "object.velocity_m_per_s",
+])
+def test_every_kind_of_number_through_a_joint_touch(key: str) -> None:
+    scene = short("case_01", 1.2)
+    state, times = difference(scene, key)
+    found = sensitivities(scene, [key])
+    assert np.abs(found.state_rates[-1, :, 0] - state).max() <= 1e-11 * np.abs(state).max()
+    for (side, kind), expected in times.items():
+        chosen = (found.event_table[:, 1] == side) & (found.event_table[:, 2] == kind)
+        np.testing.assert_allclose(found.event_rates[chosen, 0], expected, rtol=1e-10, atol=1e-13)
+
+
+@pytest.mark.parametrize("z", [0.1, 0.3, 1.0, 10.0])
+def test_restitution_of_two_free_bodies(z: float) -> None:
+    """O2: ln(1 - w) + w = ln(1 + z) - z, with z = p v before and w = p v_o after the impact."""
+    speed = z / 0.3
+    scene = compose("impact", {
+        "time": {"duration_s": 2.0, "control_period_s": 0.001},
+        "left_arm": {"mass_kg": 1.0, "position_m": -0.1, "velocity_m_per_s": speed},
+        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
+        "left_contact": {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.3},
+    })
+    found = sensitivities(scene, ["left_arm.velocity_m_per_s", P])
+    w = 0.3 * (found.state[-1, 3] - found.state[-1, 1])
+    slope = z * (1.0 - w) / (w * (1.0 + z))  # dw/dz, of the line above
+    apart = found.state_rates[-1, 3] - found.state_rates[-1, 1]
+    np.testing.assert_allclose(apart, [slope, (slope * speed - w / 0.3) / 0.3], rtol=1e-11)
+
+
+@pytest.mark.parametrize(("name", "key", "width"), [
+    ("everything_smooth", "left_feedback.position_gain_N_per_m", 1e-4),
+    ("everything_smooth", "left_feedback.set_point_m", 1e-8),
+    ("everything_smooth", "right_sensor.velocity_noise_m_per_s", 1e-7),
+    ("everything_smooth", "tilt.angle_rad", 1e-7),
+    ("everything_smooth", "object_pulse.force_N", 1e-4),
+    ("saturation", "left_actuator.limit_N", 1e-6),
+    ("sine", "object_sine.amplitude_N", 1e-7),
+    ("friction_slide", "object_friction.coulomb_N", 1e-7),
+    ("preload", "left_feedback.set_point_m", 1e-8),
+    ("tilt_hold", "tilt.angle_rad", 1e-7),
+])
+def test_inputs_friction_and_rest(name: str, key: str, width: float) -> None:
+    if name == "everything_smooth":
+        changes = {f"{side}_sensor.{number}": 0.0 for side in ("left", "right")
+                   for number in ("position_step_m", "velocity_step_m_per_s")}
+        scene = without_steps(short("everything", 1.0), list(changes))
+    else:
+        scene = scenes.load(name)
+        scene = scene.changed({"time.duration_s": min(scene.duration, 4.0)})
+    expected = differences(scene, key, width)
+    found = sensitivities(scene, [key]).state_rates[-1, :, 0]
+    assert np.nanmax(np.abs(found - expected)) <= 3e-5 * np.nanmax(np.abs(expected))
+
+
+def without_steps(scene: Scene, keys: list[str]) -> Scene:
+    sections = {section: dict(numbers) for section, numbers in scene.values.items()}
+    for key in keys:
+        section, _, name = key.partition(".")
+        del sections[section][name]
+    return compose(scene.name, sections)
+
+
+@pytest.mark.parametrize("name", ["case_01", "delay", "sine", "friction"])
+def test_the_motion_is_that_of_a_plain_run(name: str) -> None:
+    scene = short(name, 2.0)
+    grid = np.linspace(0.0, 2.0, 37)
+    plain = simulate(scene, grid=grid)
+    found = sensitivities(scene, [P if name != "sine" else "object.mass_kg"], grid)
+    assert found.state.tobytes() == plain.state.tobytes()
+    assert found.event_table.tobytes() == plain.event_table.tobytes()
+
+
+def test_directions_do_not_touch_each_other() -> None:
+    scene = short("case_01", 3.0)
+    keys = ["left_arm.mass_kg", P, "object.position_m", "right_arm.stiffness_N_per_m", "object.mass_kg"]
+    several = sensitivities(scene, keys)
+    for place, key in enumerate(keys):
+        alone = sensitivities(scene, [key])
+        np.testing.assert_allclose(several.state_rates[..., place], alone.state_rates[..., 0], rtol=1e-13, atol=0.0)
+
+
+def test_rates_of_the_energy() -> None:
+    scene = short("preload", 0.8)
+    for key, width in (("left_arm.mass_kg", 1e-6), ("left_contact.hertz_N_per_m1_5", 1e-2),
+                       ("left_feedback.set_point_m", 1e-8)):
+        section, _, name = key.partition(".")
+        value = scene.values[section][name]
+        low, high = (simulate(scene.changed({key: at}), grid=[0.8]).energy.V_c[-1]
+                     for at in (value - width, value + width))
+        found = sensitivities(scene, [key])
+        np.testing.assert_allclose(found.V_c_rates[-1, 0], (high - low) / (2.0 * width), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize(("name", "key", "word"), [
+    ("case_01", "left_arm.colour", "not in this scene"), ("case_01", "time.duration_s", "no derivative"),
+    ("noise", P, "measured in steps"), ("sine", "object_sine.frequency_Hz", "phase_rad"),
+    ("table", "left_arm_table.force_N", "a list"), ("delay", "loop.delay_ticks", "whole"),
+])
+def test_what_has_no_derivative_is_refused(name: str, key: str, word: str) -> None:
+    with pytest.raises(Refused, match=word):
+        sensitivities(scenes.load(name), [key])
+
+
+def test_an_object_that_could_as_well_stay_is_flagged() -> None:
+    scene = compose("corner", {
+        "time": {"duration_s": 0.1, "control_period_s": 0.001},
+        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
+        "left_arm": {"mass_kg": 1.0, "position_m": -1.0, "velocity_m_per_s": 0.0},
+        "object_friction": {"coulomb_N": 0.2}, "tilt": {"angle_rad": 0.1, "gravity_m_per_s2": 9.81},
+    })
+    assert sensitivities(scene, ["object.velocity_m_per_s"]).corner == 0.0
+    assert sensitivities(scene, ["object_friction.coulomb_N"]).corner is None
+
+
+def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
+    arm = scenes.load("arm_alone")
+    left = arm.values["left_arm"]
+    decay = (left["damping_Ns_per_m"] + arm.values["left_feedback"]["velocity_gain_Ns_per_m"]) / (2.0 * left["mass_kg"])
+    bound = 2.0 / arm.duration  # what the first and the last direction may differ by
+    assert np.abs(spectrum(arm) + decay).max() <= bound
+    assert spectrum(arm).sum() == pytest.approx(-2.0 * decay, rel=1e-9)
+    elastic = spectrum(short("case_02", 10.0))
+    assert elastic.sum() == pytest.approx(0.0, abs=1e-9)
+    assert elastic[0] > 0.3
+
+
+def test_times_of_sides_in_a_mirror() -> None:
+    found = sensitivities(short("v_jump_symmetric", 1.0), ["left_contact.dissipation_s_per_m",
+                                                             "right_contact.dissipation_s_per_m"])
+    left = found.event_table[:, 1] == LEFT
+    np.testing.assert_allclose(found.event_rates[left][:, 0], found.event_rates[~left][:, 1], rtol=1e-9, atol=1e-12)
