@@ -11,7 +11,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 PAGES := accuracy maps fuzz hard paper faults effects certificate domain
 fuzz_options := --draws 5000 --jobs 2
 
-.PHONY: demo test quick lint install study laboratory benchmark mutants lowest clean
+.PHONY: demo test quick lint install docs study laboratory benchmark mutants lowest clean
 
 demo: install
 	$(BIN)/grasp run case_01
@@ -31,6 +31,10 @@ lint: install
 
 install: $(VENV)/ready
 	$(BIN)/pip install --quiet --no-deps --no-build-isolation --force-reinstall .
+
+# The documentation as a site, in `site`; any warning is an error.
+docs: install
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 # Every page that the laboratory writes, some hours on a quiet machine; one of them with, say, `make study-paper`.
 study: $(PAGES:%=study-%)

@@ -66,14 +66,14 @@ def add_settings(sub: argparse.ArgumentParser) -> None:
 
 
 def load_scene(reference: str, settings: Sequence[str] = ()) -> Scene:
-    """A scene that a command line names; what it can hardly mean goes to the standard error output."""
+    """A scene that a command line names; its warnings go to the standard error output."""
     scene = scenes.load(reference, settings)
     warn(scene)
     return scene
 
 
 def warn(scene: Scene) -> None:
-    """Print what a scene can hardly mean, a line each."""
+    """Print the warnings of a scene, a line each."""
     for warning in scene.warnings:
         note(f"grasp: warning: {scene.name}: {warning}")
 

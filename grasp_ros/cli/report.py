@@ -140,7 +140,7 @@ def _timing(recording: Recording) -> list[Row]:
 
 
 def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
-    """What to watch for, and what the scene can hardly mean."""
+    """What to watch for, and suspicious settings."""
     watch = [("watch for", scene.watch)] if scene.watch else []
     return [*rows, *watch, *(("warning", warning) for warning in scene.warnings)]
 

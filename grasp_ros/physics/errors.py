@@ -1,4 +1,4 @@
-"""What is refused. The command line and the nodes answer it in one line; all else that is raised is a fault of ours."""
+"""Input that is refused. Command line and nodes print it in one line; any other exception is a bug."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ class Scene(Frozen):
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What the scene can hardly mean, a sentence each: the key, its value, why it is odd, and what may be meant."""
+        """Valid but suspicious settings, a sentence each: the key, its value, why it is odd, and what may be meant."""
         return tuple(str(oddity) for effect in self.effects for oddity in effect.oddities(self.values, self.system))
 
     @property

@@ -24,8 +24,8 @@ _MERGE = "tag:yaml.org,2002:merge"  # of mappings, by a key <<: here a key like 
 class _Loader(yaml.SafeLoader):
     """SafeLoader with the numbers of YAML 1.2 and unique keys; without tags, anchors and directives.
 
-    They say nothing that a scene could need, and cost what a stranger wants: a list of lists of aliases is larger than
-    any memory.
+    They say nothing that a scene could need, and cost whatever their author wants: a list of lists of aliases is larger
+    than any memory.
     """
 
     def __init__(self, text: str) -> None:

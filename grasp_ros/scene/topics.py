@@ -19,33 +19,71 @@ class Topic(NamedTuple):
 
     name: str
     type: str
+    sender: str = ""
+    text: str = ""  # what its messages mean
     latched: bool = False  # transient local: who comes later gets what was sent before
     depth: int = DEPTH
 
 
 FORCE = "geometry_msgs/msg/WrenchStamped"
 NAMED_LIST = "sensor_msgs/msg/JointState"
-JOINT_STATES = Topic("joint_states", NAMED_LIST)
-LEFT_COMMAND = Topic("left/effort_command", FORCE)
-RIGHT_COMMAND = Topic("right/effort_command", FORCE)
-LEFT_CONTACT = Topic("contact/left", FORCE)
-RIGHT_CONTACT = Topic("contact/right", FORCE)
-LYAPUNOV = Topic("lyapunov", NAMED_LIST)
-SCENE = Topic("scene", "std_msgs/msg/String", latched=True, depth=1)
-RUN = Topic("run", "std_msgs/msg/String", latched=True, depth=1)
-TIMING = Topic("timing", NAMED_LIST)
-MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", depth=1)
-ROBOT_DESCRIPTION = Topic("robot_description", "std_msgs/msg/String", latched=True, depth=1)
-ALIVE = Topic("alive", "std_msgs/msg/String", depth=10)
-CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock")
-DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+TEXT = "std_msgs/msg/String"
+
+
+def _command(side: str) -> Topic:
+    return Topic(f"{side}/effort_command", FORCE, f"{side} controller",
+                 "force.x: force on the arm in N; the stamp is that of the state that it answers.")
+
+
+def _contact(side: str) -> Topic:
+    return Topic(f"contact/{side}", FORCE, "plant", "force.x: impact force at this stamp in N.")
+
+
+JOINT_STATES = Topic(
+    "joint_states", NAMED_LIST, "plant", "`left`, `object`, `right`, those in the scene: position in m, velocity in"
+    " m/s; effort: the input force applied until this stamp in N.")
+LEFT_COMMAND, RIGHT_COMMAND = _command("left"), _command("right")
+LEFT_CONTACT, RIGHT_CONTACT = _contact("left"), _contact("right")
+LYAPUNOV = Topic("lyapunov", NAMED_LIST, "monitor", "position: the values below, by name.")
+SCENE = Topic("scene", TEXT, "plant", "The whole scene as YAML.", latched=True, depth=1)
+RUN = Topic("run", TEXT, "plant", "How it runs, as YAML: lockstep or free-running, accuracy, timeouts.",
+            latched=True, depth=1)
+TIMING = Topic("timing", NAMED_LIST, "plant", "Free-running only: quality of the timing, once a second.")
+MARKERS = Topic("markers", "visualization_msgs/msg/MarkerArray", "monitor", "Bodies, springs and forces for RViz.",
+                depth=1)
+ROBOT_DESCRIPTION = Topic("robot_description", TEXT, "monitor", "URDF with a joint for each name of `joint_states`.",
+                          latched=True, depth=1)
+ALIVE = Topic("alive", TEXT, "all nodes", "Heartbeat of each process.", depth=10)
+CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", "plant", "Simulated time.")
+DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "all nodes",
+                    "State and counters of each node, once a second.")
 
 COMMANDS = {"left": LEFT_COMMAND, "right": RIGHT_COMMAND}
 CONTACTS = {"left": LEFT_CONTACT, "right": RIGHT_CONTACT}
-EXTERNAL_FORCES = {name: Topic(f"external_force/{name}", FORCE) for name in ("left_arm", "object", "right_arm")}
-CHANGES = {side: Topic(f"{side}/parameters", NAMED_LIST, latched=True, depth=1) for side in ("left", "right")}
+EXTERNAL_FORCES = {
+    name: Topic(f"external_force/{name}", FORCE, "plant", "force.x: external force from this stamp on in N.")
+    for name in ("left_arm", "object", "right_arm")
+}
+CHANGES = {
+    side: Topic(f"{side}/parameters", NAMED_LIST, f"{side} controller",
+                "Numbers of the feedback law; the stamp is that of the first state to which they apply.",
+                latched=True, depth=1)
+    for side in ("left", "right")
+}
 MOST_DIGITS = 10  # of a number of an announcement
-LYAPUNOV_NAMES = ["V", "V_c", "V_rate", "mode", "unexplained", "alarm", "V_plant", "work", "closed"]
+LYAPUNOV_VALUES = {
+    "V": "the paper's function (16), twice the energy, J; NaN unless `closed`",
+    "V_c": "V with the elastic term of a pair kept whenever u >= 0, J; NaN unless `closed`",
+    "V_rate": "(18), the rate of V_c under continuous feedback, W; NaN unless `closed`",
+    "mode": "contacts: 0 none, 1 left, 2 right, 3 both",
+    "unexplained": "residual of the energy balance over the last period, J: energy gained less work of the held forces;"
+                   " dissipation makes it negative",
+    "alarm": "1 if the residual is positive by more than rounding",
+    "V_plant": "twice the energy of the plant without feedback, J",
+    "work": "twice the work of the held forces over the last period, J",
+    "closed": "1 while every controller runs the law that it announced",
+}
+LYAPUNOV_NAMES = [*LYAPUNOV_VALUES]
 
 
 class Numbers:

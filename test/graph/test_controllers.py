@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -26,10 +25,11 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import SampledPlant, simulate
+from lab.site.examples import titled
 
 pytestmark = pytest.mark.slow  # real processes
 
-PAGE = Path(__file__).parents[2] / "docs" / "graph.md"
+PAGE = Path(__file__).parents[2] / "docs" / "tutorials" / "controller.md"
 OWN = """
 class Limited:
     def __init__(self):
@@ -40,16 +40,9 @@ class Limited:
 """
 
 
-def example() -> str:
-    """The controller that the page prints."""
-    text = PAGE.read_text(encoding="utf-8").split("## A controller of your own")[1]
-    [source] = re.findall(r"```python\n(.*?)```", text.split("\n## ")[0], re.S)[:1]
-    return source
-
-
 def test_a_controller_that_we_did_not_write_is_recorded_and_verified(launch: Any, tmp_path: Path) -> None:
     """The one that the page prints on the left, and on the right one with a frame_id that reads like a number."""
-    source = example()
+    source = titled(PAGE, "my_controller.py")
     assert len(source.splitlines()) == 15
     other = source.replace("left", "right").replace("my_controller", "another").replace(
         "    commands.publish", '    command.header.frame_id = "7" if i else "world"\n    commands.publish')

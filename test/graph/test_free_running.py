@@ -25,14 +25,15 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
+from lab.site.examples import titled
 
 pytestmark = pytest.mark.slow  # real processes
-PAGE = Path(__file__).parents[2] / "docs" / "graph.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "operate-the-graph.md"
 
 
 def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any, tmp_path: Path) -> None:
     """The one that the page prints, beside one of ours."""
-    [source] = re.findall(r"```python\n(.*?)```", PAGE.read_text().split("## With the wall clock")[1], re.S)[:1]
+    source = titled(PAGE, "own_rate.py")
     begin = time.monotonic()
     run = launch(
         sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=1.5", "-o", "run",

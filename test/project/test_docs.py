@@ -1,4 +1,7 @@
-"""The pages: every link leads somewhere, and every page can be reached from the README."""
+"""The pages as they lie in the repository: every link leads somewhere, and every file can be reached.
+
+What is made while the site is built, the reference and figures of examples, `test_pages.py` looks at.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,20 @@ from pathlib import Path
 
 import pytest
 
+from lab.site.examples import has_examples
+
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
-PAGES = [README, ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [README, ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))]
 
 
 def links(page: Path) -> list[tuple[Path, str]]:
     """Files of this repository that a page links to or shows, with the anchor or an empty text."""
-    text = re.sub(r"(?m)^    .*", "", page.read_text(encoding="utf-8"))  # a terminal may show brackets, too
+    text = re.sub(r"(?ms)^ {4}[^\n]*|^```.*?^```", "", page.read_text(encoding="utf-8"))  # code may have brackets, too
     targets = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'<img src="([^"]+)"', text)
-    found = [target.partition("#") for target in targets if "://" not in target]
+    found = [target.partition("#") for target in targets
+             if "://" not in target and not target.startswith(("../reference/", "reference/"))]
     return [((page.parent / path).resolve() if path else page, anchor) for path, _, anchor in found]
 
 
@@ -28,17 +35,20 @@ def anchors(page: Path) -> set[str]:
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_links_lead_somewhere(page: Path) -> None:
+    drawn = has_examples(page.read_text(encoding="utf-8"))  # figures of examples
     for path, anchor in links(page):
-        assert path.exists(), path
+        assert path.exists() or (drawn and path.suffix == ".png"), path
         assert not anchor or anchor in anchors(path), (path, anchor)
 
 
-def test_every_page_and_picture_can_be_reached_from_the_readme() -> None:
-    reached, waiting = set(), [README]
+def test_every_page_and_picture_can_be_reached() -> None:
+    """From the README or the navigation of the site."""
+    named = re.findall(r"[\w/-]+\.md", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    reached, waiting = set(), [README, *(path for name in named if (path := DOCS / name).exists())]
     while waiting:
         page = waiting.pop()
         reached.add(page)
         if page.suffix == ".md":
             waiting += [path for path, _ in links(page) if path not in reached and path.exists()]
-    lying = {path for path in (ROOT / "docs").rglob("*") if path.is_file()}
+    lying = {path for path in DOCS.rglob("*") if path.is_file()}
     assert lying <= reached

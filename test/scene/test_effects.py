@@ -1,4 +1,4 @@
-"""Effects: each with a scene, a text and refusals; the documentation lists and adds them."""
+"""Effects: each with a scene, a text and refusals; the documentation adds one."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from grasp_ros.scene import PAPER
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV
 from grasp_ros.simulation import simulate
+from lab.site.examples import titled
+from lab.site.reference import TWINS, scene_keys
 from lab.studies.effects import variants
 
 OTHERS = [name for name in scenes.names() if name not in CASES]
@@ -86,11 +88,11 @@ def test_only_the_paper_s_grasp_is_called_one() -> None:
     assert scenes.load("case_05").grasp.left.mass == 10.0
 
 
-DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "add-an-effect.md"
 
 
 def test_the_example_of_the_documentation_works(monkeypatch: pytest.MonkeyPatch) -> None:
-    source = DOCUMENT.read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+    source = titled(PAGE, "rail.py")
     namespace: dict[str, object] = {}
     exec(compile(source, "rail.py", "exec"), namespace)
     for effect in namespace["EFFECTS"]:
@@ -113,3 +115,10 @@ def test_every_effect_has_its_row_in_the_cost_table() -> None:
     assert found["all together"].system.delay == 2
     for scene in found.values():
         assert simulate(scene.changed({"time.duration_s": 0.1})).status is Status.DONE
+
+
+def test_the_reference_lists_every_effect_and_key() -> None:
+    page = scene_keys()
+    for effect in EFFECTS:
+        assert f"## {effect.section}\n" in page or effect.section.startswith(TWINS)
+        assert all(f"`{own.key}`" in page for own in effect.parameters)

@@ -34,7 +34,7 @@ class Problem(NamedTuple):
 
 
 class Oddity(NamedTuple):
-    """What can be simulated as it is written, but is hardly meant."""
+    """A setting that is valid but suspicious."""
 
     key: str
     value: object
@@ -82,7 +82,7 @@ class Effect:
     problems : callable
         Finds what is wrong beyond ranges.
     oddities : callable
-        Finds what a scene can hardly mean, in the sections and the system that they have built.
+        Finds suspicious settings, in the sections and the system that they have built.
     example : mapping of str to numbers
         Keys to add to a scene to see what it does; `python -m lab effects` does. Empty for what the paper's grasp has.
     """
