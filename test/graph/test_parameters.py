@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from grasp_ros.studies import recorder
 from processes import DEADLINE, START, wait_for
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
@@ -27,6 +26,7 @@ from grasp_ros.graph.parameters import FREE, NODES
 from grasp_ros.graph.verify import laws_of
 from grasp_ros.scene.topics import CHANGES
 from grasp_ros.simulation import simulate
+from lab.drills import recorder
 
 pytestmark = pytest.mark.slow  # real nodes
 GAIN = "left_feedback.position_gain_N_per_m"
