@@ -80,7 +80,8 @@ def attempt(contender: Contender, scene: Scene, setting: float, truth: Truth, ef
     first = time.perf_counter() - begin
     if len(answer.state) < len(truth.grid):
         return record(answer, answer.status, [], None)
-    return record(answer, answer.status, _repeat(solve, truth.grid, effort), distance(truth, answer.state))
+    error = max(distance(truth, answer.state), truth.uncertainty)  # nothing is known better than that
+    return record(answer, answer.status, _repeat(solve, truth.grid, effort), error)
 
 
 def _repeat(solve: Solve, grid: Array, effort: Effort) -> list[float]:

@@ -32,7 +32,7 @@ def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: s
     assert left["impulse"].sum() - right["impulse"].sum() == pytest.approx(change, abs=tight * left["impulse"].sum())
     lost = left["loss"].sum() + right["loss"].sum()
     if not run.sampled and "method" not in how:  # otherwise `losses` are no more exact than the output times
-        assert lost == pytest.approx(float(losses(run).impacts) / 2.0, rel=1e-10)
+        assert lost == pytest.approx(float(losses(run).impacts), rel=1e-10)
     assert left.dtype.names == tuple(UNITS)
 
 
