@@ -108,7 +108,9 @@ def test_they_cross_the_second_surface() -> None:
     assert [each.crosses for each in _motions()] == [False, True, True]
 
 
-@pytest.mark.parametrize(("numbers", "module", "name", "wrong"), BROKEN, ids=lambda value: str(value)[:40])
+@pytest.mark.parametrize(
+    ("numbers", "module", "name", "wrong"), BROKEN, ids=[f"{k}-{name}" for k, (_, _, name, _) in enumerate(BROKEN)]
+)
 def test_a_row_flips(
     numbers: set[str], module: Any, name: str, wrong: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
