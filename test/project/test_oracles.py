@@ -20,7 +20,7 @@ SECTIONS = {
 SEARCHED = [
     path
     for path in (
-        *(ROOT / "grasp_ros").rglob("*.py"), *(ROOT / "test").rglob("*.py"), *(ROOT / "docs").glob("*.md"),
+        *(ROOT / "grasp_ros").rglob("*.py"), *(ROOT / "test").rglob("*.py"), *(ROOT / "docs").rglob("*.md"),
         *ROOT.glob("*.md"),
     )
     if path != Path(__file__)
