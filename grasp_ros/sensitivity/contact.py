@@ -19,6 +19,8 @@ from grasp_ros.sensitivity.series import NOTHING, WIDTH, combine, evaluate, mult
 from grasp_ros.sensitivity.tangents import STATES, Motion, Rates, Row, Table
 
 MOST_HALVINGS = 200
+NEGLECTED = 64.0 * EPS
+FIRST = 6  # terms of a series, one of which is about its size
 
 
 @kernel
@@ -159,8 +161,40 @@ def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) 
 
 
 @kernel
+def exact_length(table: Table, n: int, s: float) -> float:
+    """The largest s 2^-k at which the last terms of all tangents are below NEGLECTED of their first ones.
+
+    The step of the run is as long as its own motion allows, which may have died down where its tangents have not.
+    """
+    for _ in range(MOST_HALVINGS):
+        fits, power = True, s ** (n - 1)
+        for column in range(table.stride):
+            last = power * (abs(table.series[table.stride * n + column]) * s
+                            + abs(table.series[table.stride * (n - 1) + column]))
+            if last > 0.0:
+                largest, scale = 0.0, 1.0
+                for k in range(FIRST):
+                    largest = max(largest, scale * abs(table.series[table.stride * k + column]))
+                    scale *= s
+                fits = fits and last <= NEGLECTED * largest
+        if fits:
+            break
+        s *= 0.5
+    return s
+
+
+@kernel
+def shift(c: Array, n: int, s: float) -> None:
+    """Expand the polynomials of all lanes about s, by Horner's scheme."""
+    for first in range(n):
+        for k in range(n - 1, first - 1, -1):
+            for lane in range(LANES):
+                c[LANES * k + lane] += s * c[LANES * (k + 1) + lane]
+
+
+@kernel
 def variable_at(c: Array, n: int, s: float, tau: float) -> float:
-    """The s at which a step has lasted for tau, which is within its length: by bisection and Newton's iteration."""
+    """The s at which the time of a step is tau, which is within its length: by bisection and Newton's iteration."""
     low, high, at = 0.0, s, 0.5 * s
     for _ in range(MOST_HALVINGS):
         time, pace = 0.0, 0.0

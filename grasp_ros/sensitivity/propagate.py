@@ -17,10 +17,18 @@ from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.records import Array
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, Slide, U, V, X
-from grasp_ros.sensitivity.contact import expand_tangents, step_tangents, touches, variable_at
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, Slide, U, V, X
+from grasp_ros.sensitivity.contact import (
+    exact_length,
+    expand_tangents,
+    shift,
+    step_tangents,
+    touches,
+    variable_at,
+)
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
+from grasp_ros.sensitivity.series import evaluate
 from grasp_ros.sensitivity.tangents import Count, Motion, Number, Outputs, Rates, Tangents, put, tangents_at
 
 FINISH = -1  # in place of a kind of segment
@@ -134,12 +142,18 @@ def arrive(t: Tangents, interval: float, time: float) -> None:
 
 @kernel
 def add_neglected(motion: Motion, moved: Array, side: Body, span: float) -> None:
-    """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not."""
+    """Add the slope of the force of a pair that begins or leaves: its impulse is below rounding, its slope is not.
+
+    It begins from u = 0, or leaves to it, by a power of the time.
+    """
     u, after, arm = motion.before[U.L + side], motion.y[U.L + side], velocity_lane(side)
-    turn = 0.125 * span * (approach(motion.before, side) - approach(motion.y, side))
-    middle = max(0.5 * (u + after) + turn, 0.0)
-    root = (math.sqrt(max(u, 0.0)) + 4.0 * math.sqrt(middle) + math.sqrt(max(after, 0.0))) / 6.0
-    impulse = span * elastic_slope(motion.pairs[side, Law.HERTZIAN], root * root)
+    deepest = max(u, after)
+    if deepest <= 0.0:
+        return
+    rate = approach(motion.y if after > u else motion.before, side)
+    root = math.sqrt(deepest) / (1.0 + 0.5 * abs(rate) * span / deepest)  # the mean of sqrt(u), for u = a t^n
+    factor = max(damping_factor(motion.pairs[side, Law.DISSIPATION], rate), 0.0)
+    impulse = span * factor * elastic_slope(motion.pairs[side, Law.HERTZIAN], root * root)
     arm_mass, mass = motion.bodies[side, Of.MASS], motion.bodies[OBJECT, Of.MASS]
     for j in range(moved.shape[1]):
         apart = moved[arm - 1, j] - moved[X.O, j]
@@ -148,27 +162,63 @@ def add_neglected(motion: Motion, moved: Array, side: Body, span: float) -> None
 
 
 @kernel
-def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n: int) -> None:
-    """Move the tangents over a segment, and write the outputs on the way."""
-    motion, rates, presses = t.motion, t.rates, kind != Kind.FLIGHT
-    act(motion.mode, rates, t.inputs)
-    if presses:
-        expand_tangents(motion, rates, t.table, n)
+def fly_free(t: Tangents, presses: bool, tau: float) -> None:
+    """Write the tangents of the bodies that touch nothing after tau s of a segment to `at`."""
+    for body in (LEFT, OBJECT, RIGHT):
+        if not (presses and touches(t.motion, body)):
+            fly_tangent(t.motion, t.rates, t.matrices, body, tau)
+
+
+@kernel
+def pass_flight(t: Tangents, begin: float, span: float) -> None:
+    """Move the tangents over a flight, and write the outputs on the way."""
     due = True
     while due:
         due = is_due(t.outputs, t.outputs.numbers[Number.TIME])
-        tau = since(t.outputs, begin, span) if due else span
-        for body in (LEFT, OBJECT, RIGHT):
-            if not (presses and touches(motion, body)):
-                fly_tangent(motion, rates, t.matrices, body, tau)
-        if presses:
-            step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, s, tau) if due else s)
+        fly_free(t, False, since(t.outputs, begin, span) if due else span)
         if due:
-            write_output(t.motion, t.outputs, rates)
-    put(rates.x, rates.at)
+            write_output(t.motion, t.outputs, t.rates)
+
+
+@kernel
+def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
+    """Move the tangents over a Taylor step, in parts where their series end later than those of the run."""
+    motion, rates, left = t.motion, t.rates, s
+    for place in range(LANES * (n + 1)):
+        motion.c[place] = t.source[place]
+    while True:
+        expand_tangents(motion, rates, t.table, n)
+        part = exact_length(t.table, n, left)
+        ends = part == left
+        reached = span if ends else evaluate(motion.c, LANES, 0, n, part)[0]
+        while is_due(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):
+            tau = since(t.outputs, begin, span)
+            fly_free(t, True, tau)
+            step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, tau))
+            write_output(motion, t.outputs, rates)
+        if ends:
+            fly_free(t, True, span)
+            step_tangents(motion, rates, t.table, n, part)
+            return
+        put(rates.at, rates.x)  # what flies stays at the begin
+        step_tangents(motion, rates, t.table, n, part)
+        put(rates.x, rates.at)
+        shift(motion.c, n, part)
+        left -= part
+
+
+@kernel
+def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n: int) -> None:
+    """Move the tangents over a segment."""
+    act(t.motion.mode, t.rates, t.inputs)
+    if kind == Kind.FLIGHT:
+        pass_flight(t, begin, span)
+    else:
+        pass_step(t, begin, span, s, n)
+    put(t.rates.x, t.rates.at)
     for side in (LEFT, RIGHT):
-        if motion.mode[side] == Pair.BEGINNING or motion.mode[side] == Pair.LEAVING:
-            add_neglected(motion, rates.x, side, span)
+        if t.motion.mode[side] == Pair.BEGINNING or t.motion.mode[side] == Pair.LEAVING:
+            add_neglected(t.motion, t.rates.x, side, span)
 
 
 @kernel

@@ -65,7 +65,7 @@ class Carrier:
             Place.SERIES: np.zeros(stride * TERMS), Place.CLOSING: np.zeros(4 * wide * TERMS),
             Place.TOTAL: np.zeros(stride + 2 * wide), Place.ROWS: np.zeros((ROWS, TERMS)),
             Place.FACTORS: np.zeros((2, LANES * TERMS)), Place.PRODUCTS: np.zeros((3, LANES * TERMS)),
-            Place.MATRICES: np.zeros((5, MATRIX)),
+            Place.MATRICES: np.zeros((5, MATRIX)), Place.OWN: np.zeros(LANES * TERMS),
             Place.CONTROL: np.zeros((2, len(Column))), Place.CONTROL_RATES: np.zeros((2, len(Column), n)),
             Place.NORMALS: np.zeros((1, 2, 2)), Place.WAITING: np.zeros((0, 2, n)),
             Place.EXTERNAL: directions.external,

@@ -101,6 +101,7 @@ class Place(IntEnum):
     FACTORS = 28
     PRODUCTS = 29
     FORCES = 30
+    OWN = 31  # where the Taylor table is copied to
 
 
 PLACES, COUNTS = len(Place), len(Count)
@@ -109,7 +110,7 @@ PLACES, COUNTS = len(Place), len(Count)
 class Motion(NamedTuple):
     """The segment that the run has just made."""
 
-    c: Array  # (LANES TERMS,) its Taylor table
+    c: Array  # (LANES TERMS,) a copy of its Taylor table
     y: Array  # (8,) state at its end
     mode: Integers  # (3,)
     clock: Array  # (3,)
@@ -172,6 +173,7 @@ class Tangents(NamedTuple):
     inputs: Inputs
     outputs: Outputs
     matrices: Array  # (5, 6, 6) scratch
+    source: Array  # (LANES TERMS,) the Taylor table of the run
 
 
 @allocating
@@ -181,7 +183,7 @@ def tangents_at(address: int) -> Tangents:
     counts = carray(integers_at(at[Place.COUNTS]), (COUNTS,))
     n, outputs = counts[Count.DIRECTIONS], counts[Count.OUTPUTS]
     motion = Motion(
-        carray(floats_at(at[Place.C]), (LANES * TERMS,)), carray(floats_at(at[Place.Y]), (8,)),
+        carray(floats_at(at[Place.OWN]), (LANES * TERMS,)), carray(floats_at(at[Place.Y]), (8,)),
         carray(integers_at(at[Place.MODE]), (3,)), carray(floats_at(at[Place.CLOCK]), (3,)),
         carray(floats_at(at[Place.BODIES]), (3, 4)), carray(floats_at(at[Place.PAIRS]), (2, 2)),
         carray(floats_at(at[Place.BEFORE]), (8,)))
@@ -206,7 +208,8 @@ def tangents_at(address: int) -> Tangents:
         counts, carray(floats_at(at[Place.NUMBERS]), (NUMBERS,)), carray(floats_at(at[Place.GRID]), (outputs,)),
         carray(floats_at(at[Place.OUT]), (outputs, STATES, n)),
         carray(floats_at(at[Place.FORCES]), (outputs, 3, n + 1)))
-    return Tangents(motion, rates, table, inputs, written, carray(floats_at(at[Place.MATRICES]), (5, STATES, STATES)))
+    return Tangents(motion, rates, table, inputs, written, carray(floats_at(at[Place.MATRICES]), (5, STATES, STATES)),
+                    carray(floats_at(at[Place.C]), (LANES * TERMS,)))
 
 
 @kernel

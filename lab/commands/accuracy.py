@@ -1,4 +1,4 @@
-"""The studies of error against time: `accuracy`, `advise`, `prediction` and `speed`."""
+"""The studies of error against time: `accuracy`, `advise`, `prediction`, `derivatives` and `speed`."""
 
 from __future__ import annotations
 
@@ -108,6 +108,27 @@ def _prediction(options: argparse.Namespace) -> int:
     print(predictability.report(predictions))
     figures.prediction(predictions, options.output / "prediction.png")
     print(f"written to {options.output}")
+    return 0
+
+
+def add_derivatives(commands: Any) -> Parser:
+    """`python -m lab derivatives`."""
+    text = "derivatives through impacts beside the reference: writes the table of docs/derivatives.md; resumes"
+    sub = add_command(commands, "derivatives", _derivatives, text)
+    sub.add_argument("--page", type=Path, default=Path("docs") / "derivatives.md", metavar="FILE.md",
+                     help="default: docs/derivatives.md")
+    add_study_directory(sub)
+    return sub
+
+
+def _derivatives(options: argparse.Namespace) -> int:
+    from lab.studies import derivatives
+
+    prepare()
+    rows = derivatives.run(options.output)
+    derivatives.write(options.page, rows)
+    print(derivatives.report(rows))
+    print(f"written to {options.page}")
     return 0
 
 

@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import Any
 
-import gmpy2
 import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.sensitivities import sensitivities
 from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import simulate
-from lab.reference import integrate_scene
+from lab.reference.derivative import difference
 
 P = "left_contact.dissipation_s_per_m"
-STEP = 2.0**-44  # so small that the derivative does not change over it; sums of the scene stay exact
-DIGITS = 30
 
-# Scene, number, time in s, tolerance: the derivative there of x_l, v_l, x_o, v_o, x_r, v_r, by `difference`.
+# Scene, number, time in s, tolerance, and the derivative there of x_l, v_l, x_o, v_o, x_r, v_r by lab.reference.
 FROM_REFERENCE: list[tuple[str, str, float, float, list[float]]] = [
     ("case_01", P, 20.0, 1e-10, [1.9880362641581995, -9.177033352694915, 1.922265171331475, 4.1547139514509,
                                  0.18462671862163085, 1.1414727344251359]),
@@ -41,24 +37,6 @@ FROM_REFERENCE: list[tuple[str, str, float, float, list[float]]] = [
 
 def short(name: str, seconds: float) -> Scene:
     return scenes.load(name).changed({"time.duration_s": seconds})
-
-
-def difference(scene: Scene, key: str) -> tuple[np.ndarray, dict[tuple[int, int], list[float]]]:
-    """Derivatives of the last state (6,), and of the times of events by body and kind, in many digits."""
-    section, _, name = key.partition(".")
-    value = scene.values[section][name]
-    step = STEP * max(1.0, 2.0 ** round(np.log2(abs(value) or 1.0)))
-    low, high = value - step, value + step
-    runs = [integrate_scene(scene.changed({key: at}), [scene.duration], DIGITS) for at in (low, high)]
-    with gmpy2.context(precision=250):
-        width = gmpy2.mpq(Fraction(high) - Fraction(low))
-        state = np.array([float((b - a) / width) for a, b in zip(runs[0].state[-1], runs[1].state[-1], strict=True)])
-        times: dict[tuple[int, int], list[float]] = {}
-        for kind, place in ((Transition.TOUCH, 2), (Transition.RELEASE, 3)):
-            for side in (0, 1):
-                pairs = zip(runs[0][place][side], runs[1][place][side], strict=True)
-                times[side, int(kind)] = [float((b - a) / width) for a, b in pairs]
-    return state, times
 
 
 def differences(scene: Scene, key: str, width: float, **settings: Any) -> np.ndarray:
@@ -87,12 +65,13 @@ def test_derivatives_are_those_of_the_reference(
 ])
 def test_every_kind_of_number_through_a_joint_touch(key: str) -> None:
     scene = short("case_01", 1.2)
-    state, times = difference(scene, key)
+    expected = difference(scene, key, [scene.duration])
     found = sensitivities(scene, [key])
-    assert np.abs(found.state_rates[-1, :, 0] - state).max() <= 1e-11 * np.abs(state).max()
-    for (side, kind), expected in times.items():
-        chosen = (found.event_table[:, 1] == side) & (found.event_table[:, 2] == kind)
-        np.testing.assert_allclose(found.event_rates[chosen, 0], expected, rtol=1e-10, atol=1e-13)
+    assert np.abs(found.state_rates[..., 0] - expected.state).max() <= 1e-10 * np.abs(expected.state).max()
+    for kind, times in ((Transition.TOUCH, expected.touches), (Transition.RELEASE, expected.releases)):
+        for side in (LEFT, RIGHT):
+            chosen = (found.event_table[:, 1] == side) & (found.event_table[:, 2] == kind)
+            np.testing.assert_allclose(found.event_rates[chosen, 0], times[side], rtol=1e-10, atol=1e-13)
 
 
 @pytest.mark.parametrize("z", [0.1, 0.3, 1.0, 10.0])
