@@ -30,6 +30,7 @@ lint: install
 	$(BIN)/mypy
 
 install: $(VENV)/ready
+	rm -rf build
 	$(BIN)/pip install --quiet --no-deps --no-build-isolation --force-reinstall .
 
 # The documentation as a site, in `site`; any warning is an error.
