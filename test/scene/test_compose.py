@@ -103,7 +103,7 @@ def test_nobody_makes_a_scene_around_the_checks() -> None:
         "scene/scene.py"
     ]
     assert [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.rglob("*.py")) if "replace" in called(path)] == [
-        "simulation/lyapunov.py"  # of a system
+        "sensitivity/directions.py", "simulation/lyapunov.py"  # of a system
     ]
 
 
@@ -158,7 +158,7 @@ def test_naming_a_section_takes_no_number_from_it(order: int) -> None:
         ("loop=5", "--set loop=5: not understood"),
         ("loop={1}", "--set loop={1}: not understood"),
         ("loop={delay_ticks: 2}", "not understood"),
-        ("title={}", "--set title={}: no such section; allowed: time, left_arm"),
+        ("title={}", "--set title={}: no such section; did you mean tilt or time?"),
         ("wind={}", "--set wind={}: no such section"),
         ("left_actuator={}", "left_actuator.limit_N: missing"),
         ("loop.delay_ticks={}", "loop.delay_ticks: {} is not allowed; allowed: a whole number"),
