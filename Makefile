@@ -54,7 +54,7 @@ benchmark: laboratory
 	    --benchmark-columns=min,median,rounds \
 	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))
 
-# Deletes or negates every branch of the automaton and of `rest` in turn; a test must fail for each.
+# Changes branches, comparisons, operations and numbers of the automaton in turn; a test should fail for each.
 mutants: install
 	$(BIN)/python test/exact/mutants.py
 

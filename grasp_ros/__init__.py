@@ -7,9 +7,9 @@
 What is listed in `__all__` is imported when it is first used, so that `import grasp_ros` costs nothing.
 
 Rooms, each importing only from those below it (pyproject.toml has the contract): `cli`; `graph` (nodes and bags),
-`maps` (many runs in files) and `accuracy` (what it costs); `simulation` (a run without ROS); `methods` (the other
-integrators) and `observe` (what is seen of a run); `exact` (the compiled integrator) and `scene` (what a file may say);
-`physics` (equations).
+`maps` (many runs in files), `accuracy` (what it costs) and `sensitivity` (derivatives); `simulation` (a run without
+ROS); `methods` (the other integrators) and `observe` (what is seen of a run); `exact` (the compiled integrator) and
+`scene` (what a file may say); `physics` (equations).
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ def with_packages(command: Command, options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if str(error.name).split(".")[0] not in PACKAGES:
             raise
-        raise Refused(f"this needs {error.name}; pip install -e '.[lab]'") from None
+        raise Refused(f"this needs {error.name}; run `make laboratory`") from None
 
 
 if __name__ == "__main__":

@@ -61,7 +61,7 @@ def add_settings(sub: argparse.ArgumentParser) -> None:
     """What replaces numbers of scenes."""
     sub.add_argument(
         "--set", dest="settings", action="append", default=[], metavar="section.key=value",
-        help="replace a number; section={} names a section without numbers",
+        help="replace a number; section={} adds a section that needs no numbers",
     )
 
 

@@ -139,7 +139,7 @@ def check(
             f" object and both contacts; allowed here: {_able('effects')}"
         )
     if method.package is not None and importlib.util.find_spec(method.package) is None:
-        raise Refused(f"{name}: needs {method.package}, which is not installed; pip install 'grasp_ros[study]'")
+        raise Refused(f"{name}: needs {method.package}, which is not installed; pip install '.[map]' in the checkout")
     return value
 
 

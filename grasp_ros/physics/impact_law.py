@@ -4,9 +4,10 @@
 
 u > 0 is penetration, u' > 0 approach, H in N/m^1.5, p in s/m. Each function works on floats and on NumPy arrays, and
 `exact.impact` compiles the same source for the kernels. `model.impact_force` puts the parts together for any u and u'.
-What follows from the exponent stands in four more places: powers of w in `exact.contact.series` and
-`exact.automaton.friction`, scales of an impact in `exact.contact.step_unit`, and times in `exact.automaton.begin`. The
-statements that prove the law are in `verification`.
+What else follows from the exponent: in `exact` powers of w in `contact.series` and `automaton.friction`, scales of an
+impact in `contact.step_unit`, times in `automaton.begin`; in `physics` the rules of `domain`, the bounds of `reach` and
+`lyapunov`; and powers of u in `simulation.contacts`, `sensitivity` and `methods`.
+docs/oracles.md has what proves the law.
 
 References
 ----------

@@ -204,7 +204,7 @@ def test_a_study_without_its_packages_names_the_one_that_is_missing() -> None:
                " sys.exit(main(['hard', '--alone']))")
     result = ran([sys.executable, "-c", program])
     assert result.returncode == 2
-    assert result.stderr == "grasp: this needs gmpy2; pip install -e '.[lab]'\n"
+    assert result.stderr == "grasp: this needs gmpy2; run `make laboratory`\n"
 
 
 def test_a_module_of_ours_that_is_missing_is_a_fault() -> None:

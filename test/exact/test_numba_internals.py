@@ -101,4 +101,6 @@ def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
     ],
 )
 def test_numba_has_what_is_used_of_its_inside(owner: Any, name: str) -> None:
-    assert hasattr(owner, name), f"numba {numba.__version__} has moved it; used by grasp_ros/exact/numba_internals.py"
+    assert hasattr(owner, name), (
+        f"numba {numba.__version__} has moved it; used by grasp_ros/exact/compilation/numba_internals.py"
+    )

@@ -90,6 +90,6 @@ def start() -> int:
         package = str(error.name).split(".")[0]
         if package == "grasp_ros":
             raise
-        print(f"{name}: the Python package {package} is missing; `pip install grasp_ros` brings it, and so does"
-              " rosdep from package.xml", file=sys.stderr)
+        print(f"{name}: the Python package {package} is missing; `pip install .` in the"
+              " checkout brings it", file=sys.stderr)
         return 1
