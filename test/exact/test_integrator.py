@@ -134,7 +134,7 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
     for name in ("exact", "rk4", "paper", "discrete_gradient"):
         simulate(scene, method=name, grid=np.zeros(1))
     known = compiled()
-    for one in (1, np.float32(1.0), True):
+    for one in (1, np.float32(1.0), np.int64(1)):
         integrator = Integrator(scene.system, continuous=True, accuracy=np.float32(1e-6), max_work=1e8, max_events=1e6)
         watch(integrator, Wanted.LOSSES, np.float32(0.5))
         integrator.advance(one, grid, start=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -57,8 +58,8 @@ def test_the_package_lists_what_its_nodes_import_and_how_to_cite_it() -> None:
     sources = "\n".join(path.read_text() for path in (ROOT / "grasp_ros" / "graph" / "nodes").glob("*.py"))
     imported = set(re.findall(r"^from (\w+_(?:msgs|srvs|interfaces))\.", sources, re.M)) | {"rclpy"}
     assert imported <= listed
-    [required] = re.findall(r"install_requires=\[(.*?)\]", (ROOT / "setup.py").read_text(), re.S)
-    names = {name for name in re.findall(r'"([\w-]+)(?:\[\w+\])?"', required) if not name.startswith("ros-")} - PYPI
+    required = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    names = {re.split(r"[^\w-]", need)[0] for need in required if not need.startswith("ros-")} - PYPI
     assert {f"python3-{ROSDEP.get(name, name)}" for name in names} <= listed
     version = (manifest.findtext("version"), manifest.findtext("license"))
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())

@@ -22,7 +22,7 @@ def test_names_are_unique_and_families_are_many() -> None:
     assert len(names) == len(set(names)) >= 60
     assert {family for family, _ in names} == {
         "impact", "chain", "creep", "touch", "graze", "clamp", "start", "extreme", "rest", "flight", "wait",
-        "horizon", "tail", "balance", "loop", "growth", "limit", "relation", "found",
+        "horizon", "tail", "balance", "loop", "growth", "limit", "relation",
     }
 
 

@@ -160,7 +160,7 @@ def test_the_exponent_of_an_arm_is_its_decay_and_that_of_collisions_positive() -
 def test_what_is_not_known_or_not_to_be_had_is_refused() -> None:
     scene = scenes.load("case_01")
     for outcomes, settings, words in (
-        (["settling"], {}, "outcome settling: not known; allowed: settling_time"), ([], {}, "outcomes: none"),
+        (["settling"], {}, "outcome settling: not known; did you mean settling_time"), ([], {}, "outcomes: none"),
         ([LYAPUNOV], {"sampled": True}, "allowed: continuous feedback"),
         (["touches"], {"settled": 1.5}, "settled: 1.5"), (["touches"], {"accuracy": 0.5}, "accuracy: 0.5"),
     ):

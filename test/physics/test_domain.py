@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -134,8 +135,9 @@ def test_a_shorter_run_is_inside_as_well() -> None:
 
 def test_what_is_no_number_is_outside() -> None:
     system = grasp().system
-    system.state[0] = math.nan
-    assert outside(system, 1.0) is not None
+    state = system.state.copy()
+    state[0] = math.nan
+    assert outside(replace(system, state=state), 1.0) is not None
 
 
 def rows(scene: Scene, seconds: float | None = None) -> Systems:

@@ -109,11 +109,11 @@ def test_a_scene_needs_a_body() -> None:
     [
         (text_with("mass_kg: 1.0", "mass: 1.0"), ["left_arm.mass", "1.0", "mass_kg"]),  # without its unit
         (text_with("mass_kg: 1.0", "mass_g: 1000.0"), ["left_arm.mass_g", "1000.0", "mass_kg"]),
-        (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  colour: 3"), ["left_arm.colour", "3", "allowed"]),
+        (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  colour: 3"), ["left_arm.colour", "3", "did you mean left_arm."]),
         (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  mass_kg: 2.0"), ["mass_kg", "twice"]),
         (text_with("object:", "left_arm:"), ["left_arm", "twice"]),
         (text_with("object:", "gravity: 9.81\nobject:"), ["gravity", "9.81", "allowed"]),
-        (text_with("mass_kg: 1.0", "1: 1.0"), ["left_arm.1", "allowed"]),
+        (text_with("mass_kg: 1.0", "1: 1.0"), ["left_arm.1", "unknown key with the value 1.0"]),
         (text_with("mass_kg: 1.0", "mass_kg: 1,0"), ["left_arm.mass_kg", "1,0"]),
         (text_with("mass_kg: 1.0", "mass_kg: 1_000"), ["left_arm.mass_kg"]),
         (text_with("mass_kg: 1.0", "mass_kg: 0x10"), ["left_arm.mass_kg"]),

@@ -154,7 +154,7 @@ def test_files_and_names(tmp_path: Path) -> None:
     assert bits(scene) == bits(load("case_04"))
     with pytest.raises(SceneError, match="no such file"):
         load(str(tmp_path / "none.yaml"))
-    with pytest.raises(SceneError, match="case_01"):
+    with pytest.raises(SceneError, match="did you mean case_09"):
         load("case_99")
     path.write_bytes(b"title: \xff\xfe\n")
     with pytest.raises(SceneError, match=r"mine\.yaml"):

@@ -21,7 +21,7 @@ def test_continuous_is_the_integrator() -> None:
     integrator = Integrator(scene.system, continuous=True)
     states = integrator.advance(5.0, np.linspace(0.0, 5.0, GRID_POINTS))
     assert np.array_equal(result.state, states)
-    assert result.events == integrator.events
+    assert [event._replace(state=()) for event in result.events] == integrator.events
     assert result.status is Status.DONE
     assert not result.sampled
     assert np.array_equal(result.state[0], scene.initial_state)
