@@ -88,7 +88,8 @@ def _end(run: Trajectory, product: Product) -> Check:
     error = float(run.status in (Status.STALLED, Status.ENERGY_RISES, Status.ENERGY_FALLS, Status.PENETRATES))
     if run.status is Status.STALLED:
         error = float(_smallest_at_stall(run, product) > DIED_OUT)
-    if run.status is Status.NOT_FINITE or (run.status is Status.OUTSIDE and not run.sampled):
+    driven = run.sampled or bool(run.scene.system.external)  # held commands and external forces do any work
+    if run.status is Status.NOT_FINITE or (run.status is Status.OUTSIDE and not driven):
         error = 1.0
     return Check(f"ends {run.status.name}", error, 0.0)
 
