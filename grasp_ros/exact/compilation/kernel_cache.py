@@ -35,13 +35,14 @@ def _base() -> Path:
 
 @cache
 def cache_directory() -> Path:
-    """A writable directory for the kernels."""
+    """A writable directory for the kernels of these sources in this place: numba has machine code by places."""
+    name = hashlib.sha256(f"{sources_digest()} {PACKAGE}".encode()).hexdigest()[:16]
     try:
-        (_base() / sources_digest()).mkdir(parents=True, exist_ok=True)
+        (_base() / name).mkdir(parents=True, exist_ok=True)
     except OSError:
         os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="grasp_ros")  # for those that this process starts, too
-        (_base() / sources_digest()).mkdir(parents=True)
-    return _base() / sources_digest()
+        (_base() / name).mkdir(parents=True)
+    return _base() / name
 
 
 def kernels_on_disk() -> bool:
