@@ -77,14 +77,6 @@ def run(docs: Path | None) -> None:
         pages.write(docs, PAGE, scene=scene, rows=rows)
 
 
-def registry_rows() -> list[list[str]]:
-    """What every effect does; those of the right side and of other bodies stand for their twins."""
-    return [
-        [f"`{effect.section}`", effect.text, effect.certificate] for effect in EFFECTS
-        if not effect.section.startswith(("right_", "object_pulse", "object_sine", "object_table"))
-    ]
-
-
 def variants(scene: Scene) -> dict[str, Scene]:
     """The scene alone, with each effect's example, with all of them, and scenes that name less, by name."""
     own = {key: dict(numbers) for key, numbers in scene.values.items()}

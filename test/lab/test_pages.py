@@ -84,11 +84,6 @@ def test_the_domain_is_that_of_the_code() -> None:
     assert page("domain") == pages.render("domain", **domain.numbers())
 
 
-def test_the_effects_are_those_of_the_code() -> None:
-    found = pages.table(["section", "what it simulates", "what it does to V_c"], effects.registry_rows())
-    assert found in page("effects"), found
-
-
 def test_the_work_of_each_effect_is_that_of_the_code() -> None:
     bare = scenes.load(effects.SCENE)
     rows = {row[0]: [row[2], row[4], row[6], row[7]] for row in cells("costs", "scene")}
