@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -50,11 +51,22 @@ def own_contenders(scene: Scene) -> tuple[list[Contender], dict[str, str]]:
             others[name] = str(refusal)
             continue
         ladder = tuple(setting for setting in method.ladder if setting <= scene.duration)
-        found.append(Contender(method.package or "grasp_ros", name, method.knob, ladder, partial(_simulated, name)))
+        found.append(Contender(method.package or "grasp_ros", name, method.knob, ladder, partial(simulated, name)))
     return found, others
 
 
-def _simulated(name: str, scene: Scene, setting: float) -> Solve:
+def simulated(name: str, scene: Scene, setting: float) -> Solve:
+    """A method of `grasp simulate` as a contender builds it.
+
+    Raises
+    ------
+    ImportError
+        If the package that it needs is not installed.
+    """
+    package = METHODS[name].package
+    if package is not None and importlib.util.find_spec(package) is None:
+        raise ImportError(package)
+
     def solve(grid: Array) -> Answer:
         run = simulate(scene, grid=grid, method=name, setting=setting)
         left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))

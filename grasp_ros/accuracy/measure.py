@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
+from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple
 
 from grasp_ros.accuracy.contender import DONE, Answer, Contender, Solve
@@ -50,45 +53,59 @@ class Record(NamedTuple):
         return sum(abs(found - there) for found, there in zip(self.found, self.there_are, strict=True))
 
     @property
+    def good(self) -> bool:
+        """Whether there is a result, with its time."""
+        return self.error is not None and self.seconds is not None and math.isfinite(self.error)
+
+    @property
     def sound(self) -> bool:
         """Whether it has a result that may be used: to the end, and with the right number of touches."""
-        return self.error is not None and self.seconds is not None and self.status == DONE and not self.missed
+        return self.good and self.status == DONE and not self.missed
 
     @property
     def time(self) -> float:
         """Fastest warm run in s; infinite without one."""
-        return float("inf") if self.least is None else self.least
+        return math.inf if self.least is None else self.least
 
 
 def attempt(contender: Contender, scene: Scene, setting: float, truth: Truth, effort: Effort) -> Record:
     """Build a solver, run it, repeat it."""
+    noted = partial(record_of, contender, scene, setting, truth)
     begin = time.perf_counter()
-
-    def record(answer: Answer | None, status: str, times: list[float], error: float | None) -> Record:
-        return Record(
-            scene.name, contender.family, contender.name, contender.knob, setting, error,
-            statistics.median(times) if times else None, min(times, default=None), len(times), first,
-            answer and answer.steps, answer and answer.right_hand_sides, answer and answer.touches, truth.touches,
-            status)
-
     try:
         solve = contender.build(scene, setting)
         answer = solve(truth.grid)
     except ImportError:
-        first = time.perf_counter() - begin
-        return record(None, NOT_INSTALLED, [], None)
+        return noted(NOT_INSTALLED, [time.perf_counter() - begin])
     first = time.perf_counter() - begin
     if len(answer.state) < len(truth.grid):
-        return record(answer, answer.status, [], None)
+        return noted(answer.status, [first], answer)
     error = max(distance(truth, answer.state), truth.uncertainty)  # nothing is known better than that
-    return record(answer, answer.status, _repeat(solve, truth.grid, effort), error)
+    return noted(answer.status, [first, *repeat(solve, truth.grid, effort.budget, effort.most)], answer, error)
 
 
-def _repeat(solve: Solve, grid: Array, effort: Effort) -> list[float]:
-    """Seconds of warm runs, within the budget."""
+def record_of(
+    contender: Contender, scene: Scene, setting: float, truth: Truth, status: str, times: Sequence[float],
+    answer: Answer | None = None, error: float | None = None,
+) -> Record:
+    """What was measured of a solver at a setting; `times` of its first run and of its warm ones, in s."""
+    first, *warm = times
+    return Record(
+        scene.name, contender.family, contender.name, contender.knob, setting, error,
+        statistics.median(warm) if warm else None, min(warm, default=None), len(warm), first,
+        answer and answer.steps, answer and answer.right_hand_sides, answer and answer.touches, truth.touches, status)
+
+
+def repeat(solve: Solve, grid: Array, budget: float, most: int) -> list[float]:
+    """Seconds of warm runs: at least one, then as long as there is budget in s, and no more than that many."""
     times: list[float] = []
-    while not times or (sum(times) < effort.budget and len(times) < effort.most):
-        begin = time.perf_counter()
-        solve(grid)
-        times.append(time.perf_counter() - begin)
+    while not times or (sum(times) < budget and len(times) < most):
+        times.append(seconds(solve, grid))
     return times
+
+
+def seconds(solve: Solve, grid: Array) -> float:
+    """One run."""
+    begin = time.perf_counter()
+    solve(grid)
+    return time.perf_counter() - begin

@@ -31,7 +31,7 @@ class Truth(NamedTuple):
     grid: Array  # (n,), s
     state: Array  # (n, 6), m and m/s
     touches: tuple[int, int]
-    uncertainty: float  # of the states, m and m/s
+    uncertainty: float = 0.0  # of the states, m and m/s
 
 
 def finest(scene: Scene) -> Truth:
@@ -62,4 +62,5 @@ def _beside(scene: Scene, section: str) -> Scene:
 
 def distance(truth: Truth | Trajectory, state: Array) -> float:
     """Largest difference of states (n, 6) to the last n of a motion that is known, m and m/s; without absent bodies."""
-    return float(np.nanmax(np.abs(state - truth.state[-len(state) :]), initial=0.0))
+    known = truth.state[-len(state) :]
+    return float(np.abs(state - known)[~np.isnan(known)].max(initial=0.0))

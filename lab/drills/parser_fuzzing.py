@@ -19,6 +19,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.graph import bag
 from grasp_ros.graph.recover import recover
 from grasp_ros.graph.storage import unpack
@@ -26,7 +27,7 @@ from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import mutations, recorder
 from lab.reference.deadline import Deadline, deadline
-from lab.studies.records import Journal, Record, digest
+from lab.studies.records import Journal, digest
 
 SECONDS = 10.0  # no door takes longer
 MEMORY = 4 * 2**30  # bytes that a door may ask for beyond what is there

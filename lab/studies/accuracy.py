@@ -14,13 +14,15 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
+from grasp_ros.accuracy.compare import by_method
+from grasp_ros.accuracy.contender import Contender
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods import registry
 from grasp_ros.scene import Scene
 from lab.studies import measure
 from lab.studies.contenders import OURS, all_contenders
 from lab.studies.measure import Effort
-from lab.studies.peers import Contender
-from lab.studies.records import Journal, Record, describe_machine, metric, origin, scene_key, write_csv
+from lab.studies.records import Journal, describe_machine, metric, origin, scene_key, write_csv
 
 STANDARD = ("case_01", "case_02", "case_03", "case_04")
 STIFF = ("case_01", 1e8)  # ten thousand times the paper's Hertz coefficient
@@ -97,14 +99,6 @@ def frontier(records: Iterable[Record]) -> list[Record]:
         if not best or (record.error or 0.0) < (best[-1].error or 0.0):
             best.append(record)
     return best
-
-
-def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
-    """Records of each method, in the order of their settings."""
-    groups: dict[str, list[Record]] = {}
-    for record in records:
-        groups.setdefault(record.method, []).append(record)
-    return groups
 
 
 def summary(records: Sequence[Record]) -> list[str]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
+from grasp_ros.accuracy.measure import Record, seconds
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
@@ -27,7 +28,7 @@ from lab.studies import (
     stability,
 )
 from lab.studies.contenders import all_contenders, own_contenders
-from lab.studies.records import Journal, Record, write_csv
+from lab.studies.records import Journal, write_csv
 
 LOOP_SCENE = "case_01"
 QUICK_S = 5.0
@@ -108,7 +109,7 @@ def _output(subjects: Sequence[Scene]) -> list[list[str]]:
     for scene in subjects:
         solve = exact.build(scene, METHODS[EXACT].default)
         grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
-        pairs = [(measure.seconds(solve, grid), measure.seconds(solve, grid[-1:])) for _ in range(OUTPUT_RUNS)]
+        pairs = [(seconds(solve, grid), seconds(solve, grid[-1:])) for _ in range(OUTPUT_RUNS)]
         both, last = map(statistics.median, zip(*pairs, strict=True))
         rows.append([scene.name, f"{1e3 * both:.3g} ms", f"{1e3 * last:.3g} ms", f"{both / last:.2f}"])
     return rows

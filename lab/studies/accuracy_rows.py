@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.accuracy.compare import by_method
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.contract import TOLERANCE
 from grasp_ros.methods.registry import EXACT, METHODS
 from lab.studies import accuracy, predictability
 from lab.studies.drift import Drift
 from lab.studies.loop import Point
 from lab.studies.profile import Profile
-from lab.studies.records import Record, by_scene, milliseconds
+from lab.studies.records import by_scene, milliseconds
 from lab.studies.speed import Timing
 from lab.studies.stability import Limit
 
@@ -73,7 +75,7 @@ def _tolerance(records: Sequence[Record], names: list[str]) -> dict[str, Any]:
     chosen = [r for r in records if r.knob == TOLERANCE and abs(r.setting / SAME_TOLERANCE - 1.0) < 1e-6]
     factors = [record.error / SAME_TOLERANCE for record in chosen if record.error is not None]
     rows = []
-    for method, group in accuracy.by_method(chosen).items():
+    for method, group in by_method(chosen).items():
         there = {record.scene: record for record in group}
         rows.append([method, *(_error(there.get(name)) for name in names)])
     return {"setting": SAME_TOLERANCE, "scenes": names, "rows": rows if factors else [],

@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
+from grasp_ros.accuracy.compare import by_method
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from lab.studies import accuracy
 from lab.studies.contenders import own_contenders
 from lab.studies.measure import FULL, QUICK
-from lab.studies.records import Record
 
 HASTE = FULL._replace(patience=0.3)  # an adviser is asked for a minute
 OTHERS = 3
@@ -55,7 +56,7 @@ def advise(records: list[Record], error: float | None = None, budget: float | No
         return cost(record)[1]
 
     fits = sorted((record for record in sound if limited(record) <= wish), key=cost)
-    best = {name: group[0] for name, group in accuracy.by_method(fits).items()}
+    best = {name: group[0] for name, group in by_method(fits).items()}
     ranked = list(best.values())
     return Advice(ranked[0] if ranked else None, ranked[1 : 1 + OTHERS], min(sound, key=limited))
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 import warnings
 from functools import partial
 
 import numpy as np
 
-from grasp_ros import simulation
-from grasp_ros.exact.integrator import Status
+from grasp_ros.accuracy.contender import DONE, Answer, Contender, Solve, simulated
 from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.library import slopes
 from grasp_ros.methods.registry import METHODS
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.studies import peer_heyoka, peer_sundials
-from lab.studies.peers import Answer, Contender, Solve
 
 OURS = "grasp_ros"
 MAX_STEPS = 10_000_000
@@ -27,7 +23,7 @@ def own_contenders() -> list[Contender]:
     """The methods of `grasp simulate`."""
     return [
         Contender(OURS if method.package is None else method.package, name, method.knob, method.ladder,
-                  partial(_simulated, name))
+                  partial(simulated, name))
         for name, method in METHODS.items()
     ]
 
@@ -36,24 +32,6 @@ def all_contenders() -> list[Contender]:
     """The methods of `grasp simulate` and the outside peers."""
     odeint = Contender("scipy", "odeint", "tolerance", METHODS["lsoda"].ladder, _odeint)
     return [*own_contenders(), odeint, *peer_sundials.contenders(), *peer_heyoka.contenders()]
-
-
-def _simulated(name: str, scene: Scene, setting: float) -> Solve:
-    package = METHODS[name].package
-    if package is not None and importlib.util.find_spec(package) is None:
-        raise ImportError(package)
-    finds = METHODS[name].events
-
-    def solve(grid: Array) -> Answer:
-        motion = simulation.simulate(scene, grid=grid, method=name, setting=setting)
-        left, right = (len(motion.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
-        touches = (left, right) if finds else None
-        status = "done" if motion.status is Status.DONE else motion.status.value
-        counts = motion.counters
-        steps = sum(counts.get(counter, 0) for counter in ("steps", "flights", "contact steps"))
-        return Answer(motion.state, touches, status, steps, counts.get("right hand sides"))
-
-    return solve
 
 
 def _odeint(scene: Scene, tolerance: float) -> Solve:
@@ -70,7 +48,7 @@ def _odeint(scene: Scene, tolerance: float) -> Solve:
                 slopes, scene.initial_state, times, args, rtol=tolerance, atol=tolerance, tfirst=True,
                 mxstep=MAX_STEPS, full_output=True,
             )
-        status = "done" if report["message"] == "Integration successful." else report["message"]
+        status = DONE if report["message"] == "Integration successful." else report["message"]
         return Answer(states[-len(grid) :], None, status, int(report["nst"][-1]), int(report["nfe"][-1]))
 
     return solve

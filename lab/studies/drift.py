@@ -11,11 +11,11 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
+from grasp_ros.accuracy.contender import Contender
 from grasp_ros.physics.energy import energy
 from grasp_ros.scene import Scene
 from lab.reference.deadline import Deadline, deadline
 from lab.studies.contenders import all_contenders
-from lab.studies.peers import Contender
 from lab.studies.records import Journal, origin, scene_key
 
 SECONDS = 2000.0

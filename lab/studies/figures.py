@@ -11,14 +11,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from grasp_ros.accuracy.compare import by_method
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.contract import STEP
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import save
-from lab.studies.accuracy import by_method, frontier
+from lab.studies.accuracy import frontier
 from lab.studies.drift import Drift
 from lab.studies.loop import Point
 from lab.studies.predictability import LEVELS, Prediction
-from lab.studies.records import Record
 
 COLORS = {  # by the beginning of a method's name; distinguishable for colour-blind readers
     "exact": "#000000", "paper": "#d55e00", "rk45": "#56b4e9", "rk4": "#e69f00", "discrete": "#8c6d1f",

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-import statistics
 import time
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from grasp_ros import simulation
+from grasp_ros.accuracy.contender import Contender, Solve
+from grasp_ros.accuracy.measure import NOT_INSTALLED, Record, record_of, repeat
+from grasp_ros.accuracy.truth import Truth, distance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
@@ -17,20 +20,10 @@ from grasp_ros.scene.files import decoding, replacing
 from grasp_ros.scene.npz import Field, read_npz, signed
 from lab import reference
 from lab.reference.deadline import Deadline, deadline
-from lab.studies.peers import Answer, Contender, Solve
-from lab.studies.records import Journal, Record, scene_key
+from lab.studies.records import Journal, scene_key
 
 DIGITS = 25
-
-
-class Truth(NamedTuple):
-    """The solution in high precision."""
-
-    grid: Array  # (n,), s
-    state: Array  # (n, 6), m and m/s
-    touches: tuple[int, int]
-
-
+LATE = "stopped: longer"
 TRUTH = {"grid": Field("<f8", ("n",)), "state": Field("<f8", ("n", 6)), "touches": Field("<i8", (2,))}
 
 
@@ -80,7 +73,7 @@ def truth(scene: Scene, journal: Journal) -> Truth:
     exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid.tolist(), digits=DIGITS)
     result = Truth(grid, exact.as_array(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
     with replacing(path) as file:
-        np.savez_compressed(file, **signed(result._asdict()))
+        np.savez_compressed(file, **signed({key: getattr(result, key) for key in TRUTH}))
     return result
 
 
@@ -95,47 +88,24 @@ def attempt(
         The last output times of the target. Default: all of them.
     """
     grid = target.grid if grid is None else grid
+    noted = partial(record_of, contender, scene, setting, target)
     begin = time.perf_counter()
-
-    def record(answer: Answer | None, status: str, times: list[float], error: float | None) -> Record:
-        return Record(
-            scene.name, contender.family, contender.name, contender.knob, setting, error,
-            statistics.median(times) if times else None, min(times, default=None), len(times), first,
-            answer and answer.steps, answer and answer.right_hand_sides, answer and answer.touches, target.touches,
-            status,
-        )
-
     try:
         with deadline(effort.deadline):
             solve = contender.build(scene, setting)
             answer = solve(grid)
-            first = time.perf_counter() - begin
-    except (ImportError, Deadline) as reason:
-        first = time.perf_counter() - begin
-        late = f"stopped: longer than {effort.deadline:g} s"
-        return record(None, "not installed" if isinstance(reason, ImportError) else late, [], None), None
-    complete = len(answer.state) == len(grid)
-    error = float(np.abs(answer.state - target.state[-len(grid) :]).max()) if complete else None
-    times = repeat(solve, grid, effort) if complete else []
-    return record(answer, answer.status, times, error), solve if complete else None
-
-
-def repeat(solve: Solve, grid: Array, effort: Effort) -> list[float]:
-    """Seconds of warm runs, within the budget."""
-    times: list[float] = []
-    while not times or (sum(times) < effort.budget and len(times) < effort.most):
-        times.append(seconds(solve, grid))
-    return times
-
-
-def seconds(solve: Solve, grid: Array) -> float:
-    """One run."""
-    begin = time.perf_counter()
-    solve(grid)
-    return time.perf_counter() - begin
+    except ImportError:
+        return noted(NOT_INSTALLED, [time.perf_counter() - begin]), None
+    except Deadline:
+        return noted(f"{LATE} than {effort.deadline:g} s", [time.perf_counter() - begin]), None
+    first = time.perf_counter() - begin
+    if len(answer.state) != len(grid):
+        return noted(answer.status, [first], answer), None
+    times = [first, *repeat(solve, grid, effort.budget, effort.most)]
+    return noted(answer.status, times, answer, distance(target, answer.state)), solve
 
 
 def given_up(record: Record, effort: Effort) -> bool:
     """Whether tighter settings of this method are not worth a try."""
-    late = record.status.startswith("stopped: longer") or record.status == "not installed"
+    late = record.status.startswith(LATE) or record.status == NOT_INSTALLED
     return late or (record.least or 0.0) > effort.patience

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.accuracy.contender import Answer, Contender, Solve
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.methods.equations import CONTACT, condition, parameters, rates
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from lab.studies.peers import Answer, Contender, Solve, other_side_touches
+from lab.studies.peers import other_side_touches
 
 MAX_STEPS = 10_000_000
 MAX_RESTARTS = 100_000

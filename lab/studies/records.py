@@ -5,14 +5,14 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import math
 import os
 import platform
 from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -24,43 +24,6 @@ MOST_BYTES = 2**26  # of a journal
 T = TypeVar("T")
 PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "rclpy", "rosbags", "scipy", "scikit-sundae", "heyoka")
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
-
-
-class Record(NamedTuple):
-    """One method at one setting on one scene."""
-
-    scene: str
-    family: str
-    method: str
-    knob: str
-    setting: float
-    error: float | None  # see `metric`; None: not all the output
-    seconds: float | None  # median of the warm runs; None: no warm run
-    least: float | None  # s, fastest warm run
-    repeats: int
-    first: float  # s, construction and first run, with what they compile
-    steps: int | None  # None: the method does not say
-    right_hand_sides: int | None
-    found: tuple[int, int] | None  # touches left, right; None: it does not look for them
-    there_are: tuple[int, int]
-    status: str
-
-    @property
-    def missed(self) -> int | None:
-        """By how many touches the count of a side is wrong, both sides together."""
-        if self.found is None:
-            return None
-        return sum(abs(a - b) for a, b in zip(self.found, self.there_are, strict=True))
-
-    @property
-    def time(self) -> float:
-        """Fastest warm run in s: on a machine that is shared the others tell of the neighbours; infinite if none."""
-        return math.inf if self.least is None else self.least
-
-    @property
-    def good(self) -> bool:
-        """Whether there is a result, with its time."""
-        return self.error is not None and self.seconds is not None and math.isfinite(self.error)
 
 
 def metric(points: int, digits: int) -> str:

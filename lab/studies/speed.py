@@ -16,6 +16,9 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
+from grasp_ros.accuracy.contender import Contender, Solve
+from grasp_ros.accuracy.measure import Record, seconds
+from grasp_ros.accuracy.truth import Truth
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
@@ -23,8 +26,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.studies import accuracy, measure, pages, peer_heyoka, predictability
 from lab.studies.contenders import all_contenders, own_contenders
-from lab.studies.peers import Contender, Solve
-from lab.studies.records import Journal, Record, describe_machine
+from lab.studies.records import Journal, describe_machine
 
 BUDGET_S, FEWEST, MOST = 1.5, 3, 200  # per solver: time for its repeats, and their number
 PATIENCE_S = 2.0  # a solver that needs longer for one run climbs no further
@@ -80,7 +82,7 @@ def run(scene: Scene, error: float, out: Path | None, directory: Path) -> None:
         pages.put(out, json.dumps({**record, "timings": timings}, indent=1) + "\n")
 
 
-def final_state(scene: Scene, target: measure.Truth, error: float) -> list[Timing]:
+def final_state(scene: Scene, target: Truth, error: float) -> list[Timing]:
     """`exact` and its closest rival, heyoka, where only the last state is asked for."""
     grid = target.grid[-1:]
     rivals = [contenders()[0], peer_heyoka.contenders()[-1]]
@@ -97,7 +99,7 @@ def contenders() -> list[Contender]:
 
 
 def first_to_reach(
-    contender: Contender, scene: Scene, grid: Array, target: measure.Truth, error: float
+    contender: Contender, scene: Scene, grid: Array, target: Truth, error: float
 ) -> tuple[Record, Solve | None]:
     """The first setting, from loose to tight, that reaches an error; without a solver if none does."""
     effort = measure.FULL._replace(patience=PATIENCE_S, deadline=3.0 * PATIENCE_S, most=1)
@@ -125,7 +127,7 @@ def race(finalists: list[tuple[Record, Solve | None]], grid: Array, output: str)
             if solve is not None and (len(times) < FEWEST or sum(times) < BUDGET_S):
                 if record.least is not None and record.least < WARM_S:
                     solve(grid)
-                times.append(measure.seconds(solve, grid))
+                times.append(seconds(solve, grid))
     return [
         Timing(record, min(times), statistics.median(times), len(times))
         for (record, _), times in zip(finalists, samples, strict=True)
@@ -166,11 +168,11 @@ def _growth(scene: Scene) -> list[str]:
     exact = next(contender for contender in own_contenders() if contender.name == EXACT)
     quiet = scenes.load("no_contact")
     longers = [predictability.horizon(scene, factor * scene.duration) for factor in HORIZONS]
-    for longer in [*longers, *(predictability.horizon(quiet, seconds) for seconds in ENDURANCE_S)]:
+    for longer in [*longers, *(predictability.horizon(quiet, duration) for duration in ENDURANCE_S)]:
         solve = exact.build(longer, exact.ladder[-1])
         grid = np.array([longer.duration])
         touches = sum(solve(grid).touches or (0, 0))
-        median = statistics.median(measure.seconds(solve, grid) for _ in range(MOST))
+        median = statistics.median(seconds(solve, grid) for _ in range(MOST))
         each = f"{1e6 * median / touches:12.1f}" if touches else f"{'-':>12}"
         lines.append(f"  {longer.name:20}{longer.duration:12g}{touches:9}{1e3 * median:11.4f}{each}")
     return lines

@@ -10,25 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 from documents import case_of
+from measurements import record
 
 from grasp_ros import scene as scenes
 from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest
 from grasp_ros.accuracy.contender import Answer, Contender, own_contenders
-from grasp_ros.accuracy.measure import NOT_INSTALLED, Record, attempt
+from grasp_ros.accuracy.measure import NOT_INSTALLED, attempt
 from grasp_ros.accuracy.truth import Truth, finest
 from grasp_ros.physics.errors import Refused
 
 LAST = [-0.008512122262300985, -0.011087931065097529, -0.005641499599319586, 0.0034325068122038564,
         -0.0008363089547169395, 0.0033174261285577183]  # case 1 at 20 s, from the reference with 25 digits
-
-
-def record(method: str, error: float | None, seconds: float | None, **other: Any) -> Record:
-    values: dict[str, Any] = {
-        "scene": "s", "family": "f", "method": method, "knob": "tolerance", "setting": 1e-6, "error": error,
-        "seconds": seconds, "least": seconds, "repeats": 3, "first": 1.0, "steps": 10, "right_hand_sides": 60,
-        "found": (3, 2), "there_are": (3, 2), "status": "done",
-    }
-    return Record(**{**values, **other})
 
 
 def test_the_truth_knows_its_own_error() -> None:

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import pytest
+from measurements import record
 
 from lab.studies import accuracy, adviser
-from lab.studies.records import Record
-
-
-def record(method: str, error: float | None, seconds: float | None, **other: Any) -> Record:
-    values: dict[str, Any] = {
-        "scene": "s", "family": "f", "method": method, "knob": "tolerance", "setting": 1e-6, "error": error,
-        "seconds": seconds, "least": seconds, "repeats": 3, "first": 1.0, "steps": 10, "right_hand_sides": 60,
-        "found": (3, 2), "there_are": (3, 2), "status": "done",
-    }
-    return Record(**{**values, **other})
 
 
 def test_missed_contacts_are_counted_on_both_sides() -> None:

@@ -12,11 +12,12 @@ import pytest
 from documents import stalling
 
 from grasp_ros import scene as scenes
+from grasp_ros.accuracy.contender import Answer, Contender
+from grasp_ros.accuracy.measure import Record
+from grasp_ros.accuracy.truth import Truth
 from lab.studies import accuracy, figures, measure
 from lab.studies.contenders import own_contenders
-from lab.studies.measure import Truth
-from lab.studies.peers import Answer, Contender
-from lab.studies.records import Journal, Record
+from lab.studies.records import Journal
 
 SHORT = "time.duration_s=2"
 QUICK = measure.QUICK._replace(stride=1)

@@ -17,12 +17,13 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.physics.errors import LONGEST, Refused
 from grasp_ros.scene import npz
 from grasp_ros.scene.npz import signed
 from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
-from lab.studies.records import Journal, Record, digest
+from lab.studies.records import Journal, digest
 
 SECONDS = 10.0  # no door takes longer
 CASE = scenes.load("case_01").to_yaml()
