@@ -8,7 +8,7 @@ export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
 # Studies that write a page, those first that take longest; what one of them is asked beside.
-PAGES := accuracy maps fuzz hard paper faults effects certificate domain
+PAGES := derivatives accuracy maps fuzz hard paper faults effects certificate domain
 fuzz_options := --draws 5000 --jobs 2
 
 .PHONY: demo test quick lint install docs study laboratory benchmark mutants lowest clean

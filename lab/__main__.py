@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 
-from grasp_ros.cli.arguments import Command
 from grasp_ros.cli.main import run
+from grasp_ros.cli.parser import Command
 from grasp_ros.physics.errors import Refused
 from lab.commands import accuracy, costs, graph, maps, proofs
 

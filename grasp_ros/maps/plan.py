@@ -16,7 +16,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import Setup, taken
+from grasp_ros.simulation.chunk import Setup, checked
 from grasp_ros.simulation.variants import Variants, parameter_of
 
 POINTS, MOST, MOST_AXES = 101, 10**9, 2
@@ -106,7 +106,7 @@ class Plan:
         axes = tuple(
             Axis(axis.name, number(f"{axis.name}: low", axis.low), number(f"{axis.name}: high", axis.high),
                  whole(f"{axis.name}: points", axis.points, 2), bool(axis.log)) for axis in self.axes)
-        own = {"setup": taken(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
+        own = {"setup": checked(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
                "seed": whole("seed", self.seed, 0), "quasi": bool(self.quasi)}
         for name, value in own.items():
             object.__setattr__(self, name, value)

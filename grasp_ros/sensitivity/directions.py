@@ -15,9 +15,9 @@ import numpy as np
 
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT
-from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.layout import LEFT
+from grasp_ros.physics.model import Array, penetration
+from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.parameter import Parameter
@@ -124,7 +124,5 @@ def law_rows(system: System) -> Array:
 
 def closing(side: int, state: Array) -> tuple[Array, Array]:
     """u in m and u' in m/s of a pair, (8), from states (m, 6), or their derivatives from those of states (m, 6, n)."""
-    arm, sign = COLUMN[side], 1.0 if side == LEFT else -1.0
-    front, back = state[:, arm : arm + 2], state[:, COLUMN[OBJECT] : COLUMN[OBJECT] + 2]
-    u, rate = np.moveaxis(sign * (front - back), 1, 0)
-    return u, rate
+    u_l, d_l, u_r, d_r = penetration(np.moveaxis(state, 1, -1))
+    return (u_l, d_l) if side == LEFT else (u_r, d_r)

@@ -8,7 +8,7 @@ import numpy as np
 
 from grasp_ros.physics.impact_law import damping_factor, elastic_force, elastic_slope
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Entry, Law, Of, Transition
-from grasp_ros.physics.model import Array
+from grasp_ros.physics.model import Array, impact_force_of
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -37,9 +37,7 @@ class _Event:
         """u, u', the impact force of a pair, and 1 + p u'; no force where condition (10) does not hold."""
         hertzian, loss = self._pairs[side]
         u, rate = (float(value[0]) for value in closing(side, self._y))
-        factor = float(damping_factor(loss, rate))
-        pressed = u > 0.0 and factor > 0.0
-        return u, rate, float(elastic_force(hertzian, u)) * factor if pressed else 0.0, factor
+        return u, rate, float(impact_force_of(hertzian, loss, u, rate)), float(damping_factor(loss, rate))
 
     def acceleration(self, body: int) -> float:
         """Acceleration of a body, m/s^2."""

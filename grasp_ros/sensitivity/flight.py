@@ -16,10 +16,10 @@ from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.impact import elastic_force, elastic_slope
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V
-from grasp_ros.sensitivity.tangents import STATES, Motion, Rates, put
+from grasp_ros.sensitivity.tangents import STATES, Motion, Rates, copy_matrix
 
-SERIES = 16  # terms of an exponential whose argument is below HALF
-HALF = 0.25
+SERIES = 16  # terms of an exponential whose argument is below LARGEST_ARGUMENT
+LARGEST_ARGUMENT = 0.25
 SMALL = 1e-20  # terms of a flow behind which those of its derivatives are below rounding, too
 FLOW, BY_STIFFNESS, BY_DAMPING, NEXT, SPARE = range(5)  # matrices
 STEADY = 2  # column of what a constant acceleration of 1 m/s^2 does
@@ -28,7 +28,7 @@ STEADY = 2  # column of what a constant acceleration of 1 m/s^2 does
 @kernel
 def halvings(rate: float, t: float) -> int:
     """How often a time in s is halved until an exponential series of so few terms covers it."""
-    reach = rate * t / HALF
+    reach = rate * t / LARGEST_ARGUMENT
     return max(math.ceil(math.log2(reach)), 0) if reach > 1.0 else 0
 
 
@@ -70,7 +70,7 @@ def flow_of_body(stiffness: float, damping: float, t: float, m: Array) -> None:
             product_2x3(m[which], m[FLOW], m[NEXT], 1.0)
             if which != FLOW:
                 product_2x3(m[FLOW], m[which], m[NEXT], 0.0)
-            put(m[which], m[NEXT, :2, :3])
+            copy_matrix(m[which], m[NEXT, :2, :3])
 
 
 @kernel
@@ -110,7 +110,7 @@ def couple(motion: Motion, side: Body, a: Array) -> float:
 
 
 @kernel
-def square(a: Array, b: Array, out: Array) -> None:
+def product_6x6(a: Array, b: Array, out: Array) -> None:
     """Write the product of two matrices (6, 6) to a third one."""
     for i in range(STATES):
         for j in range(STATES):
@@ -151,32 +151,32 @@ def drive_at_rest(motion: Motion, rates: Rates, body: Body, j: int) -> float:
 @kernel
 def rest_tangent(motion: Motion, rates: Rates, m: Array, span: float) -> None:
     """Write the tangents after `span` s at rest to `at`."""
-    a, flow, whole, term, spare = m[0], m[1], m[2], m[3], m[4]
+    a, flow, integral, term, spare = m[0], m[1], m[2], m[3], m[4]
     times = halvings(rate_at_rest(motion, a), span)
     h = span / 2.0**times
-    flow[:] = whole[:] = term[:] = 0.0  # exp(a t) and its integral
+    flow[:] = integral[:] = term[:] = 0.0  # exp(a t) and its integral
     for i in range(STATES):
         flow[i, i] = term[i, i] = 1.0
-        whole[i, i] = h
+        integral[i, i] = h
     for k in range(1, SERIES):
-        square(a, term, spare)
+        product_6x6(a, term, spare)
         for i in range(STATES):
             for j in range(STATES):
                 term[i, j] = spare[i, j] * h / k
                 flow[i, j] += term[i, j]
-                whole[i, j] += term[i, j] * h / (k + 1)
+                integral[i, j] += term[i, j] * h / (k + 1)
     for _ in range(times):
-        square(flow, whole, spare)
+        product_6x6(flow, integral, spare)
         for i in range(STATES):
             for j in range(STATES):
-                whole[i, j] += spare[i, j]
-        square(flow, flow, spare)
-        put(flow, spare)
+                integral[i, j] += spare[i, j]
+        product_6x6(flow, flow, spare)
+        copy_matrix(flow, spare)
     for j in range(rates.x.shape[1]):
         left, right = drive_at_rest(motion, rates, LEFT, j), drive_at_rest(motion, rates, RIGHT, j)
         middle = drive_at_rest(motion, rates, OBJECT, j)
         for i in range(STATES):
-            total = whole[i, V.L] * left + whole[i, V.O] * middle + whole[i, V.R] * right
+            total = integral[i, V.L] * left + integral[i, V.O] * middle + integral[i, V.R] * right
             for k in range(STATES):
                 total += flow[i, k] * rates.x[k, j]
             rates.at[i, j] = total

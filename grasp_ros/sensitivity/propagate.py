@@ -29,7 +29,7 @@ from grasp_ros.sensitivity.contact import (
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.series import evaluate
-from grasp_ros.sensitivity.tangents import Count, Motion, Number, Outputs, Rates, Tangents, put, tangents_at
+from grasp_ros.sensitivity.tangents import Count, Motion, Number, Outputs, Rates, Tangents, copy_matrix, tangents_at
 
 FINISH = -1  # in place of a kind of segment
 GAP = 64.0 * EPS  # of the time: what is longer was rest, of which no segment tells
@@ -90,7 +90,7 @@ def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
         outputs.forces[row, body, n] = motion.bodies[body, Of.FORCE]
         for j in range(n):
             outputs.forces[row, body, j] = rates.acting[body, Of.FORCE, j]
-    put(outputs.out[row], rates.at)
+    copy_matrix(outputs.out[row], rates.at)
     outputs.counts[Count.FILLED] = row + 1
 
 
@@ -122,7 +122,7 @@ def rest_until(t: Tangents, time: float) -> None:
         rest_tangent(t.motion, t.rates, t.matrices, since(t.outputs, now, time - now) if due else time - now)
         if due:
             write_output(t.motion, t.outputs, t.rates)
-    put(t.rates.x, t.rates.at)
+    copy_matrix(t.rates.x, t.rates.at)
     t.outputs.numbers[Number.TIME] = time
 
 
@@ -190,7 +190,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         expand_tangents(motion, rates, t.table, n)
         part = exact_length(t.table, n, left)
         ends = part == left
-        reached = span if ends else evaluate(motion.c, LANES, 0, n, part)[0]
+        reached = span if ends else evaluate(motion.c, LANES, 0, n, part)[0]  # its time
         while is_due(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)
@@ -200,9 +200,9 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
             fly_free(t, True, span)
             step_tangents(motion, rates, t.table, n, part)
             return
-        put(rates.at, rates.x)  # what flies stays at the begin
+        copy_matrix(rates.at, rates.x)  # what flies stays at the begin
         step_tangents(motion, rates, t.table, n, part)
-        put(rates.x, rates.at)
+        copy_matrix(rates.x, rates.at)
         shift(motion.c, n, part)
         left -= part
 
@@ -215,7 +215,7 @@ def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n:
         pass_flight(t, begin, span)
     else:
         pass_step(t, begin, span, s, n)
-    put(t.rates.x, t.rates.at)
+    copy_matrix(t.rates.x, t.rates.at)
     for side in (LEFT, RIGHT):
         if t.motion.mode[side] == Pair.BEGINNING or t.motion.mode[side] == Pair.LEAVING:
             add_neglected(t.motion, t.rates.x, side, span)
@@ -246,7 +246,7 @@ def propagate(address: int, kind: int, span: float, s: float, degree: int) -> in
         pass_friction(t.motion, t.rates.x, t.outputs)
     arrive(t, span * (1.0 - GAP) if ends else clock[2], begin)
     if ends:
-        put(t.rates.at, t.rates.x)
+        copy_matrix(t.rates.at, t.rates.x)
         while is_due(t.outputs, math.inf):
             write_output(t.motion, t.outputs, t.rates)
         return 0

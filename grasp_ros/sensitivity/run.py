@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.compilation.jit import compiled_address
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.exact.records import Integers, Tables
+from grasp_ros.observe.observer import address_of
 from grasp_ros.physics.control import Column, normals_over
 from grasp_ros.physics.layout import LANES
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.sensitivity.directions import Directions, law_rows
 from grasp_ros.sensitivity.propagate import FINISH, UNSEEN, propagate
 from grasp_ros.sensitivity.series import padded
-from grasp_ros.sensitivity.tangents import MATRIX, NUMBERS, ROWS, STATES, TERMS, Count, Number, Place
-
-SIGNATURE = "int64(int64, int64, float64, float64, int64)"
+from grasp_ros.sensitivity.tangents import NUMBERS, ROWS, STATES, TERMS, Count, Number, Place
 
 
 class Carrier:
@@ -65,7 +61,7 @@ class Carrier:
             Place.SERIES: np.zeros(stride * TERMS), Place.CLOSING: np.zeros(4 * wide * TERMS),
             Place.TOTAL: np.zeros(stride + 2 * wide), Place.ROWS: np.zeros((ROWS, TERMS)),
             Place.FACTORS: np.zeros((2, LANES * TERMS)), Place.PRODUCTS: np.zeros((3, LANES * TERMS)),
-            Place.MATRICES: np.zeros((5, MATRIX)), Place.OWN: np.zeros(LANES * TERMS),
+            Place.MATRICES: np.zeros((5, STATES, STATES)), Place.OWN: np.zeros(LANES * TERMS),
             Place.CONTROL: np.zeros((2, len(Column))), Place.CONTROL_RATES: np.zeros((2, len(Column), n)),
             Place.NORMALS: np.zeros((1, 2, 2)), Place.WAITING: np.zeros((0, 2, n)),
             Place.EXTERNAL: directions.external,
@@ -81,7 +77,7 @@ class Carrier:
     def drive_by(self, scene: Scene, directions: Directions, sampled: bool) -> None:
         """Let inputs change at ticks: commands that are held, and external forces."""
         system, n = scene.system, self.x.shape[1]
-        self.counts[Count.DRIVEN], self.numbers[Number.PERIOD] = 1, scene.period_ns / NANOSECONDS
+        self.counts[Count.DRIVEN], self.numbers[Number.PERIOD] = 1, scene.time_of(1)
         if sampled:
             normals = np.zeros((scene.ticks + 1, 2, 2))
             for side, law in system.laws.items():
@@ -97,11 +93,11 @@ class Carrier:
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""
         self.context[Place.C] = tables.c.ctypes.data
-        return np.array([address(), self.context.ctypes.data])
+        return np.array([address_of(propagate), self.context.ctypes.data])
 
     def finish(self, time: float) -> None:
         """After a run, at its end in s."""
-        address()
+        address_of(propagate)
         propagate(self.context.ctypes.data, FINISH, float(time), 0.0, 0)
 
     @property
@@ -109,9 +105,3 @@ class Carrier:
         """First time in s at which one-sided derivatives differ; None: there is none."""
         corner = float(self.numbers[Number.CORNER])
         return corner if math.isfinite(corner) else None
-
-
-@cache
-def address() -> int:
-    """Address of the observer, which is compiled where it has not been."""
-    return compiled_address(propagate, SIGNATURE)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
@@ -18,7 +19,8 @@ from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
-from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
+from grasp_ros.simulation.closed_loop import drive
+from grasp_ros.simulation.simulate import check_grid
 
 
 @dataclass(frozen=True)
@@ -85,27 +87,25 @@ def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None,
     """
     sampled = sampled or scene.sampled
     changes = directions(scene, keys, sampled)
-    grid = np.array([scene.duration] if times is None else times, dtype=float)
-    if len(grid) and not (grid[0] >= 0.0 and grid[-1] <= scene.duration and (np.diff(grid) >= 0.0).all()):
-        raise Refused(f"times: allowed: ascending, within [0, {scene.duration!r}] s")
+    grid = given.times("times", [scene.duration] if times is None else times)
+    check_grid(scene, grid, "times")
     first = Integrator(scene.system, continuous=not sampled, accuracy=accuracy)
-    drive(scene, first, sampled, grid[:0])
+    complete(scene, first, sampled, grid[:0])
     events = first.event_table
     both = np.concatenate([grid, events[:, 0]])
     order = np.argsort(both, kind="stable")
     second = Integrator(scene.system, continuous=not sampled, accuracy=accuracy)
     carrier = carry(scene, second, changes, both[order], sampled)
-    states = drive(scene, second, sampled, both[order])
+    states = complete(scene, second, sampled, both[order])
     carrier.finish(scene.duration)
     back = np.argsort(order, kind="stable")
     at, late = back[: len(grid)], back[len(grid) :]
     system, state, rates = scene.system, states[at], carrier.out[at]
     level = energy(system, state).V_c
-    for body in system.absent:
-        state[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
+    state[:, system.absent_columns] = np.nan
     return Sensitivity(
         scene, tuple(keys), grid, state, level, events, rates,
-        level_rates(system, directions(scene, keys, False), states[at], rates),
+        level_rates(system, directions(scene, keys, False) if sampled else changes, states[at], rates),
         event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late])),
         carrier.corner,
     )
@@ -120,7 +120,7 @@ def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array
     return carrier
 
 
-def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
+def complete(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
     """Run a scene to its end, as `simulate` does; states (m, 6) at the output times.
 
     Raises
@@ -128,12 +128,7 @@ def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> A
     Refused
         If the run does not get there.
     """
-    if sampled:
-        states = SampledLoop(scene, grid, {}, None, {}).drive(integrator)
-    elif scene.system.external:
-        states = drive_external(scene, grid, integrator)
-    else:
-        states = integrator.advance(scene.duration, grid)
+    states = drive(scene, integrator, sampled, grid)
     if integrator.status is not Status.DONE:
         raise Refused(f"{scene.name}: no derivatives of a run that {integrator.stop}")
     return states

@@ -22,7 +22,6 @@ from grasp_ros.physics.layout import LANES
 TERMS = higher_order(series_order(FINEST)) + 1  # of the longest series
 STATES = 6
 COLUMNS = len(Column)
-MATRIX = STATES * STATES
 
 
 class Row(IntEnum):
@@ -49,10 +48,9 @@ class Count(IntEnum):
     DELAY = 5
     NORMALS = 6  # rows of `normals`
     DRIVEN = 7  # whether inputs change at ticks
+    SLIDE = 8  # mode of the object in the last segment; -1: there was none
     STRIDE = 9  # see `Table`
     WIDE = 10
-    SLIDE = 8  # mode of the object in the last segment; -1: there was none
-
 
 
 class Number(IntEnum):
@@ -213,7 +211,7 @@ def tangents_at(address: int) -> Tangents:
 
 
 @kernel
-def put(target: Array, source: Array) -> None:
+def copy_matrix(target: Array, source: Array) -> None:
     """Copy a matrix, without the scratch that an assignment of arrays may need."""
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):

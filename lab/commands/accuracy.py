@@ -8,12 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros.cli.arguments import (
-    STUDY_DIRECTORY,
     add_command,
     add_output,
     add_scene,
     add_settings,
-    add_study_directory,
     load_scene,
     prepare,
 )
@@ -21,6 +19,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 from lab.commands.docs import add_docs, page_directory
+from lab.commands.shared import STUDY_DIRECTORY, add_study_directory
 
 DRIFT_QUICK_S = 20.0
 Parser = argparse.ArgumentParser
@@ -113,10 +112,9 @@ def _prediction(options: argparse.Namespace) -> int:
 
 def add_derivatives(commands: Any) -> Parser:
     """`python -m lab derivatives`."""
-    text = "derivatives through impacts beside the reference: writes the table of docs/derivatives.md; resumes"
+    text = "derivatives through impacts beside the reference, which takes hours; resumes"
     sub = add_command(commands, "derivatives", _derivatives, text)
-    sub.add_argument("--page", type=Path, default=Path("docs") / "derivatives.md", metavar="FILE.md",
-                     help="default: docs/derivatives.md")
+    add_docs(sub)
     add_study_directory(sub)
     return sub
 
@@ -124,11 +122,12 @@ def add_derivatives(commands: Any) -> Parser:
 def _derivatives(options: argparse.Namespace) -> int:
     from lab.studies import derivatives
 
+    docs = page_directory(options, "derivatives")
     prepare()
     rows = derivatives.run(options.output)
-    derivatives.write(options.page, rows)
     print(derivatives.report(rows))
-    print(f"written to {options.page}")
+    if docs is not None:
+        print(f"written to {derivatives.write(docs, rows)}")
     return 0
 
 

@@ -8,12 +8,12 @@ from typing import Any
 from grasp_ros.cli.arguments import (
     add_command,
     add_scene,
-    add_study_directory,
     load_scene,
     prepare,
     whole,
 )
 from lab.commands.docs import add_docs, page_directory
+from lab.commands.shared import add_study_directory
 
 Parser = argparse.ArgumentParser
 

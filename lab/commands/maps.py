@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_study_directory, prepare, whole
+from grasp_ros.cli.arguments import add_command, prepare, whole
 from lab.commands.docs import add_docs, page_directory
+from lab.commands.shared import add_study_directory
 
 
 def add_maps(commands: Any) -> argparse.ArgumentParser:

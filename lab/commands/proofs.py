@@ -155,11 +155,12 @@ def add_doors(commands: Any) -> Parser:
 
 
 def _doors(options: argparse.Namespace) -> int:
-    from lab.drills import parser_fuzzing as doors
+    from lab.drills import parser_fuzzing
 
     seconds = _seconds(options.seconds, options.count)
     prepare()
-    broken = doors.run(options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)
+    broken = parser_fuzzing.run(
+        options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)
     return 1 if broken else 0
 
 

@@ -37,8 +37,7 @@ class Kept:
     """
 
     def __init__(self, directory: Path, seed: int) -> None:
-        home = Path(__file__).parents[2]
-        sources = (path.read_text("utf-8") for room in ROOMS for path in sorted((home / room).rglob("*.py")))
+        sources = (path.read_text("utf-8") for room in ROOMS for path in sorted((pages.HOME / room).rglob("*.py")))
         self._journal = Journal(directory)
         self._name = digest(seed, sources_digest(), *sources, *versions().items())
 

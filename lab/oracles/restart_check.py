@@ -165,7 +165,7 @@ def _end_beside_nudged(run: Trajectory, start: Array, product: Product) -> tuple
     """The end (6,) of a whole run from a state, and what roundings of the start and at each event make of it."""
     system, seconds = run.scene.system, np.array([run.scene.duration])
     size = largest(run.state)
-    size[[COLUMN[body] + part for body in system.absent for part in (0, 1)]] = 0.0
+    size[system.absent_columns] = 0.0
     end, *nudged = (_go(run, start + nudge * size * PATTERN, np.zeros(3), seconds, product)[0]
                     for nudge in (0.0, NUDGE, -NUDGE))
     grown = np.maximum(*(np.abs(other - end) for other in nudged)) * (EPS / NUDGE)

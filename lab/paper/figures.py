@@ -15,7 +15,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, canvas, plots, simulate
 from grasp_ros.simulation.losses import losses, running_losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
-from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of
+from grasp_ros.simulation.quantities import contact_intervals
 from lab.paper.cases import STANDARD, Figure, Start, start_of, started
 
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
@@ -163,7 +163,7 @@ def _one_contact(panels: Sequence[Axes], run: Trajectory) -> None:
     margin = 0.15 * (span[1] - span[0])
     grid = np.linspace(max(span[0] - margin, 0.0), min(span[1] + margin, run.scene.duration), CONTACT_POINTS)
     fine = simulate(run.scene, grid=grid)
-    force, depth = impact_forces_of(fine), fine.state[:, [0, 2]] - fine.state[:, [2, 4]]
+    force, depth = fine.impacts, fine.state[:, [0, 2]] - fine.state[:, [2, 4]]
     for side, _, color in plots.SIDES:
         style = "-" if side == 0 else "--"  # of a symmetric case both are seen
         panels[0].plot((fine.t - span[0]) * 1e3, force[:, side], color=color, linestyle=style)

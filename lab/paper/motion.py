@@ -15,7 +15,6 @@ from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, ensemble, simulate
-from grasp_ros.simulation.quantities import impact_forces_of
 from lab.paper.cases import Cases, Start, started, text_of
 from lab.paper.measures import MARGIN, measure, seconds, settlings
 from lab.paper.universal import Found
@@ -187,7 +186,7 @@ def returns(scene: Scene) -> Found:
 def holds_on(scene: Scene) -> Found:
     """A grasp in the sense of a grip: both arms press the object all through the last second, N."""
     run = run_of(scene)
-    force = float(impact_forces_of(run)[run.t >= scene.duration - LAST].min())
+    force = float(run.impacts[run.t >= scene.duration - LAST].min())
     return Found(force, force > 0.0)
 
 

@@ -9,7 +9,7 @@ from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.losses import losses
-from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of, settled_distance, settling_times
+from grasp_ros.simulation.quantities import contact_intervals, settled_distance, settling_times
 from lab.paper.cases import OFFSETS, Cases, moved, start_of
 from lab.paper.measures import seconds
 
@@ -64,7 +64,7 @@ def _column(scene: Scene) -> list[str]:
         *(f"{200.0 * float(part) / whole:.1f}" for part in (lost.dampers, lost.feedback, lost.impacts)),
         f"{100.0 * float(level[-1]) / whole:.1f}",
         f"{round(-slope, 3) + 0.0:.3f}",
-        f"{impact_forces_of(run)[-1].min():.2g}",
+        f"{run.impacts[-1].min():.2g}",
         f"{_plain(max(-1e3 * float(u_l), 0.0))}, {_plain(max(-1e3 * float(u_r), 0.0))}",
     ]
 

@@ -15,7 +15,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.quantities import contact_intervals, impact_forces_of
+from grasp_ros.simulation.quantities import contact_intervals
 from lab.paper.cases import Figure, value_of
 
 RATE = 60.0  # frames a second
@@ -36,7 +36,7 @@ def frame_times(scene: Scene) -> Array:
 def frames(scene: Scene) -> Array:
     """States, forces and V_c of all frames, (n, 9); see COLUMNS."""
     run = simulate(scene, grid=frame_times(scene))
-    return np.column_stack([run.t, run.state[:, 0::2], run.command, impact_forces_of(run), run.energy.V_c])
+    return np.column_stack([run.t, run.state[:, 0::2], run.command, run.impacts, run.energy.V_c])
 
 
 def replay(figure: Figure, scene: Scene) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,9 +10,10 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import replacing, writing
 from grasp_ros.sensitivity.sensitivities import sensitivities
 from lab.reference.derivative import difference
+from lab.studies import pages
+from lab.studies.records import Journal, scene_key
 
 P, PLACE = "left_contact.dissipation_s_per_m", "object.position_m"
 SUBJECTS = (
@@ -24,7 +24,13 @@ SUBJECTS = (
 PARTS = (0.25, 0.5, 1.0)  # of the horizon
 SECONDS = {"delay": 3.0}  # horizons of scenes with many ticks, which take the reference long
 ROUNDINGS = 4  # runs whose initial places are off by one
-MARK = "<!-- table -->"
+MARK, PAGE = "<!-- table -->", "derivatives.md"
+
+
+class Known(NamedTuple):
+    """What the reference says, in a journal."""
+
+    state: list[list[float]]  # derivatives of the states at PARTS of the horizon
 
 
 class Row(NamedTuple):
@@ -40,20 +46,17 @@ class Row(NamedTuple):
 
 def run(directory: Path) -> list[Row]:
     """Compare all subjects; differences of the reference are kept in a journal."""
-    path = directory / "derivatives.json"
-    with writing(path):
-        directory.mkdir(parents=True, exist_ok=True)
-    journal = json.loads(path.read_text()) if path.is_file() else {}
-    rows = []
+    journal, rows = Journal(directory), []
     for name, key in SUBJECTS:
         scene = scenes.load(name)
         scene = scene.changed({"time.duration_s": SECONDS.get(name, scene.duration)})
-        times, entry = [part * scene.duration for part in PARTS], f"{name}|{key}"
-        if entry not in journal:
-            journal[entry] = difference(scene, key, times).state.tolist()
-            with replacing(path) as file:
-                file.write(json.dumps(journal).encode())
-        rows += _rows(scene, key, np.array(times), np.array(journal[entry]))
+        times = [part * scene.duration for part in PARTS]
+        entry = f"derivative {scene_key(scene)} {key} {times!r}"
+        known = journal.get(entry, Known)
+        if known is None:
+            known = Known(difference(scene, key, times).state.tolist())
+            journal.put(entry, known)
+        rows += _rows(scene, key, np.array(times), np.array(known.state))
     return rows
 
 
@@ -80,15 +83,15 @@ def _off(scene: Scene, signs: Array) -> Scene:
 
 def report(rows: list[Row]) -> str:
     """The rows as a table of Markdown."""
-    lines = ["| scene | number | t, s | largest derivative | relative error | one rounding changes it by |",
-             "|---|---|---|---|---|---|"]
-    lines += [f"| {row.scene} | `{row.key}` | {row.t:g} | {row.size:.3g} | {row.error:.1e} | {row.spread:.1e} |"
-              for row in rows]
-    return "\n".join(lines)
+    heads = ("scene", "number", "t, s", "largest derivative", "relative error", "one rounding changes it by")
+    return pages.table(heads, (
+        (row.scene, f"`{row.key}`", f"{row.t:g}", f"{row.size:.3g}", f"{row.error:.1e}", f"{row.spread:.1e}")
+        for row in rows))
 
 
-def write(page: Path, rows: list[Row]) -> None:
-    """Put the table into the page, between its marks."""
-    before, _, after = page.read_text(encoding="utf-8").split(MARK)
-    with replacing(page) as file:
-        file.write(f"{before}{MARK}\n\n{report(rows)}\n\n{MARK}{after}".encode())
+def write(docs: Path, rows: list[Row]) -> Path:
+    """Write docs/derivatives.md: the words of the page that is there, and the table between its marks; returns it."""
+    before, _, after = (pages.HOME / "docs" / PAGE).read_text(encoding="utf-8").split(MARK)
+    page = docs / PAGE
+    pages.put(page, f"{before}{MARK}\n\n{report(rows)}\n\n{MARK}{after}")
+    return page

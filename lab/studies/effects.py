@@ -27,7 +27,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION, EFFECTS
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.closed_loop import drive_external
+from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.ticks import tick_times
 from lab.drills import recorder
 from lab.studies import page_figures, pages
@@ -148,10 +148,7 @@ def _segments(scene: Scene) -> tuple[Integers, Array]:
         return np.zeros(0, dtype=np.int64), np.zeros(0)
     integrator = Integrator(scene.system, continuous=True)
     integrator.observer = clock = SegmentClock(MOST_SEGMENTS)
-    if scene.system.external:
-        drive_external(scene, np.zeros(0), integrator)
-    else:
-        integrator.advance(scene.duration)
+    drive(scene, integrator, False, np.zeros(0))
     return clock.segments
 
 

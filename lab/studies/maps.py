@@ -74,19 +74,19 @@ def settling(directory: Path, pixels: int = PIXELS) -> Settling:
     setup = Setup(("settling_time",), MAP_ACCURACY, settled=SETTLED, horizons=HORIZONS)
     axes = (Axis(LOSSES, 0.02, 20.0, pixels, True), Axis(GAINS, -9.0, 60.0, pixels))
     plan = Plan(scene, setup, axes)
-    seconds = _computed(plan, directory / f"settling_{pixels}.zarr").seconds
-    data = store.read(directory / f"settling_{pixels}.zarr")
+    data, seconds = _computed(plan, directory / f"settling_{pixels}.zarr")
     jumps = _jumps(data["settling_time"].values)
     zoom = Plan(scene, setup, _window(plan, jumps, max(pixels // 20, 4), max(pixels // 4, 2)))
-    _computed(zoom, directory / f"zoom_{pixels}.zarr")
-    zoomed = store.read(directory / f"zoom_{pixels}.zarr")
+    zoomed, _ = _computed(zoom, directory / f"zoom_{pixels}.zarr")
     shares = float(jumps.mean()), float(_jumps(zoomed["settling_time"].values).mean())
     return Settling(plan, data, zoom, zoomed, shares, _changed(zoom, zoomed), seconds)
 
 
-def _computed(plan: Plan, path: Path) -> store.Store:
+def _computed(plan: Plan, path: Path) -> tuple[Any, float]:
+    """The outcomes of a plan, and the time that they took in s."""
     with tqdm(total=plan.rows, unit="run", desc=path.stem, file=sys.stderr, smoothing=0.05) as bar:
-        return run(plan, path, progress=lambda done, _: bar.update(done - bar.n))
+        seconds = run(plan, path, progress=lambda done, _: bar.update(done - bar.n)).seconds
+    return store.read(path), seconds
 
 
 def _window(plan: Plan, jumps: Array, size: int, pixels: int) -> tuple[Axis, Axis]:
@@ -178,5 +178,4 @@ def robustness(directory: Path, rows: int = SAMPLE) -> tuple[Plan, Any, float]:
     scene = scenes.load("case_01")
     outcomes = ("settling_time", "touches", "peak_input", "peak_impact")
     plan = Plan(scene, Setup(outcomes, MAP_ACCURACY), relative(scene, OFF), rows, 1)
-    seconds = _computed(plan, directory / f"robustness_{rows}.zarr").seconds
-    return plan, store.read(directory / f"robustness_{rows}.zarr"), seconds
+    return plan, *_computed(plan, directory / f"robustness_{rows}.zarr")
