@@ -17,7 +17,7 @@ from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.columns import Alike, alike
-from grasp_ros.graph.opening import KIND, begin, open_storage, running_of, scene_of
+from grasp_ros.graph.opening import KIND, begin, held_of, open_storage, running_of, scene_of
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.rosbag2 import BagError, decode, names_of
@@ -110,7 +110,7 @@ class _Content:
         self.changes, self.held, self.timing = _Changes(), Counter[Topic](), list[Any]()
         known = {name: topic for topic, name in names_of(self.scene, storage.records[OWN_RECORD]).items()}
         self.columns = {topic: _Columns(name, topic, self.scene) for name, topic in known.items()}
-        held = () if running_of(storage).lockstep else self.scene.controllers.values()
+        held = held_of(storage, self.scene)
         self._takers = {(name, topic.type): self._taker(topic, held) for name, topic in known.items()}
 
     def _taker(self, topic: Topic, held: Collection[Topic]) -> Callable[[Stored], object]:
@@ -153,7 +153,7 @@ class _Content:
             counts, ticks, joints[:, :6], joints[:, 6:], command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
             dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
-            {name: number for name, number in self.changes.unheard.items() if number},
+            dict(+self.changes.unheard),
         )
 
 
@@ -232,9 +232,11 @@ class _Changes(dict[int, dict[str, float]]):
 
 def _table(messages: Sequence[Any]) -> dict[str, Array]:
     """Lists of numbers with names as columns; those that have not the names of the last one are left out."""
-    alike = [message for message in messages if message.name == messages[-1].name]
-    columns = np.array([message.position for message in alike]).T
-    return dict(zip(messages[-1].name, columns, strict=True)) if messages else {}
+    if not messages:
+        return {}
+    names = messages[-1].name
+    columns = np.array([message.position for message in messages if message.name == names]).T
+    return dict(zip(names, columns, strict=True))
 
 
 def _values(topic: Topic, group: Alike) -> Array:

@@ -45,7 +45,7 @@ def place(given: Mapping[str, str], namespace: str) -> str:
     return f"in ROS domain {given.get(DOMAIN) or 0}, namespace {namespace}, on {reach}"
 
 
-def check(given: Mapping[str, str], alone: bool = False) -> None:
+def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     """Refuse variables with which a graph would be somewhere else, or in no place where its nodes find each other.
 
     Parameters

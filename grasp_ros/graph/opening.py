@@ -13,7 +13,7 @@ from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, topics_of
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.scene.files import decoding
-from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE
+from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
 
 KIND = "a bag of this package"
 MOST_AHEAD = 16  # messages, of which two say what the bag holds
@@ -91,3 +91,8 @@ def scene_of(storage: Storage, path: Path) -> scenes.Scene:
 def running_of(storage: Storage) -> Running:
     """How the plant of a bag ran, once its first record has been read."""
     return runnings.parse(storage.records[OWN_RECORD]["run"])
+
+
+def held_of(storage: Storage, scene: scenes.Scene) -> Collection[Topic]:
+    """Topics whose messages are as they came, not one for each tick: those of commands in a free run."""
+    return () if running_of(storage).lockstep else scene.controllers.values()

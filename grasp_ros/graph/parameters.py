@@ -29,16 +29,18 @@ CONTROLLER = {
 NODES = {
     "plant": PLANT, "left_controller": CONTROLLER, "right_controller": CONTROLLER,
     "monitor": {"bag": "directory of the bag; it must not exist (grasp_ and the time)", **PEERS},
+}
+TOOLS = {  # which commands of `grasp` become
     "player": {"bag": "directory of the bag", "rate": "seconds of the bag in a second (1)"},
     "remote": {"words": "what to ask, a JSON list; empty: what the lines of the standard input say"},
     "watch": {},
 }
-TEXTS = {name: text for parameters in NODES.values() for name, text in parameters.items()}
+PARAMETERS = NODES | TOOLS
 
 
 def usage(node: str) -> str:
     """What a node prints when it is asked for help."""
-    rows = [f"  {name:<20} {text}" for name, text in NODES[node].items()]
-    numbers = "" if node == "monitor" else "Numbers of the scene are parameters, too: -p left_arm.position_m:=-0.4\n"
-    return "\n".join([f"usage: {node} [--ros-args [-p NAME:=VALUE] ...]", "", *rows, "", numbers])
-
+    rows = [f"  {name:<20} {text}" for name, text in PARAMETERS[node].items()]
+    if node in NODES and node != "monitor":
+        rows += ["", "Numbers of the scene are parameters, too: -p left_arm.position_m:=-0.4"]
+    return "\n".join([f"usage: {node} [--ros-args [-p NAME:=VALUE] ...]", "", *rows, ""])

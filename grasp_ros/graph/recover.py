@@ -85,7 +85,7 @@ def _ticks(storage: Storage, messages: Iterator[Stored], scene: scenes.Scene
            ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
     """Time, messages by topic, and what lies beside them, of every tick of which all are there, in ascending order."""
     known = {(name, topic.type): topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
-    held = () if opening.running_of(storage).lockstep else scene.controllers.values()
+    held = opening.held_of(storage, scene)
     wanted = {topic for topic in scene.topics if topic not in held}
     before = -1
     with decoding(storage.path, opening.KIND, BagError, (SerdeError,)):

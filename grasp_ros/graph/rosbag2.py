@@ -117,11 +117,10 @@ def text_message(text: str) -> bytes:
 
 def list_message(
     time_ns: int, names: Sequence[str], position: Array, velocity: Array = NOTHING, effort: Array = NOTHING,
-    frame: str = "",
 ) -> bytes:
     """A stamped list of numbers with names, serialized; rclpy would pad it with stray bytes."""
     return bytes(_TYPES.serialize_cdr(_TYPES.types[NAMED_LIST](
-        header=_header(time_ns, frame), name=list(names), position=position, velocity=velocity, effort=effort
+        header=_header(time_ns), name=list(names), position=position, velocity=velocity, effort=effort
     ), NAMED_LIST))
 
 

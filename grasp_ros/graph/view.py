@@ -42,16 +42,10 @@ class View:
     ----------
     scene : Scene
         Its initial state gives the scale of the line.
-
-    Attributes
-    ----------
-    controlled : dict of str to int
-        Bodies that have a controller, by side.
     """
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.controlled = {side: body for side, body in SIDES.items() if body in scene.system.laws}
         places = np.abs(scene.initial_state[0::2])
         self._reach = 1.25 * float(places.max()) or 1.0
         self._most = 0.0  # energy shown so far, J

@@ -55,7 +55,7 @@ def test_two_graphs_in_one_domain_do_not_see_each_other(launch: Any, tmp_path: P
 def test_the_package_lists_what_its_nodes_import_and_how_to_cite_it() -> None:
     manifest = ElementTree.parse(ROOT / "package.xml").getroot()
     listed = {entry.text for entry in manifest.findall("exec_depend")}
-    sources = "\n".join(path.read_text() for path in (ROOT / "grasp_ros" / "graph" / "nodes").glob("*.py"))
+    sources = "\n".join(path.read_text() for path in (ROOT / "grasp_ros" / "graph").rglob("*.py"))
     imported = set(re.findall(r"^from (\w+_(?:msgs|srvs|interfaces))\.", sources, re.M)) | {"rclpy"}
     assert imported <= listed
     required = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]

@@ -16,13 +16,15 @@ from processes import DEADLINE, START, wait_for
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 
 from grasp_ros import scene
-from grasp_ros.graph import bag, rosbag2
+from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
+from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import laws_of
 from grasp_ros.scene.topics import CHANGES
 from grasp_ros.simulation import simulate
@@ -112,7 +114,7 @@ def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None
     numbers = run.scene.numbers_of("left_controller")
     for tick, (time_ns, rows, own) in enumerate(recorder.ticks_of(run)):
         values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
-        said = rosbag2.list_message(time_ns, list(numbers), values, frame=str(1 + 2 * tick))
+        said = serialize_message(messages.named_list(time_ns, list(numbers), [*values], 1 + 2 * tick))
         beside = [(CHANGES["left"], said)] if tick < 3 else []
         writer.write_tick(time_ns, [*beside, *rows], own)
     writer.close()

@@ -34,7 +34,6 @@ from grasp_ros.physics.model import impact_forces
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.quantities import impact_forces_of
 
 pytestmark = pytest.mark.slow  # real processes
 CONFIG = Path(__file__).parents[2] / "config"
@@ -181,7 +180,7 @@ def test_the_picture_of_the_page_is_one_state() -> None:
     tick = round(1000 * float(re.findall(r"t = (\S+) s", page)[0]))
     [words] = re.findall(r"t = \S+ s +(\d+ ticks/s)", page)
     run = simulate(scene.load("case_01", ["time.duration_s=8"]), sampled=True)
-    view, level, impacts = View(run.scene), run.energy, impact_forces_of(run)
+    view, level, impacts = View(run.scene), run.energy, run.impacts
     for row in (0, tick):
         known = {"V": level.V[row], "V_c": level.V_c[row], "mode": float(level.mode[row]), "closed": 1.0}
         moment = Moment(float(run.t[row]), run.state[row], dict(zip(CONTACTS, run.command[row], strict=True)),

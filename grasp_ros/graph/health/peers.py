@@ -100,7 +100,7 @@ class PeerNode(GraspNode):
         )
         self.beats = Beats(self, self.heard, self._watchdog.beat)
         self._looked = self._excused = time.monotonic()
-        self._created = 0.0  # wall time of the first look: all that may take long is done
+        self._first_look = 0.0  # wall time of the first look: all that may take long is done
         self._before: object = None
         self._still = 0  # looks in a row without progress
         self.wall_timer(LOOK_SECONDS, self.look)
@@ -141,8 +141,8 @@ class PeerNode(GraspNode):
             self._excused = self._watchdog.resumed
             if self.begun:
                 self.get_logger().warning(f"this process was stopped for {self._watchdog.stood:.1f} s")
-        if not self._created:
-            self._created = now
+        if not self._first_look:
+            self._first_look = now
             self.beats.own.ready = True
         elif now - self._looked > STILL_SECONDS:  # this thread was busy: what others did meanwhile waits here
             self.sweep()
@@ -165,7 +165,7 @@ class PeerNode(GraspNode):
                 return
 
     def _wait_for_start(self, now: float) -> None:
-        waited = now - max(self._created, self.beats.prepared)
+        waited = now - max(self._first_look, self.beats.prepared)
         self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
         if waited > self.start_patience and self._ends:
             self.fail(f"{self.words}: nobody has come for {self.start_patience:g} s")
@@ -236,12 +236,12 @@ class PeerNode(GraspNode):
         """A peer without which this node stays has ended."""
         if self._left is None:
             self._left = self.phase, self.words
-            self.phase, self.words = Phase.LEFT, f"waiting for another one: {words}"
+            self.phase, self.words = Phase.IDLE, f"waiting for another one: {words}"
             self.get_logger().info(self.words)
 
     def _come_back(self) -> None:
         """It is there, or another one in its place."""
-        if self._left is not None and self.phase is Phase.LEFT:
+        if self._left is not None and self.phase is Phase.IDLE:
             self.phase, self.words = self._left
         self._left = None
 

@@ -74,5 +74,5 @@ class Watchdog:
             with suppress(OSError):
                 print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
-            tell_parent(self._name, f"stands: {' and '.join(self._frozen()) or 'a law'}")
+            tell_parent(self._name, f"stands: {frozen or 'a law'}")
             os._exit(1)

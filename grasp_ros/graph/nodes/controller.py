@@ -101,7 +101,8 @@ class Controller(PeerNode):
         except Refused as error:
             if first:
                 raise
-            self.phase, self.words = Phase.LEFT, f"waits for another scene: {error}"
+            self._left = None  # a living plant is no reason to go on with the last scene
+            self.phase, self.words = Phase.IDLE, f"waits for another scene: {error}"
             self.concern = "this scene is not answered"
             self.get_logger().error(self.words)
             return

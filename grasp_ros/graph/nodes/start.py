@@ -12,14 +12,11 @@ import signal
 import sys
 from importlib import import_module
 
-from grasp_ros.graph.host import check, this_host
-from grasp_ros.graph.parameters import usage
+from grasp_ros.graph.host import check_reach, this_host
+from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
-
-NODES = ("plant", "left_controller", "right_controller", "monitor")
-TOOLS = ("watch", "player", "remote")  # which commands of `grasp` become
 
 
 def main(name: str, child: bool = False) -> int:
@@ -32,7 +29,7 @@ def main(name: str, child: bool = False) -> int:
         print(usage(name))
         return 0
     try:
-        check(os.environ, alone=name == "together")
+        check_reach(os.environ, alone=name == "together")
         if words and name != "together":
             raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
     except Refused as error:
@@ -81,7 +78,7 @@ def start() -> int:
     is_child = sys.argv[1:2] == ["child"]
     del sys.argv[1 : 1 + is_child]
     name = sys.argv.pop(1) if len(sys.argv) > 1 else ""
-    if name not in (*NODES, *TOOLS, "together"):
+    if name not in PARAMETERS and not (is_child and name == "together"):
         print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
         return 2
     try:

@@ -23,8 +23,13 @@ BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before 
 POLL_SECONDS = 0.2
 
 
-def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> int:
+def run(
+    makes: Sequence[Callable[[], GraspNode]], received: Sequence[int],
+    work: Callable[[Sequence[GraspNode], Sequence[int]], None] | None = None,
+) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
+
+    `work` is done in place of `spin`.
 
     0 after a finished run or a signal, 2 if a node refuses its parameters, otherwise the first status of a node that is
     not 0. The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
@@ -32,12 +37,12 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
     """
     nodes: list[GraspNode] = []
     try:
-        init()
+        _init()
         for make in makes:
             nodes.append(make())
         gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
         gc.enable()
-        spin(nodes, received)
+        (work or spin)(nodes, received)
     except Refused as error:
         tell_parent(_names(nodes), str(error))
         with suppress(OSError):  # nobody reads it
@@ -101,7 +106,7 @@ def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:
             executor.spin_once(timeout_sec=QUIET_SECONDS)
 
 
-def init() -> None:
+def _init() -> None:
     """Start rclpy with the arguments of the process."""
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)

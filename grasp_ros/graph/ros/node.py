@@ -38,7 +38,7 @@ class Phase(Enum):
 
     WAITING = "waiting"  # for those without whom it does not begin
     RUNNING = "running"
-    LEFT = "left"  # without a plant; it waits for the next one
+    IDLE = "idle"  # without a plant; it waits for the next one
     FINISHED = "finished"
     FAILED = "failed"
 

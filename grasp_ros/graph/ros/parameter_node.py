@@ -13,7 +13,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from grasp_ros.graph.parameters import TEXTS
+from grasp_ros.graph.parameters import PARAMETERS
 from grasp_ros.graph.ros import messages
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -34,13 +34,14 @@ class ParameterNode(Node):
     why_read_only = "set at the start only, with -p or a parameter file"
 
     def __init__(self, name: str, **options: Any) -> None:
+        self._in_words = PARAMETERS.get(name, {})
         with _refusing():
             super().__init__(name, **options)
 
     def read_only(self, name: str, default: Any) -> Any:
         """Declare a parameter that is set at start only, and return its value."""
         number = isinstance(default, float)  # for which an integer will do as well
-        descriptor = ParameterDescriptor(description=TEXTS[name], read_only=True, dynamic_typing=number)
+        descriptor = ParameterDescriptor(description=self._in_words[name], read_only=True, dynamic_typing=number)
         value = self._declare(name, default, descriptor)
         if not number:
             return value

@@ -7,9 +7,11 @@ import os
 import sys
 import time
 from array import array
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from inspect import signature
+from itertools import islice
 from typing import Any
 
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
@@ -19,8 +21,8 @@ from std_srvs.srv import Trigger
 
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import init
-from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.graph.ros.life import run
+from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.topics import Topic
@@ -80,7 +82,7 @@ class Remote(GraspNode):
 
     def plant(self, name: str) -> str:
         """Call a service of the plant, and wait for what it promises."""
-        found, goal, deadline = self._status(name), {}, time.monotonic() + PATIENCE_SECONDS
+        found, deadline = self._status(name), time.monotonic() + PATIENCE_SECONDS
         goal = found.get("goal", {})
         while not goal.items() <= found.items():
             before, found = found, self._status("status")
@@ -119,7 +121,7 @@ class Remote(GraspNode):
 
     def echo(self, topic: str, number: str = "0") -> str:
         """Print messages of a topic as they come, a line each; so many, or until a signal."""
-        name, left = self.resolve_topic_name(topic), _whole(number) or -1
+        name, wanted = self.resolve_topic_name(topic), _whole(number) or None
         self._wait(lambda: bool(self.count_publishers(name)), f"nobody publishes {name}")
         [kind, *_] = dict(self.get_topic_names_and_types())[name]
         if kind not in messages.TYPES:
@@ -128,15 +130,18 @@ class Remote(GraspNode):
         qos = messages.glance_qos(Topic(name, kind))
         subscription = self.create_subscription(messages.TYPES[kind], name, found.append, qos)
         try:
-            while left:
-                self._spin()
-                shown, found[:] = found[: left if left > 0 else None], []
-                for message in shown:
-                    print(json.dumps(_plain(message)), flush=True)
-                left -= len(shown) if left > 0 else 0
+            for message in islice(self._coming(found), wanted):
+                print(json.dumps(_plain(message)), flush=True)
         finally:
             self.destroy_subscription(subscription)
         return ""
+
+    def _coming(self, found: list[Any]) -> Iterator[Any]:
+        """What a subscription puts into a list, as it comes."""
+        while True:
+            self._spin()
+            yield from found
+            found.clear()
 
     def _ask(self, kind: Any, name: str, request: Any) -> Any:
         """Answer of a service."""
@@ -170,7 +175,7 @@ def _whole(word: str) -> int:
 
 def _line(status: dict[str, Any]) -> str:
     """A status for a reader."""
-    if status["state"] == "waiting":
+    if status["state"] == Phase.WAITING.value:
         return f"{status['scene']}: {status['words']}"
     return (f"{status['scene']}: {status['state']} at tick {status['tick']} of {status['ticks']},"
             f" t = {status['time_s']:g} s, {status['resets']} resets")
@@ -207,13 +212,14 @@ def _say(remote: Remote, words: Sequence[str]) -> int:
     return 0
 
 
+def _work(nodes: Sequence[GraspNode], _: Sequence[int]) -> None:
+    """Ask once, or be a shell; the exit code is that of the last answer."""
+    [remote] = nodes
+    assert isinstance(remote, Remote)
+    with suppress(Stopped):
+        remote.exit_code = _say(remote, remote.wanted) if remote.wanted else _shell(remote)
+
+
 def main(_: str, received: Sequence[int]) -> int:
-    """Ask once, or be a shell."""
-    init()
-    remote = Remote(received)
-    try:
-        return _say(remote, remote.wanted) if remote.wanted else _shell(remote)
-    except Stopped:
-        return 0
-    finally:
-        remote.end()
+    """Ask, until a signal comes or everything is said."""
+    return run([partial(Remote, received)], received, _work)

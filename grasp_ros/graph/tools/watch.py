@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence, Set
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -18,7 +19,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.graph.view import Moment, View, named
-from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of
 
 FRAME_SECONDS = 0.1
@@ -41,7 +42,7 @@ class Newest:
         self._open: dict[int, dict[Topic, bytes]] = {}
         self._state, self._stale = -1, 0.0  # stamp of the last one, and until when others are not taken
 
-    def put(self, topic: Topic, cdr: bytes, needed: Collection[Topic]) -> None:
+    def put(self, topic: Topic, cdr: bytes, needed: Set[Topic]) -> None:
         """Take a message; `needed` is what belongs to a state."""
         stamp = messages.raw_stamp_ns(cdr)
         if topic == JOINT_STATES:
@@ -53,7 +54,7 @@ class Newest:
             return
         there = self._open.setdefault(stamp, {})
         there[topic] = cdr
-        if len(there) >= len(needed) and there.keys() >= set(needed):
+        if there.keys() >= needed:
             self.found = there
             for older in [other for other in self._open if other <= stamp]:
                 del self._open[older]
@@ -98,15 +99,16 @@ class Watch(GraspNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         if messages.SHORTEST <= len(cdr) <= messages.MOST_BYTES and (topic in self._needed or topic == JOINT_STATES):
-            self.guarded(self._newest.put, topic, cdr, self._needed)
+            self._newest.put(topic, cdr, self._needed)
 
     def _draw(self) -> None:
-        there = {topic for topic in (LYAPUNOV, *CONTACTS.values()) if self.count_publishers(topic.name)}
         held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
-        self._needed = {JOINT_STATES, *there, *(topic for topic in held if self.count_publishers(topic.name))}
+        there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.count_publishers(topic.name))
+        self._needed = {JOINT_STATES, *there}
         alone = not self.count_publishers(JOINT_STATES.name)
         if self._view is not None and self._newest.found:
-            self._live.update(self._view.draw(self._moment(self._newest.found, alone)), refresh=True)
+            with suppress(*messages.UNREADABLE):  # of a sender that says something else
+                self._live.update(self._view.draw(self._moment(self._newest.found, alone)), refresh=True)
         elif alone and time.monotonic() > self._created + PATIENCE_SECONDS:
             self.fail(self._nobody)
 
@@ -123,7 +125,8 @@ class Watch(GraspNode):
             for topics in (COMMANDS, CONTACTS)
         )
         if not self._lockstep:
-            commands = {side: inputs[body] for side, body in self._view.controlled.items()}
+            laws = self._view.scene.system.laws
+            commands = {side: inputs[body] for side, body in SIDES.items() if body in laws}
         level = named(_read(LYAPUNOV, found).position) if LYAPUNOV in found else {}
         words = "the plant has ended" if alone else f"{self._rate:.0f} ticks/s"
         return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)
