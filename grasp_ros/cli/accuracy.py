@@ -20,8 +20,7 @@ from grasp_ros.cli.arguments import (
     load_scene,
     prepare,
 )
-from grasp_ros.cli.commands import COMMANDS
-from grasp_ros.cli.output import STDOUT, bar, destination, show
+from grasp_ros.cli.output import bar, image_format, show, write_figure
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.physics.errors import Refused
 
@@ -31,7 +30,7 @@ MOST_SECONDS = 3600.0
 
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
-    sub = add_command(commands, "accuracy", _accuracy, COMMANDS["accuracy"].text)
+    sub = add_command(commands, "accuracy", _accuracy)
     add_scene(sub)
     sub.add_argument("--error", type=float, metavar="E", help="largest error that you accept, in all states (m, m/s)")
     sub.add_argument("--seconds", type=float, default=SECONDS, metavar="S",
@@ -49,6 +48,7 @@ def _accuracy(options: argparse.Namespace) -> int:
         raise Refused(f"--error {options.error!r} is not allowed; allowed: a number > 0")
     if options.output is not None:
         check_output(options.output, options.force, [options.scene])
+        image_format(options.output)
     contenders, others = own_contenders(scene)
     prepare()
     truth = finest(scene)
@@ -64,12 +64,8 @@ def _accuracy(options: argparse.Namespace) -> int:
         "take": None if advice is None or advice.choice is None else advice.choice._asdict()})
     if options.output is not None:
         from grasp_ros.accuracy.figure import error_against_time
-        from grasp_ros.simulation.plots import format_of, write
 
-        figure = error_against_time(scene, truth, records, advice, options.error)
-        ending = "png" if options.output == STDOUT else format_of(figure, options.output)
-        with destination(options.output) as file:
-            write(figure, file, ending)
+        write_figure(error_against_time(scene, truth, records, advice, options.error), options.output)
     return 0 if advice is None or advice.choice is not None else 1
 
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import STDOUT, note
-from grasp_ros.cli.parser import Command as Command
-from grasp_ros.cli.parser import add_levels
+from grasp_ros.cli.parser import Command, add_levels
 from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
@@ -23,12 +23,12 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 
 Options = argparse.ArgumentParser | argparse._ArgumentGroup
-STUDY_DIRECTORY = Path("runs") / "studies"
 ROW = 16  # numbers that a run keeps for each output time: time, state, commands, energies, and copies
 
 
-def add_command(commands: Any, name: str, command: Command, text: str) -> argparse.ArgumentParser:
-    """Add a subcommand; `command` is what it runs, and returns the exit status."""
+def add_command(commands: Any, name: str, command: Command, text: str = "") -> argparse.ArgumentParser:
+    """Add a subcommand; `command` is what it runs, and returns the exit status. Default text: that of `COMMANDS`."""
+    text = text or COMMANDS[name].text
     sub: argparse.ArgumentParser = commands.add_parser(name, help=text, description=text)
     sub.set_defaults(command=command, parser=sub)
     add_levels(sub)
@@ -117,12 +117,6 @@ def check_output(output: Path, force: bool, inputs: Sequence[str] = ()) -> None:
                 raise Refused(f"-o {output}: is the input; allowed: another file")
         if not force:
             raise Refused(f"{output}: is there; allowed: a new file, or --force to replace it")
-
-
-def add_study_directory(sub: argparse.ArgumentParser) -> None:
-    """Where a study keeps what it has measured."""
-    text = f"records, tables and figures; what is there is not measured again (default {STUDY_DIRECTORY})"
-    add_output(sub, "DIRECTORY", text, STUDY_DIRECTORY)
 
 
 def whole(least: int) -> Callable[[str], int]:

@@ -24,7 +24,7 @@ COMMANDS: dict[str, Entry] = {
     "methods": Entry("simulate", _RUNS, "list the methods of integration"),
     "run": Entry("graph", _GRAPH, "run a scene in four ROS 2 processes and record a bag"),
     "watch": Entry("graph", _GRAPH, "watch a running graph, or a bag, in the terminal"),
-    "ctl": Entry("graph", _GRAPH, "pause, resume, step or reset a running graph"),
+    "ctl": Entry("graph", _GRAPH, "steer a running graph, ask it, set its numbers; or a shell that does"),
     "inspect": Entry("graph", _GRAPH, "print what is in a bag"),
     "verify": Entry("graph", _GRAPH, "simulate a bag again with its recorded inputs, compare every bit"),
     "replay": Entry("graph", _GRAPH, "publish a bag again, with its clock"),

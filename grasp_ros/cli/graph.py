@@ -26,7 +26,7 @@ from grasp_ros.cli.arguments import (
 from grasp_ros.cli.controllers import sides_of
 from grasp_ros.cli.output import show
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
-from grasp_ros.graph.host import check, network
+from grasp_ros.graph.host import check_reach, network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
 
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
-    sub = add_command(commands, "run", _run, "run a scene in four ROS 2 processes and record a bag")
+    sub = add_command(commands, "run", _run)
     add_scene(sub)
     add_accuracy(sub)
     add_output(sub, "DIRECTORY", "new directory for the scene and the bag")
@@ -67,29 +67,29 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--no-figure", action="store_true", help="draw no figure")
     _add_limits(sub)
     _add_network(sub)
-    sub = add_command(commands, "recover", _recover, "make a new bag of one that was cut off or damaged")
+    sub = add_command(commands, "recover", _recover)
     sub.add_argument("bag", type=Path)
     add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
-    sub = add_command(commands, "inspect", _inspect, "print what is in a bag")
+    sub = add_command(commands, "inspect", _inspect)
     sub.add_argument("bag", type=Path)
     add_json(sub)
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
     _add_limits(sub)
-    sub = add_command(commands, "replay", _replay, "publish a bag again, with its clock")
+    sub = add_command(commands, "replay", _replay)
     sub.add_argument("bag", type=Path)
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
     _add_network(sub)
-    sub = add_command(commands, "watch", _watch, "watch a running graph, or a bag, in the terminal")
+    sub = add_command(commands, "watch", _watch)
     sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     _add_network(sub)
-    sub = add_command(commands, "ctl", _ctl, "steer a running graph, ask it, set its numbers; or a shell that does")
+    sub = add_command(commands, "ctl", _ctl)
     sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N]; none: a shell that stays connected")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     _add_network(sub)
-    sub = add_command(commands, "verify", _verify, "simulate a bag again with its recorded inputs, compare every bit")
+    sub = add_command(commands, "verify", _verify)
     sub.add_argument("bag", type=Path)
     add_json(sub)
 
@@ -121,7 +121,7 @@ def _add_network(sub: argparse.ArgumentParser) -> None:
 
 def _reach(options: argparse.Namespace) -> None:
     """Let the processes that come be reached from where the options say, and refuse where none can be."""
-    check(os.environ, alone=getattr(options, "one_process", False))
+    check_reach(os.environ, alone=getattr(options, "one_process", False))
     if options.network:
         os.environ.update(network(os.environ))
 

@@ -27,7 +27,8 @@ Simulate, run, inspect and draw a grasp that collides.
 
 {overview()}
 
-`grasp COMMAND --help` says more; `grasp --version` prints the version. Begin with `grasp simulate case_01`.
+`grasp COMMAND --help` says more; `grasp --version` prints the version.
+Begin with `grasp simulate case_01`.
 """
 
 

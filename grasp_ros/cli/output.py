@@ -7,7 +7,7 @@ import json
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -33,13 +33,11 @@ def note(text: str) -> None:
         print(text, file=sys.stderr)
 
 
-@contextmanager
-def bar(total: float, unit: str, name: str) -> Iterator[Told | None]:
+def bar(total: float, unit: str, name: str) -> AbstractContextManager[Told | None]:
     """A bar on a terminal, see `simulation.progress`; None where there is none."""
     from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
 
-    with showing(not _LEVEL["quiet"], total, unit, name) as told:
-        yield told
+    return showing(not _LEVEL["quiet"], total, unit, name)
 
 
 def show(options: argparse.Namespace, text: str, data: Any) -> None:
@@ -75,3 +73,24 @@ def destination(path: Path) -> Iterator[BinaryIO]:
     with writing("standard output"):
         yield sys.stdout.buffer
         sys.stdout.buffer.flush()
+
+
+def image_format(path: Path) -> str:
+    """Format of the figure of `-o`, before the work; PNG on the standard output.
+
+    Raises
+    ------
+    Refused
+        See `simulation.plots.format_of`.
+    """
+    from grasp_ros.simulation.plots import format_of
+
+    return "png" if path == STDOUT else format_of(path)
+
+
+def write_figure(figure: Any, path: Path) -> None:
+    """A figure into the file of `-o`."""
+    from grasp_ros.simulation.plots import write
+
+    with destination(path) as file:
+        write(figure, file, image_format(path))

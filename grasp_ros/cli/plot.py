@@ -20,8 +20,7 @@ from grasp_ros.cli.arguments import (
     prepare,
     warn,
 )
-from grasp_ros.cli.commands import COMMANDS
-from grasp_ros.cli.output import STDOUT, destination, note
+from grasp_ros.cli.output import STDOUT, image_format, note, write_figure
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
@@ -32,7 +31,7 @@ Span = tuple[float, float] | None
 
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
-    sub = add_command(commands, "plot", _plot, COMMANDS["plot"].text)
+    sub = add_command(commands, "plot", _plot)
     sub.add_argument("sources", metavar="BAG|FILE.npz|SCENE", nargs="+")
     add_settings(sub)
     sub.add_argument("--sampled", action="store_true", help="scenes: hold each command over a control period")
@@ -54,6 +53,8 @@ def _plot(options: argparse.Namespace) -> int:
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
     check_output(output, options.force, options.sources)
+    if not options.animate:
+        image_format(output)
     motions, captions = [], []
     for source in options.sources:
         motion, sampled = _motion(source, options, span)
@@ -73,8 +74,7 @@ def _plot(options: argparse.Namespace) -> int:
         note(f"written to {output}")
         return 0
     figure = plots.compose(motions, captions, width_mm=options.width, span=span)
-    with destination(output) as file:
-        plots.write(figure, file, "png" if output == STDOUT else plots.format_of(figure, output))
+    write_figure(figure, output)
     return 0
 
 

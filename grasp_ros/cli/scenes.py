@@ -18,7 +18,6 @@ from grasp_ros.cli.arguments import (
     complete_scenes,
     load_scene,
 )
-from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import STDOUT, destination, show
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.commented import commented
@@ -29,10 +28,10 @@ DEFAULT = "case_01"
 
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
-    sub = add_command(commands, "scenes", _scenes, COMMANDS["scenes"].text)
+    sub = add_command(commands, "scenes", _scenes)
     complete_scenes(sub.add_argument("scene", nargs="?", help="print this one, as a file, with its comments"))
     add_json(sub)
-    sub = add_command(commands, "new", _new, COMMANDS["new"].text)
+    sub = add_command(commands, "new", _new)
     sub.add_argument("file", metavar="FILE.yaml", type=Path, nargs="?", help="new file; its name is that of the scene")
     complete_scenes(sub.add_argument("--like", metavar="SCENE", default=DEFAULT,
                                      help=f"what it begins with (default {DEFAULT})"))

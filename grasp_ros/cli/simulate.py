@@ -21,7 +21,6 @@ from grasp_ros.cli.arguments import (
     prepare,
     whole,
 )
-from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.controllers import load_controllers
 from grasp_ros.cli.output import STDOUT, bar, destination, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
@@ -37,8 +36,8 @@ TABLE = (".csv",)  # endings of files that are tables; any other is a .npz file
 
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
-    add_json(add_command(commands, "methods", _methods, COMMANDS["methods"].text))
-    sub = add_command(commands, "simulate", _simulate, COMMANDS["simulate"].text)
+    add_json(add_command(commands, "methods", _methods))
+    sub = add_command(commands, "simulate", _simulate)
     add_scene(sub)
     sub.add_argument("--grid", type=whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")

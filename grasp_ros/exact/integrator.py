@@ -127,12 +127,12 @@ class Integrator:
         self._plant_block, self._state_block = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS)
         self._mode = np.array(_UNKNOWN)
         self.plant, self.records = plant_of(self._plant_block), state_of(self._state_block, self._mode)
-        given = system.closed_loop if continuous else system.bodies
-        self.plant.given[:] = given  # `bodies` follow from it
+        bodies = system.closed_loop if continuous else system.bodies
+        self.plant.given[:] = bodies  # `bodies` follow from it
         for body in system.absent:  # what is not there rests at 0 without any force
             self.plant.given[body, Of.MASS] = 1.0
         self.plant.pairs[:], self._plant_block[COULOMB] = system.pairs, system.coulomb
-        self.plant.own[:] = given[:, Of.FORCE]
+        self.plant.own[:] = bodies[:, Of.FORCE]
         self.records.y[:] = *state, state[X.L] - state[X.O], state[X.O] - state[X.R]
         self.records.rest[SINCE] = math.inf
         self._events: list[Array] = []
@@ -214,7 +214,7 @@ class Integrator:
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else given.times("grid", grid)
-        loop = Loop(np.array([float(duration)]), np.array([float(start)]), np.array([0, len(times)]), new_place())
+        loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
         return self.run(loop, times)
 
     def run(self, loop: Loop, grid: Array, rows: Array | None = None) -> Array:

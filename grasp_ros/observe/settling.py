@@ -17,11 +17,12 @@ from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.flight_extremes import first_zero
 from grasp_ros.observe.sight import COUNTS, LOWER, MODES, NONE, STATES, UNDECIDED, UPPER, Kept, Seen, Sight
 from grasp_ros.observe.step_extremes import FIRST, ROW, SQUARE, WORK, expand_quantity, extremes_of
+from grasp_ros.physics import reach as bounds
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of
-from grasp_ros.physics.reach import reach as physics_reach
 
 BISECTIONS = 60
-reach = kernel(physics_reach)
+reach = kernel(bounds.reach)
+
 
 @kernel
 def settled_from(loop: Array, pairs: Array, V_c: float, at_rest: bool, seen: Array) -> float:

@@ -1,4 +1,4 @@
-"""What callers hold in their hands, taken once, at the door: numbers and times of Python, numpy, pandas and xarray.
+"""Arguments of callers, converted and checked once: numbers and times of Python, numpy, pandas and xarray.
 
 Whatever is a real number counts as one, whatever its type; texts, truth values and times where a number is meant do
 not. What is not taken is refused with its name.

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
+
 
 def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
     """Largest displacements of left arm, object and right arm, and largest deformations of both pairs, in m.
@@ -23,13 +25,15 @@ def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
     V_c : float, J
     """
     left = middle = right = 0.0
-    if bodies[0, 0] > 0.0:
-        left = np.sqrt(V_c / bodies[0, 1]) if bodies[0, 1] > 0.0 and bodies[0, 3] == 0.0 else np.inf
-    if bodies[1, 0] > 0.0:
-        right = np.sqrt(V_c / bodies[1, 1]) if bodies[1, 1] > 0.0 and bodies[1, 3] == 0.0 else np.inf
-    u_l = (1.25 * V_c / pairs[0, 0]) ** 0.4 if pairs[0, 0] > 0.0 else np.inf
-    u_r = (1.25 * V_c / pairs[1, 0]) ** 0.4 if pairs[1, 0] > 0.0 else np.inf
-    if bodies[2, 0] > 0.0:
-        enclosed = bodies[0, 0] > 0.0 and bodies[1, 0] > 0.0 and bodies[2, 3] == 0.0
-        middle = max(left + u_l, right + u_r) if enclosed else np.inf
+    if bodies[LEFT, Of.MASS] > 0.0:
+        driven = bodies[LEFT, Of.STIFFNESS] > 0.0 and bodies[LEFT, Of.FORCE] == 0.0
+        left = np.sqrt(V_c / bodies[LEFT, Of.STIFFNESS]) if driven else np.inf
+    if bodies[RIGHT, Of.MASS] > 0.0:
+        driven = bodies[RIGHT, Of.STIFFNESS] > 0.0 and bodies[RIGHT, Of.FORCE] == 0.0
+        right = np.sqrt(V_c / bodies[RIGHT, Of.STIFFNESS]) if driven else np.inf
+    u_l = (1.25 * V_c / pairs[LEFT, Law.HERTZIAN]) ** 0.4 if pairs[LEFT, Law.HERTZIAN] > 0.0 else np.inf
+    u_r = (1.25 * V_c / pairs[RIGHT, Law.HERTZIAN]) ** 0.4 if pairs[RIGHT, Law.HERTZIAN] > 0.0 else np.inf
+    if bodies[OBJECT, Of.MASS] > 0.0:
+        arms = bodies[LEFT, Of.MASS] > 0.0 and bodies[RIGHT, Of.MASS] > 0.0
+        middle = max(left + u_l, right + u_r) if arms and bodies[OBJECT, Of.FORCE] == 0.0 else np.inf
     return left, middle, right, u_l, u_r

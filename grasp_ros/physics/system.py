@@ -98,6 +98,11 @@ class System:
         return [body for body in BODIES if masses[body] == 0.0] if 0.0 in masses else []
 
     @property
+    def absent_columns(self) -> list[int]:
+        """Columns of states (..., 6) of bodies that are not there."""
+        return [COLUMN[body] + part for body in self.absent for part in (0, 1)]
+
+    @property
     def contacts(self) -> list[int]:
         """Sides whose pair can push."""
         hertzian = self.pairs[:, Law.HERTZIAN].tolist()

@@ -87,10 +87,23 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             with path.open("wb") as file:
                 yield file
             return
-        part = path.with_name(f".{path.name[:200]}.{os.getpid()}.part")
+        with replaced(path) as part, part.open("xb") as file:
+            yield file
+
+
+@contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """The name of a file, with the same ending, that takes the place of another one when it is whole.
+
+    Raises
+    ------
+    Refused
+        If it cannot be written; what was there is still there.
+    """
+    part = path.with_name(f".{path.stem[:200]}.{os.getpid()}.part{path.suffix}")
+    with writing(path):
         try:
-            with part.open("xb") as file:
-                yield file
+            yield part
             part.replace(path.resolve())
         finally:
             part.unlink(missing_ok=True)

@@ -15,7 +15,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene.files import writing
+from grasp_ros.scene.files import replaced
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.plots import LEFT_COLOR, MM, OBJECT_COLOR, RIGHT_COLOR, Motion
@@ -56,18 +56,13 @@ def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float
     """
     times = _times(motion, speed, span)
     writer = _writer(path)
-    part = path.with_name(f".{path.stem[:200]}.part{path.suffix}")
-    try:
-        with writing(path), canvas.style():
-            figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
-            animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
-            if path.suffix == ".html":
-                part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
-            else:
-                animation.save(part, writer=writer, fps=RATE, dpi=DPI)
-            part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+    with replaced(path) as part, canvas.style():
+        figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
+        animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
+        if writer == "html":
+            part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
+        else:
+            animation.save(part, writer=writer, fps=RATE, dpi=DPI)
 
 
 def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Array:
@@ -103,7 +98,7 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
         force = impact_force(Contact(*system.pairs[side]), u, d)
         forces[side] = np.maximum.reduceat(force, np.searchsorted(motion.t, times, side="right").clip(1) - 1)
     figure, (line, past) = canvas.subplots(2, 1, figsize=(width_mm / MM, width_mm / MM * HEIGHT_MM / WIDTH_MM),
-                                        height_ratios=(2, 3), layout="constrained")
+                                           height_ratios=(2, 3), layout="constrained")
     low, high = (float(pick(list(positions.values()))) for pick in (np.min, np.max))
     reach = max(high - low, 1e-12)
     bodies, coils = _draw_line(line, list(positions), low - 0.25 * reach, high + 0.25 * reach, THICK * reach)

@@ -45,6 +45,11 @@ def style(own: Mapping[str, Any] | None = None) -> Iterator[None]:
         yield
 
 
+def formats() -> list[str]:
+    """Endings of the files that can be written."""
+    return sorted(FigureCanvasAgg.get_supported_filetypes())
+
+
 def figure(**settings: Any) -> Figure:
     """A new figure, which no window and no `pyplot` knows."""
     new = Figure(**settings)

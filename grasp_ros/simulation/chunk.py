@@ -24,9 +24,8 @@ from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.closed_loop import SampledLoop, drive_external
+from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.lyapunov import check as check_lyapunov
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
@@ -96,7 +95,7 @@ class _Row(NamedTuple):
     stop: str
 
 
-def taken(setup: Setup) -> Setup:
+def checked(setup: Setup) -> Setup:
     """A setup with numbers of Python's own.
 
     Raises
@@ -143,10 +142,11 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
         runs.seen[i], runs.state[i], runs.touches[i], runs.growth[i] = row[:4]
         if row.status is not Status.DONE:
             status[i], stops[i] = STATUSES.index(row.status.name), row.stop
-    for body in variants.scene.system.absent:
-        runs.seen[:, Seen.OUTSIDE + body] = np.nan
-        for place in (COLUMN[body], COLUMN[body] + 1):
-            runs.state[:, place] = runs.seen[:, Seen.LOW + place] = runs.seen[:, Seen.HIGH + place] = np.nan
+    absent = variants.scene.system.absent_columns
+    runs.seen[:, [Seen.OUTSIDE + body for body in variants.scene.system.absent]] = np.nan
+    runs.state[:, absent] = np.nan
+    for first in (Seen.LOW, Seen.HIGH):
+        runs.seen[:, [first + place for place in absent]] = np.nan
     found = {column.name: np.array(column.read(runs)) for column in columns}
     for name, values in found.items():
         values[status != 0 if name not in LAST else status == STATUSES.index(REFUSED)] = np.nan
@@ -189,12 +189,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
     watcher, wanted = None, wanted_by(columns)
     if wanted:
         watcher = watch(integrator, wanted, setup.settled)
-    if sampled:
-        SampledLoop(scene, NO_GRID, {}, None, {}).drive(integrator)
-    elif system.external:
-        drive_external(scene, NO_GRID, integrator)
-    else:
-        integrator.advance(scene.duration)
+    drive(scene, integrator, sampled, NO_GRID)
     touched = integrator.event_table[integrator.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     touches = np.array([(touched == side).sum() for side in (LEFT, RIGHT)], dtype=float)
     row = _Row(np.full(SEEN, np.nan), integrator.state, touches, np.nan, integrator.status, integrator.stop)

@@ -197,3 +197,12 @@ def _rest(grid: Array, tick: int, period_ns: int, state: Array) -> Array:
     """The state (n, 6) at the output times of the last tick and later."""
     later = len(grid) - int(np.searchsorted(grid, tick * period_ns / NANOSECONDS, side="left"))
     return np.repeat(state[None], later, axis=0)
+
+
+def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
+    """States (n, 6) at the output times of a run to its end, as `simulate` drives it; fewer rows if it stops."""
+    if sampled:
+        return SampledLoop(scene, grid, {}, None).drive(integrator)
+    if scene.system.external:
+        return drive_external(scene, grid, integrator)
+    return integrator.advance(scene.duration, grid)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import EPS, LEFT, Entry, Transition
-from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force, penetration
+from grasp_ros.physics.layout import EPS, Entry, Transition
+from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.simulation.smooth import States, expand
+from grasp_ros.simulation.smooth import Quantity, States, expand
 
 UNITS = {
     "begin": "s", "end": "s", "speed_in": "m/s", "speed_out": "m/s", "restitution": "1", "peak_force": "N",
@@ -70,8 +71,8 @@ def contact_table(system: System, event_table: Array, side: int, breaks: Array, 
     group = np.repeat(np.arange(len(spans)), [len(span) - 1 for span in spans])
     begins, ends = (np.concatenate([np.zeros(0), *(span[part] for span in spans)])
                     for part in (slice(None, -1), slice(1, None)))
-    pair, n = _Pair(system, side), len(found)
-    pieces = expand(states, pair.quantities, begins, ends, group)
+    n = len(found)
+    pieces = expand(states, _quantities_of(system, side), begins, ends, group)
     for name, column in (("impulse", 0), ("loss", 1)):
         rows[name] = pieces.integral(column, n) if n else 0.0
     for name, column in (("peak_force", 0), ("deepest", 2)):
@@ -79,21 +80,19 @@ def contact_table(system: System, event_table: Array, side: int, breaks: Array, 
     return rows
 
 
-class _Pair:
+def _quantities_of(system: System, side: int) -> Quantity:
     """Force in N, power lost in W, and penetration in m of one pair."""
+    contact = Contact(*system.pairs[side].tolist())
 
-    def __init__(self, system: System, side: int) -> None:
-        self._contact, self._side = Contact(*system.pairs[side].tolist()), side
-
-    def quantities(self, _: Array, state: Array) -> tuple[Array, Array]:
-        u_l, d_l, u_r, d_r = penetration(np.nan_to_num(state))
-        u, d = (u_l, d_l) if self._side == LEFT else (u_r, d_r)
+    def quantities(_: Array, state: Array) -> tuple[Array, Array]:
+        state = np.nan_to_num(state)
+        [(u, d)] = [(u, d) for other, u, d in pairs_of(system, state) if other == side]
         u = np.maximum(u, 0.0)
-        force, elastic = impact_force(self._contact, u, d), hertzian_force(self._contact, u)
-        rounding = ROUNDINGS * np.abs(np.nan_to_num(state[:, 0::2])).max(axis=1)
-        slope = 1.5 * self._contact.hertzian * np.sqrt(u + rounding)
-        noise = np.stack([slope * rounding * (1.0 + self._contact.dissipation * np.abs(d)),
-                          slope * rounding * self._contact.dissipation * d * d, rounding], axis=1)
+        force, elastic = impact_force(contact, u, d), hertzian_force(contact, u)
+        rounding = ROUNDINGS * np.abs(state[:, 0::2]).max(axis=1)
+        slope = 1.5 * contact.hertzian * np.sqrt(u + rounding)
+        noise = np.stack([slope * rounding * (1.0 + contact.dissipation * np.abs(d)),
+                          slope * rounding * contact.dissipation * d * d, rounding], axis=1)
         return np.stack([force, (force - elastic) * d, u], axis=1), noise
 
-
+    return quantities

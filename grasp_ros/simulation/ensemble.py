@@ -26,7 +26,7 @@ from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
-from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, compute, taken
+from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
@@ -133,7 +133,7 @@ def ensemble(
     Refused
         If a key or an outcome is not known, or a setting is outside its range.
     """
-    setup = taken((setup or Setup())._replace(outcomes=tuple([outcomes] if isinstance(outcomes, str) else outcomes)))
+    setup = checked((setup or Setup())._replace(outcomes=tuple([outcomes] if isinstance(outcomes, str) else outcomes)))
     columns, variants = check(scene, setup), Variants(scene, changes)
     found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}
     status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()

@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
-from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.html import table
-from grasp_ros.simulation.tables import Motion
 
-COLORS = {LEFT: "#0072b2", OBJECT: "#777777", RIGHT: "#d55e00"}
+if TYPE_CHECKING:  # it imports this file
+    from grasp_ros.simulation.trajectory import Trajectory
+
+COLORS: dict[int, str] = {LEFT: "#0072b2", OBJECT: "#777777", RIGHT: "#d55e00"}
 WIDTH, HEIGHT, POINTS = 480, 120, 400  # px, and points of a line
 
 
-class Run(Motion, Protocol):
-    """What is shown, see `trajectory.Trajectory`."""
-
-    @property
-    def stop(self) -> str: ...  # noqa: D102
-
-    @property
-    def at_rest(self) -> float | None: ...  # noqa: D102
-
-    def times(self, kind: Transition, side: int) -> Array: ...  # noqa: D102
-
-
-def html_of_run(run: Run) -> str:
+def html_of_run(run: Trajectory) -> str:
     """A table of the run and its positions as an SVG."""
     touches = ", ".join(f"{NAMES[side]} {len(run.times(Transition.TOUCH, side))}" for side in (LEFT, RIGHT))
     rows = [
@@ -46,10 +35,10 @@ def html_of_run(run: Run) -> str:
     return table(rows) + picture
 
 
-def _picture(run: Run) -> str:
+def _picture(run: Trajectory) -> str:
     """Positions over time."""
     chosen = np.unique(np.linspace(0, len(run.t) - 1, POINTS).round().astype(int))
-    shown = [body for body in COLORS if body not in run.scene.system.absent]
+    shown = run.scene.system.present
     x = {body: run.state[chosen, COLUMN[body]] for body in shown}
     low, high = min(values.min() for values in x.values()), max(values.max() for values in x.values())
     across = (run.t[chosen] - run.t[0]) / (run.t[-1] - run.t[0] or 1.0) * WIDTH

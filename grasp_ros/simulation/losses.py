@@ -15,7 +15,7 @@ from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.simulation.quantities import again, by_output_times
+from grasp_ros.simulation.quantities import by_output_times, watch_again
 from grasp_ros.simulation.trajectory import Trajectory
 
 CAUSES = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
@@ -69,7 +69,7 @@ def running_losses(run: Trajectory) -> tuple[Array, Losses]:
 
 def observed_losses(run: Trajectory, times: Array) -> Losses:
     """Energy lost until each of the times (n,) in s, from 0 on: arrays (n,). An exact run is integrated again."""
-    integrator, watcher = again(run, Wanted.LOSSES)
+    integrator, watcher = watch_again(run, Wanted.LOSSES)
     lost = np.zeros((len(CAUSES), len(times)))
     for k, length in enumerate(np.diff(times).tolist(), 1):
         integrator.advance(length)

@@ -238,12 +238,12 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> None:
     Refused
         If the path has no ending, matplotlib does not know the format, or the file cannot be written.
     """
-    ending = format_of(figure, path)
+    ending = format_of(path)
     with replacing(path) as file:
         write(figure, file, ending, dpi)
 
 
-def format_of(figure: Figure, path: str | os.PathLike[str]) -> str:
+def format_of(path: str | os.PathLike[str]) -> str:
     """Format of an image file, by its ending.
 
     Raises
@@ -251,7 +251,7 @@ def format_of(figure: Figure, path: str | os.PathLike[str]) -> str:
     Refused
         If the path has no ending, or matplotlib does not know the format.
     """
-    known, ending = sorted(figure.canvas.get_supported_filetypes()), Path(path).suffix.removeprefix(".").lower()
+    known, ending = canvas.formats(), Path(path).suffix.removeprefix(".").lower()
     if not ending:
         raise Refused(f"{path}: no ending; allowed: one of {', '.join(known)}")
     if ending not in known:

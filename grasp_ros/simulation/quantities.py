@@ -19,11 +19,11 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.contacts import intervals
+from grasp_ros.simulation.repeat import UNLIMITED
 from grasp_ros.simulation.trajectory import Trajectory
 
 SETTLED = 0.02  # of the largest initial displacement
 HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
-UNLIMITED = 2**62  # budgets of a run that has reached its end before
 
 
 def settled_distance(scene: Scene, part: float = SETTLED) -> float:
@@ -55,7 +55,7 @@ def by_output_times(run: Trajectory) -> bool:
     return run.method != EXACT or run.status is not Status.DONE or run.sampled or bool(run.scene.system.external)
 
 
-def again(run: Trajectory, wanted: Wanted, part: float = SETTLED) -> tuple[Integrator, Watcher]:
+def watch_again(run: Trajectory, wanted: Wanted, part: float = SETTLED) -> tuple[Integrator, Watcher]:
     """An exact run from its begin, and what watches it."""
     integrator = Integrator(
         run.scene.system, continuous=True, accuracy=run.setting, max_events=UNLIMITED, max_work=UNLIMITED)
@@ -68,24 +68,33 @@ def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZ
     Infinite: V_c does not prove it within so many horizons, for which an exact run goes on, or within the output times
     of any other. nan: V_c proves nothing, because it can rise here, or bounds no mass that is not driven to 0.
     """
-    system, distance = run.scene.system, settled_distance(run.scene, part)
-    if run.sampled or run.controllers or system.caveats or not distance > 0.0:
+    if not _may_settle(run, part):
         return np.full(3, np.nan)
     if not by_output_times(run):
-        integrator, watcher = again(run, Wanted.SETTLING, part)
+        integrator, watcher = watch_again(run, Wanted.SETTLING, part)
         integrator.advance(run.scene.duration)
-        return settle(integrator, watcher, run.scene.duration, horizons)[[LEFT, OBJECT, RIGHT]]
+        return settling_from(run, integrator, watcher, part, horizons)
+    system, distance = run.scene.system, settled_distance(run.scene, part)
     ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
     if not np.isfinite(ahead).all():
         return np.full(3, np.nan)
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
 
 
+def _may_settle(run: Trajectory, part: float) -> bool:
+    """Whether V_c cannot rise, and there is a distance to come into."""
+    held = run.sampled or run.controllers or run.scene.system.caveats
+    return not held and settled_distance(run.scene, part) > 0.0
+
+
+def settling_from(run: Trajectory, integrator: Integrator, watcher: Watcher, part: float = SETTLED,
+                  horizons: int = HORIZONS) -> Array:
+    """The same of an exact run that was watched again, from its end on, as far as `settling_times` has it."""
+    if not _may_settle(run, part):
+        return np.full(3, np.nan)
+    return settle(integrator, watcher, run.scene.duration, horizons)[[LEFT, OBJECT, RIGHT]]
+
+
 def contact_intervals(run: Trajectory, side: int) -> Array:
     """Begin and end of every stretch with u > 0 of one side, (n, 2) in s."""
     return intervals(run.event_table, side, float(run.t[-1]) if len(run.t) else 0.0)[:, :2]
-
-
-def impact_forces_of(run: Trajectory) -> Array:
-    """fw of both sides at the output times, (n, 2) in N: `Trajectory.impacts`."""
-    return run.impacts

@@ -7,7 +7,7 @@ used again as they are, whatever gave them; otherwise the laws of the scene answ
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,59 +16,26 @@ from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Entry
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.closed_loop import outputs_within
 from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.solve import How, solve
 from grasp_ros.simulation.ticks import tick_of, tick_times
 
+if TYPE_CHECKING:  # it imports this file
+    from grasp_ros.simulation.trajectory import Trajectory
+
 UNLIMITED = 2**62  # budgets of a run that has been there before
 
 
-class Run(Protocol):
-    """What a run must tell to be repeated, see `trajectory.Trajectory`."""
-
-    @property
-    def scene(self) -> Scene: ...  # noqa: D102
-
-    @property
-    def t(self) -> Array: ...  # noqa: D102
-
-    @property
-    def state(self) -> Array: ...  # noqa: D102
-
-    @property
-    def event_table(self) -> Array: ...  # noqa: D102
-
-    @property
-    def command(self) -> Array: ...  # noqa: D102
-
-    @property
-    def sampled(self) -> bool: ...  # noqa: D102
-
-    @property
-    def controllers(self) -> object: ...  # noqa: D102
-
-    @property
-    def method(self) -> str: ...  # noqa: D102
-
-    @property
-    def setting(self) -> float: ...  # noqa: D102
-
-    @property
-    def status(self) -> Status: ...  # noqa: D102
-
-
-def reached(run: Run) -> float:
+def reached(run: Trajectory) -> float:
     """Time in s up to which a run is known."""
     if run.status is Status.DONE:
         return run.scene.duration
     return float(max([0.0, *run.t[-1:], *run.event_table[-1:, 0]]))
 
 
-def states_at(run: Run, times: Array) -> Array:
+def states_at(run: Trajectory, times: Array) -> Array:
     """States (..., 6) at any times (...) in s of a run: those of the run with these output times, bit for bit.
 
     Raises
@@ -90,7 +57,7 @@ def states_at(run: Run, times: Array) -> Array:
     return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
 
 
-def breaks_of(run: Run) -> Array:
+def breaks_of(run: Trajectory) -> Array:
     """Times (k,) in s between which a run is smooth: its begin and end, its events, and changes of its inputs."""
     scene, end = run.scene, reached(run)
     times = [np.array([0.0, end]), run.event_table[:, Entry.TIME]]
@@ -103,7 +70,7 @@ def breaks_of(run: Run) -> Array:
     return np.asarray(found[found <= end])
 
 
-def _again(run: Run, grid: Array) -> Array:
+def _again(run: Trajectory, grid: Array) -> Array:
     """States (n, 6) at ascending times; fewer if the run stops."""
     if run.sampled and _every_tick(run, grid[-1:]):
         return _with_commands(run, grid)
@@ -115,13 +82,13 @@ def _again(run: Run, grid: Array) -> Array:
     return solve(run.scene, grid, how)[0].state
 
 
-def _every_tick(run: Run, last: Array) -> bool:
+def _every_tick(run: Trajectory, last: Array) -> bool:
     """Whether the output times hold every control period up to a time."""
     ticks = tick_times(run.scene)[: int(tick_of(run.scene, last).max(initial=0)) + 1]
     return bool(np.isin(ticks, run.t).all())
 
 
-def _with_commands(run: Run, grid: Array) -> Array:
+def _with_commands(run: Trajectory, grid: Array) -> Array:
     """The same under the commands that were recorded."""
     scene, last = run.scene, int(tick_of(run.scene, grid[-1:]).max(initial=0))
     count = min(last + 1, scene.ticks)
@@ -134,6 +101,5 @@ def _with_commands(run: Run, grid: Array) -> Array:
     states = plant.follow(answers, outputs)
     if plant.status is Status.DONE:
         states = np.concatenate([states, np.repeat(plant.state[None], len(grid) - len(states), axis=0)])
-    for body in scene.system.absent:
-        states[:, COLUMN[body] : COLUMN[body] + 2] = np.nan
+    states[:, scene.system.absent_columns] = np.nan
     return states

@@ -12,7 +12,6 @@ from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.closed_loop import Changes, Progress, SampledLoop, drive_external
 from grasp_ros.simulation.ticks import Loop
@@ -41,6 +40,5 @@ def solve(
     problem = Problem(scene.system, scene.duration, grid, how.setting, how.max_events, how.max_work, how.sampled, drive,
                       None if loop else progress)
     found = METHODS[how.method].solve(problem)
-    for body in scene.system.absent:
-        found.state[:, COLUMN[body] : COLUMN[body] + 2] = float("nan")
+    found.state[:, scene.system.absent_columns] = float("nan")
     return found, None if loop is None else loop.record()

@@ -2,22 +2,38 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.losses import losses
-from grasp_ros.simulation.quantities import HORIZONS, by_output_times, settling_times
+from grasp_ros.simulation.losses import CAUSES, Losses, losses
+from grasp_ros.simulation.outcomes import Runs, find, wanted_by
+from grasp_ros.simulation.quantities import HORIZONS, by_output_times, settling_from, settling_times, watch_again
+from grasp_ros.simulation.repeat import UNLIMITED
 from grasp_ros.simulation.trajectory import Trajectory
 
 MOTION, OUTPUTS = "motion", "output times"  # what a number is of
 ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
+FORCES = ("f_l", "f_r", "fw_l", "fw_r")
+PEAKS = find(("peak_input", "peak_impact"))  # in the order of FORCES
+NONE = np.zeros((1, 2))
+
+
+class _Observed(NamedTuple):
+    """What was seen of a run."""
+
+    settled: Array  # (3,), s: left arm, object, right arm
+    lost: Losses
+    largest_of: str
+    largest: list[float]  # N, see FORCES
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -52,23 +68,32 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
     if not METHODS[run.method].energy_check:
         found["V_c_rise_J"] = float((level - np.minimum.accumulate(level)).max())
-    times = settling_times(run)
-    if not np.isnan(times).any():
-        found["settled_s"] = {NAMES[body]: float(times[COLUMN[body] // 2]) for body in system.present}
+    observed = _by_output_times(run) if by_output_times(run) else _of_the_motion(run)
+    if not np.isnan(observed.settled).any():
+        found["settled_s"] = {NAMES[body]: float(observed.settled[COLUMN[body] // 2]) for body in system.present}
         found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
-    found["largest_of"], found["largest_N"] = _largest(run)
+    found["largest_of"], found["largest_N"] = observed.largest_of, dict(zip(FORCES, observed.largest, strict=True))
     if len(run.t) > 1 and not system.external:
-        found["lost_J"] = {cause: float(value) for cause, value in losses(run)._asdict().items()}
+        found["lost_J"] = {cause: float(value) for cause, value in observed.lost._asdict().items()}
         found["lost_by"] = OUTPUTS if by_output_times(run) else MOTION
     return found
 
 
-def _largest(run: Trajectory) -> tuple[str, dict[str, float]]:
-    """Largest inputs and impact forces in N: of the motion itself if it can be watched once more, or at the outputs."""
-    names = ("f_l", "f_r", "fw_l", "fw_r")
+def _of_the_motion(run: Trajectory) -> _Observed:
+    """Of an exact run under continuous feedback, from its closed forms and polynomials: it is integrated once more."""
+    integrator, watcher = watch_again(run, Wanted.LOSSES | Wanted.SETTLING | wanted_by(PEAKS))
+    integrator.advance(run.scene.duration)
+    watcher.finish()
+    seen = watcher.seen.copy()
+    largest = [float(peak.read(Runs(seen[None], run.state, NONE, NONE))[0]) for peak in PEAKS]
+    return _Observed(settling_from(run, integrator, watcher), Losses(*seen[CAUSES]), MOTION, largest)
+
+
+def _by_output_times(run: Trajectory) -> _Observed:
+    """Of any other run; the largest forces are those of the motion where it can be watched once more."""
+    where, largest = OUTPUTS, [*np.abs(run.command).max(axis=0).tolist(), *run.impacts.max(axis=0).tolist()]
     if run.method == EXACT and run.status is Status.DONE and not run.controllers:
-        setup = Setup(accuracy=run.setting, sampled=run.sampled)
-        columns = ensemble(run.scene, {}, ("peak_input", "peak_impact"), setup=setup, threads=1).columns
-        return MOTION, dict(zip(names, (float(column[0]) for column in columns.values()), strict=True))
-    inputs, impacts = np.abs(run.command).max(axis=0), run.impacts.max(axis=0)
-    return OUTPUTS, dict(zip(names, [*inputs.tolist(), *impacts.tolist()], strict=True))
+        setup = Setup(accuracy=run.setting, sampled=run.sampled, max_events=UNLIMITED, max_work=UNLIMITED)
+        columns = ensemble(run.scene, {}, [peak.name for peak in PEAKS], setup=setup, threads=1).columns
+        where, largest = MOTION, [float(column[0]) for column in columns.values()]
+    return _Observed(settling_times(run), losses(run), where, largest)

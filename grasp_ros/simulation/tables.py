@@ -3,58 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, BinaryIO, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import Energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene import Scene
 from grasp_ros.scene.parameter import UNITS as KEYS
+
+if TYPE_CHECKING:  # it imports this file
+    from grasp_ros.simulation.trajectory import Trajectory
 
 TIME = ("t", "s", "time")
 _ENDINGS = {unit: ending for ending, unit in reversed(KEYS.items())} | {"J": "_J", "W": "_W", "1": ""}
-
-
-class Motion(Protocol):
-    """What a table is made of, see `trajectory.Trajectory`."""
-
-    @property
-    def scene(self) -> Scene: ...  # noqa: D102
-
-    @property
-    def t(self) -> Array: ...  # noqa: D102
-
-    @property
-    def state(self) -> Array: ...  # noqa: D102
-
-    @property
-    def command(self) -> Array: ...  # noqa: D102
-
-    @property
-    def inputs(self) -> Array: ...  # noqa: D102
-
-    @property
-    def impacts(self) -> Array: ...  # noqa: D102
-
-    @property
-    def energy(self) -> Energy: ...  # noqa: D102
-
-    @property
-    def energy_of(self) -> str: ...  # noqa: D102
-
-    @property
-    def method(self) -> str: ...  # noqa: D102
-
-    @property
-    def setting(self) -> float: ...  # noqa: D102
-
-    @property
-    def status(self) -> Status: ...  # noqa: D102
 
 
 class Column(NamedTuple):
@@ -63,14 +27,14 @@ class Column(NamedTuple):
     name: str
     unit: str
     text: str
-    read: Callable[[Motion, Energy], Array]
+    read: Callable[[Trajectory, Energy], Array]
 
 
-def _place(name: str, place: int) -> Callable[[Motion, Energy], Array]:
+def _place(name: str, place: int) -> Callable[[Trajectory, Energy], Array]:
     return lambda motion, _: np.asarray(getattr(motion, name))[:, place]
 
 
-def _level(name: str) -> Callable[[Motion, Energy], Array]:
+def _level(name: str) -> Callable[[Trajectory, Energy], Array]:
     return lambda _, level: np.asarray(getattr(level, name))
 
 
@@ -93,21 +57,21 @@ COLUMNS: tuple[Column, ...] = (
 )
 
 
-def values_of(motion: Motion) -> dict[str, Array]:
+def values_of(motion: Trajectory) -> dict[str, Array]:
     """Values (n,) of each column."""
     level = motion.energy
     return {column.name: column.read(motion, level) for column in COLUMNS}
 
 
-def about(motion: Motion) -> dict[str, Any]:
-    """What the numbers are of."""
+def attributes_of(motion: Trajectory) -> dict[str, Any]:
+    """What the table is of."""
     return {
         "title": motion.scene.title, "scene": motion.scene.name, "scene_yaml": motion.scene.to_yaml(),
         "method": motion.method, "setting": motion.setting, "status": motion.status.name, "energy_of": motion.energy_of,
     }
 
 
-def dataset_of(motion: Motion) -> Any:
+def dataset_of(motion: Trajectory) -> Any:
     """See `trajectory.Trajectory.dataset`."""
     try:
         import xarray
@@ -118,18 +82,19 @@ def dataset_of(motion: Motion) -> Any:
     return xarray.Dataset(
         {column.name: (name, values[column.name], {"units": column.unit, "long_name": column.text})
          for column in COLUMNS},
-        {name: (name, motion.t, {"units": unit, "long_name": text})}, about(motion),
+        {name: (name, motion.t, {"units": unit, "long_name": text})}, attributes_of(motion),
     )
 
 
-def dataframe_of(motion: Motion) -> Any:
+def dataframe_of(motion: Trajectory) -> Any:
     """See `trajectory.Trajectory.dataframe`."""
     frame = frame_of({TIME[0]: motion.t, **values_of(motion)}).set_index(TIME[0])
-    frame.attrs = {**about(motion), "units": {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}}
+    units = {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}
+    frame.attrs = {**attributes_of(motion), "units": units}
     return frame
 
 
-def write_csv(motion: Motion, file: BinaryIO) -> None:
+def write_csv(motion: Trajectory, file: BinaryIO) -> None:
     """See `trajectory.Trajectory.to_csv`; numbers have all their digits."""
     heads = [TIME[0] + _ENDINGS[TIME[1]], *(column.name + _ENDINGS[column.unit] for column in COLUMNS)]
     write_rows(file, heads, [motion.t, *values_of(motion).values()])

@@ -73,13 +73,12 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
 def _check(found: Trajectory) -> None:
     """Refuse numbers that no run has."""
     events, end, done = found.event_table, found.scene.duration, found.status is Status.DONE
-    there = [body for body in COLUMN if body not in found.scene.system.absent]
-    columns = [COLUMN[body] + k for body in there for k in (0, 1)]
-    absent = np.delete(found.state, columns, axis=1)
+    gone = found.scene.system.absent_columns
+    there, absent = np.delete(found.state, gone, axis=1), found.state[:, gone]
     acted = found.scene.ticks if found.sampled else 0
     for name, good, allowed in (
         ("t", _ascending(found.t, end), "ascending times within the horizon"),
-        ("state", not done or np.isfinite(found.state[:, columns]).all(), "finite numbers"),
+        ("state", not done or np.isfinite(there).all(), "finite numbers"),
         ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
         ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
         ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),

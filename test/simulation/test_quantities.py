@@ -16,7 +16,6 @@ from grasp_ros.simulation.quantities import (
     HORIZONS,
     by_output_times,
     contact_intervals,
-    impact_forces_of,
     last_outside,
     settling_times,
 )
@@ -99,7 +98,7 @@ def test_contacts_of_case_1() -> None:
     for side in (LEFT, RIGHT):
         spans = contact_intervals(run, side)
         inside = ((run.t[:, None] > spans[:, 0]) & (run.t[:, None] < spans[:, 1])).any(axis=1)
-        assert np.array_equal(impact_forces_of(run)[:, side] > 0.0, inside)
+        assert np.array_equal(run.impacts[:, side] > 0.0, inside)
     begun = simulate(scenes.load("case_01", ["left_arm.position_m=0.01"]))
     assert contact_intervals(begun, LEFT)[0, 0] == 0.0
 
