@@ -17,7 +17,7 @@ PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "ruamel", "scipy", "sksundae"
 ABOUT = "Measure, and print what was measured. Those with --docs write a page; `make study` writes all pages."
 COMMANDS = (
     proofs.add_paper, proofs.add_domain, proofs.add_certificate, proofs.add_hard, proofs.add_fuzz,
-    accuracy.add_accuracy, accuracy.add_advise, accuracy.add_prediction, accuracy.add_derivatives,
+    accuracy.add_accuracy, accuracy.add_prediction, accuracy.add_derivatives,
     accuracy.add_speed,
     costs.add_effects, costs.add_loop, costs.add_recorder, maps.add_maps, maps.add_many,
     graph.add_graph, graph.add_free_running, graph.add_steering, proofs.add_faults, proofs.add_doors,

@@ -22,7 +22,7 @@ class Advice(NamedTuple):
 
     choice: Record | None
     others: list[Record]  # the best of other methods, the fastest first
-    closest: Record  # the most accurate of all
+    closest: Record  # the most accurate of all for an error, the fastest for a budget
 
 
 def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort: Effort = QUICK,
@@ -84,19 +84,58 @@ def fastest(records: Iterable[Record], error: float) -> Record | None:
     return min(reached, key=lambda record: record.time, default=None)
 
 
-def advise(records: Iterable[Record], error: float) -> Advice:
-    """The fastest setting that reaches an error; runs that miss touches or stop early are no choice.
+def within(records: Iterable[Record], budget: float) -> Record | None:
+    """The sound record with the least error of those that take no longer than a budget in s."""
+    affordable = [record for record in records if record.sound and record.time <= budget]
+    return min(affordable, key=lambda record: (record.error or 0.0, record.time), default=None)
+
+
+def advise(records: Iterable[Record], error: float | None = None, budget: float | None = None) -> Advice:
+    """The fastest setting that reaches an error, or the most accurate one within a budget.
+
+    Runs that miss touches or stop early are no choice.
+
+    Parameters
+    ----------
+    records : iterable of Record
+        Of one scene.
+    error : float, m and m/s
+    budget : float, s
+        Exactly one of the two is given, and positive.
 
     Raises
     ------
     Refused
-        If the error is not positive, or nothing has a result.
+        If it is not so, or nothing has a result.
     """
-    if not error > 0.0:
-        raise Refused(f"--error {error!r} is not allowed; allowed: a number > 0")
+    check_wish(error, budget)
     groups = by_method(record for record in records if record.sound)
     if not groups:
         raise Refused("no method has a result on this scene")
-    best = sorted((found for group in groups.values() if (found := fastest(group, error))), key=lambda r: r.time)
     sound = [record for group in groups.values() for record in group]
-    return Advice(best[0] if best else None, best[1 : 1 + OTHERS], min(sound, key=lambda r: r.error or 0.0))
+    if error is not None:
+        found = (fastest(group, error) for group in groups.values())
+        best = sorted((record for record in found if record), key=lambda r: r.time)
+        return Advice(*_split(best), min(sound, key=lambda r: r.error or 0.0))
+    found = (within(group, budget or 0.0) for group in groups.values())
+    best = sorted((record for record in found if record), key=lambda r: (r.error or 0.0, r.time))
+    return Advice(*_split(best), min(sound, key=lambda r: r.time))
+
+
+def _split(best: Sequence[Record]) -> tuple[Record | None, list[Record]]:
+    """The choice and what comes after it."""
+    return (best[0] if best else None), list(best[1 : 1 + OTHERS])
+
+
+def check_wish(error: float | None, budget: float | None) -> None:
+    """Refuse a wish that is not one positive number.
+
+    Raises
+    ------
+    Refused
+    """
+    for name, wish in (("--error", error), ("--budget", budget)):
+        if wish is not None and not wish > 0.0:
+            raise Refused(f"{name} {wish!r} is not allowed; allowed: a number > 0")
+    if (error is None) == (budget is None):
+        raise Refused("--error, --budget: allowed: exactly one of them")

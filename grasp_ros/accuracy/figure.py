@@ -16,13 +16,15 @@ CHOSEN = "#d55e00"
 
 
 def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], advice: Advice | None,
-                       error: float | None) -> Figure:
-    """A figure of all sound records, with the limit of what can be known, the error that is wanted, and the choice."""
+                       error: float | None, budget: float | None = None) -> Figure:
+    """A figure of all sound records, with the limit of what can be known, what is wanted, and the choice."""
     with canvas.style():
         figure, axes = canvas.subplots(figsize=(8.0, 5.2), layout="constrained")
         _draw_methods(axes, truth, records)
         if error is not None:
             axes.axvline(error, color=CHOSEN, linewidth=0.8, linestyle="--")
+        if budget is not None:
+            axes.axhline(1e3 * budget, color=CHOSEN, linewidth=0.8, linestyle="--")
         if advice is not None and advice.choice is not None:
             choice = advice.choice
             axes.plot(max(choice.error or 0.0, truth.uncertainty), 1e3 * choice.time, "o", markersize=13,

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, compare, fastest
+from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest
 from grasp_ros.accuracy.contender import own_contenders
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
@@ -33,6 +33,7 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "accuracy", _accuracy)
     add_scene(sub)
     sub.add_argument("--error", type=float, metavar="E", help="largest error that you accept, in all states (m, m/s)")
+    sub.add_argument("--budget", type=float, metavar="S", help="longest time in s that a simulation may take")
     sub.add_argument("--seconds", type=float, default=SECONDS, metavar="S",
                      help=f"after which no measurement begins (default {SECONDS:g})")
     add_output(sub, "FIGURE", "draw error against time, .png, .svg or .pdf; - is the standard output")
@@ -44,8 +45,9 @@ def _accuracy(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene, options.settings)
     if not 0.0 < options.seconds <= MOST_SECONDS:
         raise Refused(f"--seconds {options.seconds!r} is not allowed; allowed: > 0 and <= {MOST_SECONDS:g}")
-    if options.error is not None and not options.error > 0.0:
-        raise Refused(f"--error {options.error!r} is not allowed; allowed: a number > 0")
+    wished = options.error is not None or options.budget is not None
+    if wished:
+        check_wish(options.error, options.budget)
     if options.output is not None:
         check_output(options.output, options.force, [options.scene])
         image_format(options.output)
@@ -54,10 +56,10 @@ def _accuracy(options: argparse.Namespace) -> int:
     truth = finest(scene)
     with bar(options.seconds, "s", scene.name) as told:
         records = compare(scene, contenders, truth, seconds=options.seconds, progress=told)
-    advice = None if options.error is None else advise(records, options.error)
+    advice = advise(records, options.error, options.budget) if wished else None
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
     text = [*_table(truth, records), *(f"not here: {reason}" for reason in others.values()),
-            *([] if advice is None else _advice(again, options.error, truth, advice))]
+            *([] if advice is None else _advice(again, _wish(options), truth, advice))]
     show(options, "\n".join(text), {
         "scene": scene.name, "uncertainty": truth.uncertainty, "touches": truth.touches, "not_here": others,
         "records": [record._asdict() for record in records],
@@ -65,7 +67,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     if options.output is not None:
         from grasp_ros.accuracy.figure import error_against_time
 
-        write_figure(error_against_time(scene, truth, records, advice, options.error), options.output)
+        write_figure(error_against_time(scene, truth, records, advice, options.error, options.budget), options.output)
     return 0 if advice is None or advice.choice is not None else 1
 
 
@@ -88,10 +90,15 @@ def _table(truth: Truth, records: Sequence[Record]) -> list[str]:
     return lines
 
 
-def _advice(scene: str, error: float, truth: Truth, advice: Advice) -> list[str]:
+def _wish(options: argparse.Namespace) -> str:
+    """What is wanted, as it follows "no method reaches"."""
+    return f"a time of {options.budget:g} s" if options.error is None else f"an error of {options.error:g}"
+
+
+def _advice(scene: str, wish: str, truth: Truth, advice: Advice) -> list[str]:
     """What to take."""
     if advice.choice is None:
-        return [f"no method reaches an error of {error:g}; closest: {_in_words(advice.closest, truth)}"]
+        return [f"no method reaches {wish}; closest: {_in_words(advice.closest, truth)}"]
     choice = advice.choice
     return [
         f"take: {_in_words(choice, truth)}", *(f"or:   {_in_words(record, truth)}" for record in advice.others),

@@ -1,4 +1,4 @@
-"""The studies of error against time: `accuracy`, `advise`, `prediction`, `derivatives` and `speed`."""
+"""The studies of error against time: `accuracy`, `prediction`, `derivatives` and `speed`."""
 
 from __future__ import annotations
 
@@ -65,27 +65,6 @@ def _accuracy_page(options: argparse.Namespace, docs: Path) -> int:
     prepare()
     print(f"written to {accuracy_page.write(docs, options.output, options.quick)}")
     return 0
-
-
-def add_advise(commands: Any) -> Parser:
-    """`python -m lab advise`."""
-    sub = add_command(commands, "advise", _advise, "which method, with which setting, on this machine")
-    add_scene(sub)
-    sub.add_argument("--error", type=float, help="largest error that is acceptable, in all states (m, m/s)")
-    sub.add_argument("--budget", type=float, metavar="SECONDS", help="longest time that a simulation may take")
-    sub.add_argument("--quick", action="store_true", help="fewer settings: an answer in seconds")
-    add_study_directory(sub)
-    return sub
-
-
-def _advise(options: argparse.Namespace) -> int:
-    from lab.studies import adviser
-
-    scene = load_scene(options.scene, options.settings)
-    prepare()
-    advice, text = adviser.run(scene, options.output, options.error, options.budget, options.quick)
-    print(text)
-    return 0 if advice.choice is not None else 1
 
 
 def add_prediction(commands: Any) -> Parser:

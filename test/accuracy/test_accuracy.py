@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from pathlib import Path
 from typing import Any
@@ -85,11 +86,25 @@ def test_advice_is_the_fastest_sound_run_within_the_error() -> None:
     nobody = advise([slow, good], 1e-12)
     assert (nobody.choice, nobody.closest) == (None, slow)
     assert fastest([lucky, good, slow], 1e-9) is slow
-    for error in (0.0, float("nan")):
-        with pytest.raises(Refused, match="allowed: a number > 0"):
-            advise([good], error)
     with pytest.raises(Refused, match="no method has a result"):
         advise([cut], 1.0)
+
+
+def test_advice_within_a_budget_is_the_most_accurate() -> None:
+    good, slow = record("good", 1e-7, 1.0), record("slow", 1e-10, 5.0)
+    assert advise([slow, good], budget=2.0).choice is good
+    both = advise([slow, good], budget=9.0)
+    assert (both.choice, both.others) == (slow, [good])
+    none = advise([slow, good], budget=0.5)
+    assert (none.choice, none.closest) == (None, good)
+
+
+@pytest.mark.parametrize("wish", [
+    {}, {"error": 1.0, "budget": 1.0}, {"error": 0.0}, {"error": math.nan}, {"budget": math.nan}, {"budget": -1.0},
+])
+def test_advice_needs_one_positive_wish(wish: dict[str, float]) -> None:
+    with pytest.raises(Refused, match=r"--(error|budget).* allowed: (exactly one of them|a number > 0)"):
+        advise([record("a", 1.0, 1.0)], **wish)
 
 
 def test_methods_that_do_not_know_a_scene_are_named() -> None:
@@ -112,5 +127,9 @@ def test_the_command_answers_with_a_command_and_a_picture(command: Any, tmp_path
     assert "no method reaches an error of 1e-30; closest: exact" in too_much.stdout
     found = json.loads(command("accuracy", "noise", "--set", "time.duration_s=0.5", "--json").stdout)
     assert {entry["method"] for entry in found["records"]} == {"exact"}
+    in_time = command(*words, "--budget", "10")
+    assert in_time.stdout.splitlines()[-1].startswith("grasp simulate case_01 ")
+    assert command(*words, "--budget", "1e-9").returncode == 1
     assert command(*words, "--error", "0").returncode == 2
+    assert command(*words, "--error", "1", "--budget", "1").returncode == 2
     assert command(*words[:-1], "inf").returncode == 2

@@ -16,17 +16,16 @@ from processes import DEADLINE, START, wait_for
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from rclpy.serialization import serialize_message
+from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene
-from grasp_ros.graph import bag
+from grasp_ros.graph import bag, rosbag2
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
-from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import laws_of
-from grasp_ros.scene.topics import CHANGES
+from grasp_ros.scene.topics import CHANGES, NAMED_LIST
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
 
@@ -111,11 +110,12 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: 
 def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:
     run = simulate(scene.load("arm_alone", ["time.duration_s=0.004"]), sampled=True)
     writer = bag.Recorder(tmp_path / "bag", run.scene, {})
-    numbers = run.scene.numbers_of("left_controller")
+    numbers, types = run.scene.numbers_of("left_controller"), get_typestore(Stores.ROS2_JAZZY)
     for tick, (time_ns, rows, own) in enumerate(recorder.ticks_of(run)):
         values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
-        said = serialize_message(messages.named_list(time_ns, list(numbers), [*values], 1 + 2 * tick))
-        beside = [(CHANGES["left"], said)] if tick < 3 else []
+        said = types.deserialize_cdr(rosbag2.list_message(time_ns, list(numbers), values), NAMED_LIST)
+        said.header.frame_id = str(1 + 2 * tick)  # its number
+        beside = [(CHANGES["left"], bytes(types.serialize_cdr(said, NAMED_LIST)))] if tick < 3 else []
         writer.write_tick(time_ns, [*beside, *rows], own)
     writer.close()
     recording = bag.read(tmp_path / "bag")

@@ -35,19 +35,6 @@ def test_page_quick_has_all_sections_and_figures(lab_command: Any, tmp_path: Pat
     assert "275.0566374 ms" in text
 
 
-def test_advise_answers_with_a_command(lab_command: Any) -> None:
-    wish = ("advise", "case_01", "--set", "time.duration_s=0.5", "--quick", "-o", "out")
-    result = lab_command(*wish, "--error", "1e-6")
-    assert result.returncode == 0, result.stderr
-    assert "\nthat is: grasp simulate case_01 --method " in result.stdout
-    too_much = lab_command(*wish, "--error", "1e-30")
-    assert too_much.returncode == 1
-    assert "no method reaches it; closest: " in too_much.stdout
-    neither = lab_command(*wish)
-    assert neither.returncode == 2
-    assert "--error, --budget: allowed: exactly one of them" in neither.stderr
-
-
 def test_maps_quick_writes_its_page_and_figures(lab_command: Any, tmp_path: Path) -> None:
     for _ in range(2):  # the second time from what is there
         result = lab_command("maps", "--quick", "--docs", "docs", "-o", "runs")
