@@ -25,17 +25,17 @@ from grasp_ros.scene.strict_yaml import MOST_NODES
 from grasp_ros.simulation import plots, simulate
 from lab.studies.records import Journal, digest
 
-SECONDS = 10.0  # no door takes longer
+SECONDS = 10.0  # of this process; no door takes longer
 CASE = scenes.load("case_01").to_yaml()
 DURATION = "duration_s: 20.0"
 
 
 def said(text: str) -> str:
     """What refuses the text of a scene."""
-    begin = time.monotonic()
+    begin = time.process_time()
     with pytest.raises(scenes.SceneError) as caught:
         scenes.parse(text, "mine", "mine.yaml")
-    assert time.monotonic() - begin < SECONDS
+    assert time.process_time() - begin < SECONDS
     assert len(str(caught.value)) < LONGEST + 100
     return str(caught.value)
 
