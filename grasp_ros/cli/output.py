@@ -33,7 +33,7 @@ def note(text: str) -> None:
         print(text, file=sys.stderr)
 
 
-def bar(total: float, unit: str, name: str) -> AbstractContextManager[Told | None]:
+def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Told | None]:
     """A bar on a terminal, see `simulation.progress`; None where there is none."""
     from grasp_ros.simulation.progress import showing  # with the compiler, which a graph does not need
 

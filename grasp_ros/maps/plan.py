@@ -63,7 +63,7 @@ def read_axis(option: str, text: str) -> Axis:
         "allowed: section.key=low:high, keys of one value joined by +, :n behind it for n >= 2 values, and :log behind"
         " that for a scale > 0"
     )
-    match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d+)(?::(log))?)?", text)
+    match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d*)(?::(log))?)?", text)
     if match is None:
         raise Refused(f"{option} {text}: not understood; {allowed}")
     name, low, high, points, log = match.groups()

@@ -23,14 +23,14 @@ def anybody_looks() -> bool:
 
 
 @contextmanager
-def showing(progress: Told | bool | None, total: float, unit: str, name: str) -> Iterator[Told | None]:
+def showing(progress: Told | bool | None, total: float | None, unit: str, name: str) -> Iterator[Told | None]:
     """What is to be told how far a computation is: what a caller gave, a bar in place of True, or nothing.
 
     Parameters
     ----------
     progress : callable, bool or None
-    total : float
-        What the last call says.
+    total : float, optional
+        What the last call says, where it is known.
     unit : str
     name : str
         Stands in front of the bar.

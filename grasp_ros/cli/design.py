@@ -1,0 +1,109 @@
+"""`grasp design`: numbers of a scene, chosen for an outcome."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from grasp_ros.cli.arguments import (
+    add_accuracy,
+    add_command,
+    add_force,
+    add_json,
+    add_output,
+    add_scene,
+    check_output,
+    load_scene,
+    prepare,
+    whole,
+)
+from grasp_ros.cli.output import bar, destination, image_format, show, write_figure
+from grasp_ros.physics.errors import Refused
+from grasp_ros.simulation.outcomes import GROUPS
+
+if TYPE_CHECKING:
+    from grasp_ros.maps.plan import Axis
+
+END = "  an end of its range: a wider one may have a better choice"
+NEAR = 1e-6  # of a range
+RANGE = "section.key[+section.key]=low:high[::log]"
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommand."""
+    sub = add_command(commands, "design", _design)
+    add_scene(sub)
+    sub.add_argument("--free", action="append", required=True, metavar=RANGE,
+                     help="number to choose within a range; keys of one value joined by +; once for each number")
+    sub.add_argument("--minimise", action="append", required=True, metavar="OUTCOME",
+                     help=f"outcome to make small, one of {', '.join(GROUPS)}, or a column of one; given twice: choices"
+                     " none of which is better in both")
+    sub.add_argument("--subject-to", action="append", default=[], metavar="OUTCOME<=NUMBER", dest="bounds",
+                     help="largest value of an outcome")
+    sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
+    sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the search (default 0)")
+    sub.add_argument("--figure", type=Path, metavar="FIGURE",
+                     help="draw the outcome along each number, or two outcomes")
+    add_accuracy(sub)
+    add_output(sub, "FILE.yaml", "write the scene with the numbers chosen; - is the standard output")
+    add_force(sub)
+    add_json(sub)
+
+
+def _design(options: argparse.Namespace) -> int:
+    from grasp_ros.maps.plan import read_axis
+    from grasp_ros.optimization.problem import Problem, read_bound
+    from grasp_ros.optimization.search import Design, front, search
+    from grasp_ros.simulation.chunk import Setup
+
+    scene = load_scene(options.scene, options.settings)
+    setup = Setup(accuracy=options.accuracy, sampled=options.sampled)
+    problem = Problem(scene, [read_axis("--free", text) for text in options.free], options.minimise,
+                      [read_bound(text) for text in options.bounds], setup)
+    for path in (options.output, options.figure):
+        if path is not None:
+            check_output(path, options.force, [options.scene])
+    if options.figure is not None:
+        image_format(options.figure)
+    several = len(options.minimise) == 2
+    if several and options.output is not None:
+        raise Refused("-o: allowed: with one --minimise, which has one best choice; the table has the numbers of all")
+    prepare()
+    with bar(None, "run", scene.name) as told:
+        found: Sequence[Design] = (
+            front(problem, options.seed, progress=told) if several else [search(problem, options.seed, progress=told)])
+    show(options, "\n".join(_table(problem, found)), {
+        "scene": scene.name, "units": problem.units, "choices": [
+            {"numbers": own.numbers, "outcomes": own.outcomes, "runs": own.runs} for own in found]})
+    if options.output is not None:
+        with destination(options.output) as file:
+            file.write(found[0].scene.to_yaml().encode())
+    if options.figure is not None:
+        from grasp_ros.optimization import figure
+
+        write_figure(figure.tradeoff(problem, found) if several else figure.around(problem, found[0]), options.figure)
+    return 0
+
+
+def _table(problem: Any, found: Sequence[Any]) -> list[str]:
+    """A column for each free number and outcome, a row for each choice; of one choice a line for each of them."""
+    units = problem.units
+    if len(found) == 1:
+        ends = {key: axis for axis in problem.axes for key in axis.keys if _at_an_end(axis, found[0].numbers[key])}
+        rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in found[0].numbers.items()),
+                *((name, f"{value:.10g} {units[name]}") for name, value in found[0].outcomes.items()),
+                ("simulations", str(found[0].runs))]
+        width = max(len(name) for name, _ in rows)
+        return [f"{name:<{width}}  {text}" for name, text in rows]
+    heads = [*(f"{name}, {unit}" for name, unit in units.items()), *(axis.name for axis in problem.axes)]
+    lines = [[*(f"{own.outcomes[name]:.6g}" for name in units),
+              *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]
+    widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
+    return ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [heads, *lines]]
+
+
+def _at_an_end(axis: Axis, value: float) -> bool:
+    """Whether a choice is an end of its range."""
+    return min(value - axis.low, axis.high - value) <= NEAR * (axis.high - axis.low)

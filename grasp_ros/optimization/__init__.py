@@ -1,0 +1,1 @@
+"""Numbers of a scene, chosen for an outcome."""

@@ -1,0 +1,115 @@
+"""What is to be designed: free numbers of a scene within ranges, an outcome to make small, and bounds on others."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.maps.plan import Axis, Plan
+from grasp_ros.maps.plan import check as check_plan
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.simulation.chunk import Setup, check
+from grasp_ros.simulation.ensemble import ensemble
+from grasp_ros.simulation.outcomes import GROUPS, find
+
+
+class Bound(NamedTuple):
+    """A largest value of an outcome."""
+
+    outcome: str
+    most: float
+
+
+class Found(NamedTuple):
+    """Of n choices of the free numbers: outcomes by name, and by how much, relative, they break the bounds."""
+
+    outcomes: dict[str, Array]  # (n,) each; inf where a run has none
+    excess: Array  # (n,) 0: all bounds are kept
+
+
+class Problem:
+    """A scene, its free numbers, outcomes to make small, and bounds.
+
+    Parameters
+    ----------
+    scene : Scene
+    axes : sequence of Axis
+        Free numbers with their ranges; keys that are joined have one value. The search takes logarithmic ones as such.
+    minimise : sequence of str
+        One outcome or two, see `simulation.outcomes`; of a group the largest of its columns.
+    bounds : sequence of Bound
+    setup : Setup
+        How rows are run; its outcomes are those that are needed.
+
+    Raises
+    ------
+    Refused
+        If a number, a range, an outcome or a bound cannot be.
+    """
+
+    def __init__(self, scene: Scene, axes: Sequence[Axis], minimise: Sequence[str], bounds: Sequence[Bound] = (),
+                 setup: Setup | None = None) -> None:
+        if not 1 <= len(minimise) <= 2 or len(set(minimise)) < len(minimise):
+            raise Refused(f"minimise: {', '.join(minimise) or 'nothing'}; allowed: one outcome, or two different ones")
+        self.scene, self.axes, self.minimise, self.bounds = scene, tuple(axes), tuple(minimise), tuple(bounds)
+        self.names = tuple(dict.fromkeys([*minimise, *(bound.outcome for bound in bounds)]))
+        for name in self.names:
+            if len({column.unit for column in find([name])}) > 1:
+                raise Refused(f"outcome {name}: has several units; allowed: one of {', '.join(GROUPS[name])}")
+        self.setup = (setup or Setup())._replace(outcomes=self.names)
+        check_plan(Plan(scene, self.setup, self.axes, sample=1))
+        check(scene, self.setup)
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """Units of the outcomes."""
+        return {name: find([name])[0].unit for name in self.names}
+
+    def numbers(self, parts: Array) -> dict[str, Array]:
+        """Free numbers (n,) by their keys, at parts (n, k) of the ranges in [0, 1]."""
+        return {key: axis.at(parts[:, i]) for i, axis in enumerate(self.axes) for key in axis.keys}
+
+    def run(self, parts: Array) -> Found:
+        """Simulate choices, given as parts (n, k) of the ranges in [0, 1]."""
+        return self.found(self.numbers(parts))
+
+    def found(self, numbers: Mapping[str, Array]) -> Found:
+        """Simulate choices, given as free numbers (n,) by their keys."""
+        table = ensemble(self.scene, numbers, self.names, setup=self.setup)
+        outcomes = {name: self._worst([table.columns[column.name] for column in find([name])]) for name in self.names}
+        excess: Array = np.zeros(len(table.status))
+        for bound in self.bounds:
+            excess += np.maximum(outcomes[bound.outcome] - bound.most, 0.0) / (abs(bound.most) or 1.0)
+        return Found(outcomes, excess)
+
+    @staticmethod
+    def _worst(columns: Sequence[Array]) -> Array:
+        """The largest of several columns; what no run tells is as bad as can be."""
+        worst = np.max(np.stack(columns), axis=0)
+        return np.where(np.isnan(worst), np.inf, worst)
+
+
+def read_bound(text: str) -> Bound:
+    """A bound from "OUTCOME<=NUMBER".
+
+    Raises
+    ------
+    Refused
+        If it is written otherwise, or there is no such outcome.
+    """
+    name, sign, most = re.sub(r"\s", "", text).partition("<=")
+    try:
+        bound = Bound(name, float(most))
+    except ValueError:
+        bound = Bound(name, math.nan)
+    if not sign or not math.isfinite(bound.most):
+        raise Refused(f"--subject-to {text}: not understood; allowed: OUTCOME<=NUMBER")
+    find([name])
+    return bound

@@ -1,0 +1,182 @@
+"""The best choice of a problem, and what one outcome costs of another.
+
+Settling times jump from swing to swing, and the best choice often lies beside such a jump, where no derivative points
+to it. So it is sought by what needs none, differential evolution (R. Storn and K. Price, J. Global Optim. 11, 1997):
+each generation is one ensemble.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from grasp_ros.maps.plan import Axis
+from grasp_ros.optimization.problem import Bound, Problem
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.frozen import Frozen
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.simulation.chunk import Setup
+
+MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
+AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
+FRONT = 12  # choices along two outcomes
+BROKEN, NOTHING = 1e100, 1e140  # above every outcome: a bound is broken; there is no outcome; squares are finite
+
+
+@dataclass(frozen=True)
+class Design(Frozen):
+    """A choice of the free numbers.
+
+    Attributes
+    ----------
+    scene : Scene
+        With the numbers that were chosen.
+    numbers : dict of str to float
+        The free numbers by "section.key".
+    outcomes : dict of str to float
+        What comes of this scene, by a run of its own.
+    runs : int
+        Simulations that the search took.
+    """
+
+    scene: Scene
+    numbers: dict[str, float]
+    outcomes: dict[str, float]
+    runs: int
+
+
+def design(
+    scene: Scene, free: Mapping[str, tuple[float, float]], minimise: str, subject_to: Mapping[str, float] | None = None,
+    *, setup: Setup | None = None, seed: int = 0, progress: Callable[[int], object] | None = None,
+) -> Design:
+    """Choose numbers of a scene so that an outcome is small.
+
+    Parameters
+    ----------
+    scene : Scene
+    free : mapping of str to (float, float)
+        Numbers to choose, "section.key", within ranges (low, high); keys of one value are joined by +.
+    minimise : str
+        One of `simulation.outcomes`; of a group the largest of its columns.
+    subject_to : mapping of str to float, optional
+        Largest values of outcomes.
+    setup : Setup, optional
+        How each choice is simulated.
+    seed, progress
+        See `search`.
+
+    Raises
+    ------
+    Refused
+        If a number, a range, an outcome or a bound cannot be; and see `search`.
+    """
+    axes = [Axis(name, float(low), float(high)) for name, (low, high) in free.items()]
+    bounds = [Bound(name, float(most)) for name, most in (subject_to or {}).items()]
+    return search(Problem(scene, axes, [minimise], bounds, setup), seed, progress)
+
+
+def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | None = None) -> Design:
+    """Find the choice whose first outcome is smallest within the bounds.
+
+    Parameters
+    ----------
+    problem : Problem
+    seed : int
+        Of the search; where the best choice is unique every seed ends there.
+    progress : callable, optional
+        Called with the number of simulations so far.
+
+    Raises
+    ------
+    Refused
+        If no choice was found that keeps the bounds and has the outcome, or scipy is not installed.
+    """
+    try:
+        from scipy.optimize import differential_evolution
+    except ModuleNotFoundError:
+        raise Refused("`grasp design` needs scipy; pip install 'grasp_ros[design]'") from None
+    runs = 0
+
+    def function(parts: Array) -> Array:
+        nonlocal runs
+        runs += parts.shape[1]
+        if progress is not None:
+            progress(runs)
+        return costs(problem, np.ascontiguousarray(parts.T))
+
+    found = differential_evolution(
+        function, [(0.0, 1.0)] * len(problem.axes), popsize=MEMBERS, maxiter=GENERATIONS, tol=AGREE, rng=seed,
+        polish=False, init="sobol", updating="deferred", vectorized=True)
+    if found.fun >= BROKEN:
+        wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
+        raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
+                      + (f" with {wish}" if wish else ""))
+    outcomes = {name: float(values[0]) for name, values in problem.run(found.x[None]).outcomes.items()}
+    numbers = {key: float(values[0]) for key, values in problem.numbers(found.x[None]).items()}
+    return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
+
+
+def costs(problem: Problem, parts: Array) -> Array:
+    """What a search makes small: the outcome; above all outcomes what breaks a bound, the less the better."""
+    found = problem.run(parts)
+    outcome = np.minimum(found.outcomes[problem.minimise[0]], NOTHING)
+    return np.where(found.excess > 0.0, np.minimum(BROKEN * (1.0 + found.excess), NOTHING), outcome)
+
+
+def front(problem: Problem, seed: int = 0, points: int = FRONT, progress: Callable[[int], object] | None = None
+          ) -> list[Design]:
+    """Choices none of which is better than another in both outcomes of a problem, from the first outcome's best on.
+
+    Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. Of
+    choices that are equal in both the first is kept.
+
+    Parameters
+    ----------
+    problem : Problem
+        With two outcomes to make small.
+    seed : int
+        Of every search.
+    points : int
+        At least 2.
+    progress : callable, optional
+        Called with the number of simulations so far.
+
+    Raises
+    ------
+    Refused
+        See `search`.
+    """
+    if len(problem.minimise) != 2:
+        raise Refused(f"minimise: {', '.join(problem.minimise)}; allowed: two outcomes for a curve")
+    first, second = problem.minimise
+    choices: list[Design] = []
+
+    def add(name: str, bounds: Sequence[Bound]) -> Design:
+        before = sum(own.runs for own in choices)
+        told = None if progress is None else lambda runs: progress(before + runs)
+        choices.append(search(_with(problem, name, bounds), seed, told))
+        return choices[-1]
+
+    most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
+    for level in np.linspace(most, least, points)[1:]:
+        add(first, (*problem.bounds, Bound(second, max(float(level), least))))
+    return sorted(_undominated(choices, first, second), key=lambda own: own.outcomes[first])
+
+
+def _with(problem: Problem, name: str, bounds: Sequence[Bound]) -> Problem:
+    """The same with one outcome to make small, and all outcomes to look at."""
+    names = (name, *(other for other in problem.minimise if other != name))
+    return Problem(problem.scene, problem.axes, names, bounds, problem.setup)
+
+
+def _undominated(choices: Sequence[Design], first: str, second: str) -> list[Design]:
+    """Those than which no other one is better in one outcome and as good in the other."""
+    def beats(other: Design, own: Design) -> bool:
+        pairs = [(other.outcomes[name], own.outcomes[name]) for name in (first, second)]
+        return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)
+
+    best = [own for own in choices if not any(beats(other, own) for other in choices)]
+    return [*{(own.outcomes[first], own.outcomes[second]): own for own in reversed(best)}.values()]

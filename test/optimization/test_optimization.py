@@ -1,0 +1,93 @@
+"""Numbers of a scene that are chosen for an outcome."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import grasp_ros as gr
+from grasp_ros.maps.plan import Axis
+from grasp_ros.optimization.problem import Problem, read_bound
+from grasp_ros.optimization.search import front
+from grasp_ros.simulation.summary import summary
+
+BOTH_KV = "left_feedback.velocity_gain_Ns_per_m+right_feedback.velocity_gain_Ns_per_m"
+BOTH_KP = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
+CRITICAL = 2.0 * math.sqrt(15.0) - 1.0  # of an arm of Table 1 alone: 2 sqrt(K m) - c
+
+
+def test_every_start_finds_the_gain_beside_critical_damping() -> None:
+    scene = gr.load("case_01")
+    found = [gr.design(scene, {BOTH_KV: (0.5, 30.0)}, "settling_time", seed=seed) for seed in range(10)]
+    gains = np.array([list(own.numbers.values()) for own in found])
+    assert np.ptp(gains) < 1e-6
+    assert 0.7 * CRITICAL < gains[0, 0] < CRITICAL
+    least = gr.ensemble(scene, {key: np.linspace(0.5, 30.0, 2001) for key in BOTH_KV.split("+")}, ["settling_time"])
+    assert found[0].outcomes["settling_time"] <= np.nanmin(least.columns["settling_time"])
+
+
+def test_outcomes_are_those_of_a_simulation_and_bounds_are_kept() -> None:
+    scene = gr.load("case_01")
+    found = gr.design(scene, {BOTH_KV: (0.5, 30.0), BOTH_KP: (1.0, 100.0)}, "settling_time", {"peak_input": 10.0})
+    told = summary(gr.simulate(found.scene))
+    assert found.outcomes["settling_time"] == max(told["settled_s"].values())
+    assert found.outcomes["peak_input"] <= 10.0
+    assert found.numbers["left_feedback.position_gain_N_per_m"] == pytest.approx(20.0, rel=1e-6)  # 10 N at 0.5 m
+    with pytest.raises(AttributeError):
+        found.runs = 1  # type: ignore[misc]
+
+
+def test_no_choice_along_two_outcomes_is_better_in_both() -> None:
+    scene = gr.load("case_01", ["left_feedback.velocity_gain_Ns_per_m=7", "right_feedback.velocity_gain_Ns_per_m=7"])
+    problem = Problem(scene, [Axis(BOTH_KP, 1.0, 40.0)], ["settling_time", "peak_input"])
+    choices = front(problem, points=4)
+    times, inputs = ([own.outcomes[name] for own in choices] for name in problem.minimise)
+    assert len(choices) >= 3
+    assert times == sorted(times)
+    assert inputs == sorted(inputs, reverse=True)
+
+
+@pytest.mark.parametrize(("free", "minimise", "bounds", "words"), [
+    ({"left_arm.weight_kg": (1.0, 2.0)}, "settling_time", {}, "left_arm.weight_kg"),
+    ({"left_arm.mass_kg": (-1.0, 2.0)}, "settling_time", {}, "-1.0 is not allowed"),
+    ({BOTH_KV: (1.0, 2.0)}, "beauty", {}, "outcome beauty: not known"),
+    ({BOTH_KV: (1.0, 2.0)}, "extremes", {}, "has several units; allowed: one of x_left_min"),
+    ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"beauty": 1.0}, "outcome beauty: not known"),
+    ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3}, "none of .* with peak_input <= 0.001"),
+    ({}, "settling_time", {}, "axes: none"),
+])
+def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: Any, words: str) -> None:
+    with pytest.raises(gr.Refused, match=words):
+        gr.design(gr.load("case_01"), free, minimise, bounds)
+
+
+@pytest.mark.parametrize("text", ["peak_input", "peak_input<=", "peak_input<=nan", "peak_input>=3", "beauty<=3"])
+def test_a_bound_is_written_in_one_way(text: str) -> None:
+    with pytest.raises(gr.Refused):
+        read_bound(text)
+    assert read_bound("peak_input <= 3").most == 3.0
+
+
+def test_the_command_writes_a_scene_and_figures(command: Any, tmp_path: Path) -> None:
+    words = ("design", "case_01", "--free", f"{BOTH_KV}=0.5:30", "--minimise", "settling_time")
+    result = command(*words, "-o", "best.yaml", "--figure", "best.png")
+    assert result.returncode == 0, result.stderr
+    assert "settling_time" in result.stdout
+    best = gr.load(tmp_path / "best.yaml")
+    assert best.numbers_of("left_controller") != gr.load("case_01").numbers_of("left_controller")
+    assert (tmp_path / "best.png").read_bytes().startswith(b"\x89PNG")
+    again = command(*words, "--json")
+    gain = best.values["left_feedback"]["velocity_gain_Ns_per_m"]
+    assert json.loads(again.stdout)["choices"][0]["numbers"] == dict.fromkeys(BOTH_KV.split("+"), gain)
+    both = command(*words, "--minimise", "peak_input", "--figure", "both.svg")
+    assert both.returncode == 0, both.stderr
+    assert command(*words, "-o", "best.yaml").returncode == 2  # is there
+    assert command(*words, "--minimise", "peak_input", "-o", "no.yaml").returncode == 2
+    assert "at an end" not in result.stdout
+    end = command("design", "case_01", "--free", f"{BOTH_KV}=1:3", "--minimise", "peak_impact")
+    assert "an end of its range" in end.stdout
