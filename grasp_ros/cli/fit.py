@@ -32,8 +32,8 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "fit", _fit)
     sub.add_argument("source", metavar="BAG|FILE.npz|FILE.csv", help="a bag, a file of `grasp simulate -o`, or a table"
                      f" with columns t_s and some of {', '.join(CHANNELS)}")
-    sub.add_argument("--free", action="append", required=True, metavar="KEY",
-                     help="a number to estimate, section.key, or the offset of a sensor, offset.CHANNEL; repeatable")
+    sub.add_argument("--free", action="extend", nargs="+", required=True, metavar="KEY",
+                     help="numbers to estimate, section.key, or the offset of a sensor, offset.CHANNEL")
     complete_scenes(sub.add_argument("--scene", help="what is known, and where the search starts (default: the scene of"
                                      " the data; a table has none)"))
     add_settings(sub)

@@ -65,9 +65,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say(held: Trajectory) -> None
 
 def test_data_without_noise_give_the_numbers_back(held: Trajectory, tmp_path: Path, command: Any) -> None:
     held.save(tmp_path / "run.npz")
-    words = [word for key in CONTACTS for word in ("--free", key)]
-    result = command("fit", "run.npz", *words, "--set", f"{H_LEFT}=3000", "--against", f"{P_LEFT}=0", "--json",
-                     "-o", "fit.png")
+    result = command("fit", "run.npz", "--free", *CONTACTS, "--set", f"{H_LEFT}=3000", "--against", f"{P_LEFT}=0",
+                     "--json", "-o", "fit.png")
     data = json.loads(result.stdout)
     assert result.returncode == 0, result.stderr
     for key, value in CONTACTS.items():
@@ -107,7 +106,7 @@ def test_a_table_says_what_its_run_says(tmp_path: Path, loop: tuple[str, ...]) -
     found, same = (fit(data, [H_LEFT, P_LEFT], scene) for data in (tmp_path / "run.csv", run))
     assert found.estimates.tolist() == same.estimates.tolist()
     off = np.abs(found.estimates - [1e4, 0.1]) / np.sqrt(np.diag(found.covariance))
-    assert ((0.01 < off) & (off < 4.0)).all()
+    assert ((off > 0.01) & (off < 4.0)).all()
 
 
 def test_masses_are_free_only_up_to_a_scale_without_a_known_force() -> None:
@@ -130,7 +129,7 @@ def test_offsets_and_initial_values(held: Trajectory) -> None:
     found = fit(replace(held, state=state), keys, wrong)
     truth = np.array([0.02, 0.5, 0.0, 10.0])
     off = np.abs(found.estimates - truth) / np.sqrt(np.diag(found.covariance))
-    assert ((0.01 < off) & (off < 4.0)).all()
+    assert ((off > 0.01) & (off < 4.0)).all()
     assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.0, 0.0, 0.0, 0.0], abs=0.01)
     assert found.scene.values["right_arm"]["stiffness_N_per_m"] == found.estimates[3]
     assert found.correlation[0, 1] < 0.0
