@@ -44,8 +44,11 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     least_squares()
     free, found = [free] if isinstance(free, str) else list(free), measured(data, scene)
     numbers = numbers_of(found.scene, free, found)
-    if found.inputs is not None and any(acts(number.key) for number in numbers):
+    if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)
+    if found.inputs is None and found.foreign:
+        raise Refused(f"{found.name}: {found.foreign}; allowed: inputs at every tick, and no free number of controllers"
+                      " or external forces")
     for key in against:
         if key not in free or key.startswith("offset."):
             raise Refused(f"--against {key}: allowed: a number of the scene that is free")

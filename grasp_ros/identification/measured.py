@@ -40,6 +40,7 @@ class Measured(NamedTuple):
     state: Array  # (n, 6) m and m/s; NaN: a channel that is not measured
     inputs: Array | None  # (n - 1, 3) N by body, from each sample to the next
     sampled: bool  # whether commands are held over control periods
+    foreign: str = ""  # why the controllers of the scene do not tell what acted; empty if they do
 
     @property
     def channels(self) -> list[int]:
@@ -75,15 +76,17 @@ def _of_recording(recording: Recording) -> Measured:
     name, tick = str(recording.path), recording.tick
     if recording.starts.tolist() != [0] or (np.diff(tick) != 1).any():
         raise Refused(f"{name}: allowed: a bag of one run from its begin, with all of its ticks")
-    return Measured(name, recording.scene, recording.t, recording.state, recording.inputs[:-1], True)
+    foreign = "numbers were set while it ran" if recording.changes else (
+        "" if recording.running.lockstep else "commands came by the wall clock")
+    return Measured(name, recording.scene, recording.t, recording.state, recording.inputs[:-1], True, foreign)
 
 
 def _of_trajectory(run: Trajectory, name: str) -> Measured:
     ticks = tick_times(run.scene)[: len(run.t)]
     held = run.sampled and np.array_equal(run.t, ticks)
-    if run.controllers and not held:
-        raise Refused(f"{name}: inputs of controllers that the scene does not name; allowed: an output at every tick")
-    return Measured(name, run.scene, run.t, run.state, run.inputs[: len(run.t) - 1] if held else None, run.sampled)
+    foreign = "other controllers acted" if run.controllers else ""
+    inputs = run.inputs[: len(run.t) - 1] if held else None
+    return Measured(name, run.scene, run.t, run.state, inputs, run.sampled, foreign)
 
 
 def _of_table(path: Path, scene: Scene) -> Measured:

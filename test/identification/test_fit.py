@@ -190,6 +190,13 @@ def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, 
     assert complaint in result.stderr
 
 
+def test_the_law_of_another_controller_has_no_numbers() -> None:
+    run = simulate(SCENE, controllers={"left": lambda tick, time, x, v: -5.0 * x - 0.6 * v})
+    assert fit(run, [P_LEFT], SCENE.changed({P_LEFT: 0.2})).estimates == pytest.approx([0.1], rel=1e-9)
+    with pytest.raises(Refused, match=r"^run: other controllers acted; allowed: inputs at every tick"):
+        fit(run, [P_LEFT, "right_feedback.velocity_gain_Ns_per_m"])
+
+
 def test_scipy_is_needed_and_named(held: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)
     with pytest.raises(Refused, match=r"needs scipy.*; pip install 'grasp_ros\[fit\]'"):
