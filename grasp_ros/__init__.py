@@ -6,10 +6,11 @@
 
 What is listed in `__all__` is imported when it is first used, so that `import grasp_ros` costs nothing.
 
-Rooms, each importing only from those below it (pyproject.toml has the contract): `cli`; `graph` (nodes and bags),
-`optimization` (numbers chosen for an outcome), `maps` (many runs in files), `accuracy` (what it costs) and
-`sensitivity` (derivatives); `simulation` (a run without ROS); `methods` (the other integrators) and `observe` (what is
-seen of a run); `exact` (the compiled integrator) and `scene` (what a file may say); `physics` (equations).
+Rooms, each importing only from those below it (pyproject.toml has the contract): `cli`; `identification` (numbers from
+measurements) and `optimization` (numbers chosen for an outcome); `graph` (nodes and bags), `maps` (many runs in files),
+`accuracy` (what it costs) and `sensitivity` (derivatives); `simulation` (a run without ROS); `methods` (the other
+integrators) and `observe` (what is seen of a run); `exact` (the compiled integrator) and `scene` (what a file may say);
+`physics` (equations).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ _PLACES = {  # module, and the name there where it is another one; their types: 
     "LEFT": "physics.layout", "OBJECT": "physics.layout", "RIGHT": "physics.layout", "Refused": "physics.errors",
     "Scene": "scene.scene", "Status": "exact.integrator", "Trajectory": "simulation.trajectory",
     "Transition": "physics.layout", "compose": "scene.scene", "design": "optimization.search",
-    "draw": "simulation.plots", "ensemble": "simulation.ensemble", "load": "scene.scene",
+    "draw": "simulation.plots", "ensemble": "simulation.ensemble", "fit": "identification.fit", "load": "scene.scene",
     "load_run": "simulation.trajectory_file:load", "names": "scene.library", "parse": "scene.scene",
     "read_bag": "graph.bag:read", "simulate": "simulation.simulate",
 }

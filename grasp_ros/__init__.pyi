@@ -2,6 +2,7 @@ from pathlib import Path
 
 from grasp_ros.exact.integrator import Status as Status
 from grasp_ros.graph.bag import read as read_bag
+from grasp_ros.identification.fit import fit as fit
 from grasp_ros.optimization.search import design as design
 from grasp_ros.physics.errors import Refused as Refused
 from grasp_ros.physics.layout import LEFT as LEFT
@@ -21,7 +22,7 @@ from grasp_ros.simulation.trajectory_file import load as load_run
 
 __all__ = [
     "LEFT", "OBJECT", "RIGHT", "Refused", "Scene", "Status", "Trajectory", "Transition", "compose", "design", "draw",
-    "ensemble", "load", "load_run", "names", "parse", "read_bag", "simulate",
+    "ensemble", "fit", "load", "load_run", "names", "parse", "read_bag", "simulate",
 ]
 
 CONFIG: Path

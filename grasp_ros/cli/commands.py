@@ -21,6 +21,7 @@ COMMANDS: dict[str, Entry] = {
     "plot": Entry("plot", _RUNS, "draw or animate bags, files of `grasp simulate`, or scenes"),
     "map": Entry("map", _RUNS, "outcomes of many variants of a scene, over two of its numbers or a sample"),
     "design": Entry("design", _RUNS, "choose numbers of a scene that make an outcome small"),
+    "fit": Entry("fit", _RUNS, "estimate numbers of a scene from a bag or a table, with intervals"),
     "accuracy": Entry("accuracy", _RUNS, "error against time of every method on a scene, and the setting to take"),
     "methods": Entry("simulate", _RUNS, "list the methods of integration"),
     "run": Entry("graph", _GRAPH, "run a scene in four ROS 2 processes and record a bag"),

@@ -55,6 +55,9 @@ COLUMNS: tuple[Column, ...] = (
     Column("V_rate", "W", "its rate (18)", _level("V_rate")),
     Column("mode", "1", "contacts: 0 none, 1 left, 2 right, 3 both", _level("mode")),
 )
+HEADS = {  # of a text file, by the names of the columns
+    name: name + _ENDINGS[unit] for name, unit in (TIME[:2], *(column[:2] for column in COLUMNS))
+}
 
 
 def values_of(motion: Trajectory) -> dict[str, Array]:
@@ -96,8 +99,7 @@ def dataframe_of(motion: Trajectory) -> Any:
 
 def write_csv(motion: Trajectory, file: BinaryIO) -> None:
     """See `trajectory.Trajectory.to_csv`; numbers have all their digits."""
-    heads = [TIME[0] + _ENDINGS[TIME[1]], *(column.name + _ENDINGS[column.unit] for column in COLUMNS)]
-    write_rows(file, heads, [motion.t, *values_of(motion).values()])
+    write_rows(file, [*HEADS.values()], [motion.t, *values_of(motion).values()])
 
 
 def frame_of(columns: Mapping[str, np.ndarray]) -> Any:

@@ -42,6 +42,7 @@ REFUSALS: dict[str, Callable[[Path], object]] = {
     "method": lambda _: simulate(scenes.load("case_01"), method="euler"),
     "changes": lambda _: simulate(scenes.load("case_01"), changes={0: {"left_feedback.set_point_m": 1.0}}),
     "simulation": lambda path: simulation.load(path / "nothing.npz"),
+    "fit": lambda path: grasp_ros.fit(path / "nothing.csv", ["object.mass_kg"], scenes.load("case_01")),
     "bag": lambda path: bag.read(path),
     "new bag": lambda path: bag.Recorder(path, scenes.load("case_01"), {}),
     "graph": lambda path: Graph(scenes.load("case_01"), path, ACCURACY).start(),

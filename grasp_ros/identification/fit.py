@@ -1,0 +1,94 @@
+"""Identify numbers of a scene from a measured motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+
+from grasp_ros.identification.measured import FEWEST, Source, measured
+from grasp_ros.identification.numbers import acts, numbers_of
+from grasp_ros.identification.result import Against, Fit, residual_table, seen_by
+from grasp_ros.identification.search import Problem, first_noise, fitted, least_squares, mean_square, refine, search
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+
+
+def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
+        against: Mapping[str, float] = MappingProxyType({})) -> Fit:
+    """Estimate numbers of a scene from a measured motion, with confidence intervals.
+
+    Positive numbers are estimated by their logarithm. The noise of each channel is estimated as well, and weights it.
+
+    Parameters
+    ----------
+    data : path, Recording or Trajectory
+        A bag, a .npz file of `grasp simulate`, or a .csv file with columns as `Trajectory.to_csv` names them: `t_s`,
+        and states, not all of which need be there. Inputs that were recorded at every tick act as they were, if no
+        free number belongs to what gives them; otherwise the controllers of the scene act.
+    free : sequence of str
+        "section.key" of numbers that enter smoothly: masses, stiffness, damping, H, p, gains, initial values.
+        "offset.x_left_m" is the offset of a sensor, in what it measures minus what is.
+    scene : Scene, optional
+        What is known, and the start of what is free. Default: the scene of the data; a .csv file has none.
+    against : mapping of str to float
+        Free numbers whose value is tested: whether the data reject it.
+
+    Raises
+    ------
+    Refused
+        If scipy is not installed, the data or the keys are not allowed, or there are too few samples.
+    """
+    least_squares()
+    free, found = [free] if isinstance(free, str) else list(free), measured(data, scene)
+    numbers = numbers_of(found.scene, free, found)
+    if any(acts(number.key) for number in numbers):
+        found = found._replace(inputs=None)
+    if found.inputs is None and found.foreign:
+        raise Refused(f"{found.name}: {found.foreign}; allowed: inputs at every tick, and no free number of controllers"
+                      " or external forces")
+    for key in against:
+        if key not in free or key.startswith("offset."):
+            raise Refused(f"--against {key}: allowed: a number of the scene that is free")
+    samples = len(found.t) * len(found.channels)
+    if samples < len(numbers) + FEWEST:
+        raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"
+                      f" {len(numbers) + FEWEST}")
+    problem, y = fitted(Problem(found, found.scene, numbers, first_noise(found)))
+    return _result(problem, y, against)
+
+
+def _result(problem: Problem, y: Array, against: Mapping[str, float]) -> Fit:
+    """What the minimum says."""
+    data, rows = problem.data, len(problem.data.t)
+    values, slopes = problem.residuals(y, rows)
+    states, _, touches = problem.predict(y, rows)
+    states[:, [place for place in range(6) if place not in data.channels]] = np.nan
+    sight = seen_by(slopes, values, len(y))
+    estimates = problem.values(y)
+    scale = [number.slope(value) for number, value in zip(problem.numbers, estimates.values(), strict=True)]
+    low, high = ([float(number.at(end)) for number, end in zip(problem.numbers, ends.tolist(), strict=True)]
+                 for ends in (y - sight.reach, y + sight.reach))
+    return Fit(
+        problem.scene_at(y), data.name, tuple(estimates), np.array([*estimates.values()]), np.array(low),
+        np.array(high), sight.covariance * np.outer(scale, scale),
+        tuple(tuple(problem.numbers[place].key for place in places) for places in sight.unseen),
+        data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
+        residual_table(values.reshape(rows, -1), data.t, touches),
+        {key: _test(problem, y, key, value, values) for key, value in against.items()},
+    )
+
+
+def _test(problem: Problem, y: Array, key: str, value: float, best: Array) -> Against:
+    """F test of a value of one number: by how much the sum of squares grows where it is fixed."""
+    from scipy import stats
+
+    numbers = tuple(number._replace(start=value, positive=False, width=0.0) if number.key == key else number
+                    for number in problem.numbers)
+    fixed, rows, free = problem._replace(numbers=numbers), len(problem.data.t), len(best) - len(y)
+    least = min(mean_square(fixed, found) for found in (refine(fixed, y, rows), search(fixed)))
+    variance = max(float(best @ best) / free, 1.0)
+    growth = max((least * len(best) - float(best @ best)) / variance, 0.0)
+    return Against(value, growth, float(stats.f.sf(growth, 1, free)))

@@ -1,0 +1,147 @@
+"""A measured motion: of a bag, of a file of `grasp simulate`, or of a table with its scene."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.graph import bag
+from grasp_ros.graph.recording import Recording
+from grasp_ros.physics import given
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import BODIES, NAMES
+from grasp_ros.scene import Scene
+from grasp_ros.scene.files import reading
+from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
+from grasp_ros.simulation.ticks import tick_times
+from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.trajectory_file import load
+
+CHANNELS = tuple(HEADS[column.name] for column in COLUMNS[:6])  # names of the states, in their order
+INPUTS = tuple(HEADS[f"input_{NAMES[body]}"] for body in sorted(BODIES))  # by body
+FEWEST = 10  # samples
+Source = str | os.PathLike[str] | Recording | Trajectory
+
+
+class Measured(NamedTuple):
+    """n samples of a motion.
+
+    Without recorded inputs the controllers of the scene act.
+    """
+
+    name: str
+    scene: Scene
+    t: Array  # (n,) s, ascending
+    state: Array  # (n, 6) m and m/s; NaN: a channel that is not measured
+    inputs: Array | None  # (n - 1, 3) N by body, from each sample to the next
+    sampled: bool  # whether commands are held over control periods
+    foreign: str = ""  # why the controllers of the scene do not tell what acted; empty if they do
+
+    @property
+    def channels(self) -> list[int]:
+        """Columns of the state that are measured."""
+        return [place for place in range(6) if not np.isnan(self.state[:, place]).any()]
+
+
+def measured(source: Source, scene: Scene | None) -> Measured:
+    """A motion from what holds it; a scene replaces that of the source, and a table must have one.
+
+    Raises
+    ------
+    Refused
+        If the source cannot be read, holds too little, or holds what is no number.
+    """
+    if isinstance(source, Recording):
+        found = _of_recording(source)
+    elif isinstance(source, Trajectory):
+        found = _of_trajectory(source, "run")
+    elif Path(source).suffix == ".csv":
+        if scene is None:
+            raise Refused(f"{source}: a table does not name its scene; allowed: a scene beside it, --scene")
+        return _checked(_of_table(Path(source), scene))
+    else:
+        path = Path(source)
+        with reading(path):
+            directory = path.is_dir()
+        found = _of_recording(bag.read(path)) if directory else _of_trajectory(load(path), str(path))
+    return _checked(found if scene is None else found._replace(scene=scene))
+
+
+def _of_recording(recording: Recording) -> Measured:
+    name, tick = str(recording.path), recording.tick
+    if recording.starts.tolist() != [0] or (np.diff(tick) != 1).any():
+        raise Refused(f"{name}: allowed: a bag of one run from its begin, with all of its ticks")
+    foreign = "numbers were set while it ran" if recording.changes else (
+        "" if recording.running.lockstep else "commands came by the wall clock")
+    return Measured(name, recording.scene, recording.t, recording.state, recording.inputs[:-1], True, foreign)
+
+
+def _of_trajectory(run: Trajectory, name: str) -> Measured:
+    ticks = tick_times(run.scene)[: len(run.t)]
+    held = run.sampled and np.array_equal(run.t, ticks)
+    foreign = "other controllers acted" if run.controllers else ""
+    inputs = run.inputs[: len(run.t) - 1] if held else None
+    return Measured(name, run.scene, run.t, run.state, inputs, run.sampled, foreign)
+
+
+def _of_table(path: Path, scene: Scene) -> Measured:
+    """Columns as `Trajectory.to_csv` names them: the time, states, and the inputs of a scene that holds them."""
+    columns = _columns(path)
+    time = HEADS[TIME[0]]
+    if time not in columns or not any(name in columns for name in CHANNELS):
+        raise Refused(f"{path}: columns {', '.join(columns)}; allowed: {time} and at least one of"
+                      f" {', '.join(CHANNELS)}")
+    t = columns[time]
+    missing = np.full(len(t), np.nan)
+    state = np.stack([columns.get(name, missing) for name in CHANNELS], axis=1)
+    held = scene.sampled and all(name in columns for name in INPUTS)
+    if held and not np.array_equal(t, tick_times(scene)[: len(t)]):
+        raise Refused(f"{path}: {time}: not the ticks of {scene.name}, every"
+                      f" {scene.time_of(1):g} s from 0 to {scene.duration:g} s, at which its inputs change")
+    inputs = np.stack([columns[name] for name in INPUTS], axis=1)[:-1] if held else None
+    return Measured(str(path), scene, t, state, inputs, scene.sampled)
+
+
+def _columns(path: Path) -> Mapping[str, Array]:
+    """Numbers (n,) by the names in the first line; NaN where nothing stands."""
+    with reading(path):
+        names, *lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()] or [[""]]
+    if len({*names}) < len(names):
+        raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
+    rows = []
+    for number, line in enumerate(lines, 2):
+        if len(line) != len(names):
+            raise Refused(f"{path}: line {number}: {len(line)} entries; allowed: {len(names)}")
+        try:
+            rows.append([float(word.strip() or "nan") for word in line])
+        except ValueError as error:
+            raise Refused(f"{path}: line {number}: {error}; allowed: numbers") from None
+    return dict(zip(map(str.strip, names), np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
+
+
+def _checked(found: Measured) -> Measured:
+    """Refuse what no fit can use."""
+    found = found._replace(t=given.times("times", found.t))  # kernels read a row of numbers, no column of a table
+    name, t, present = found.name, found.t, found.scene.system.present
+    if len(t) < FEWEST:
+        raise Refused(f"{name}: {len(t)} samples; allowed: at least {FEWEST}")
+    if not (np.isfinite(t).all() and t[0] >= 0.0 and (np.diff(t) > 0.0).all() and t[-1] <= found.scene.duration):
+        raise Refused(f"{name}: times are not allowed; allowed: ascending from 0 to {found.scene.duration:g} s,"
+                      " the time of the scene")
+    for place, channel in enumerate(CHANNELS):
+        gone = ~np.isfinite(found.state[:, place])
+        if gone.any() and not np.isnan(found.state[:, place]).all():
+            raise Refused(f"{name}: {channel}: no number at t = {t[np.argmax(gone)]:g} s; allowed: numbers throughout,"
+                          " or a column that is not there")
+        if not gone.any() and BODIES[place // 2] not in present:
+            raise Refused(f"{name}: {channel}: {found.scene.name} has no such body")
+    if not found.channels:
+        raise Refused(f"{name}: no state is measured")
+    if found.inputs is not None and not np.isfinite(found.inputs).all():
+        raise Refused(f"{name}: inputs are missing; allowed: a number for every control period")
+    return found

@@ -1,0 +1,68 @@
+"""The motion of a scene at the times of a measurement, and its derivatives by numbers of the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.identification.measured import Measured
+from grasp_ros.identification.numbers import OUTSIDE
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import Entry, Transition
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.sensitivity.directions import directions
+from grasp_ros.sensitivity.sensitivities import carry, complete
+from grasp_ros.simulation.sampled_plant import SampledPlant
+from grasp_ros.simulation.ticks import tick_of
+
+
+def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tuple[Array, Array, Array]:
+    """States (rows, 6) at the first times of a measurement, their derivatives (rows, 6, n), and touches (k, 2).
+
+    A touch is its time in s and its side. Recorded inputs act as they were; without them the controllers of the scene.
+
+    Raises
+    ------
+    Refused
+        If the run does not get there.
+    """
+    if data.inputs is None:
+        return _closed_loop(data, scene, keys, data.t[:rows])
+    scene = _plant(scene)
+    integrator = Integrator(scene.system, continuous=False)
+    carrier = carry(scene, integrator, directions(scene, keys, True), data.t[:rows], True)
+    plant = SampledPlant(scene.system, scene.period_ns, integrator)
+    states = plant.follow(data.inputs[: rows - 1])
+    if plant.status is not Status.DONE:
+        raise Refused(f"{scene.name}: {plant.stop}")
+    carrier.finish(data.t[rows - 1])
+    return np.concatenate([states, plant.state[None]]), carrier.out, _touches(integrator)
+
+
+def _closed_loop(data: Measured, scene: Scene, keys: Sequence[str], times: Array) -> tuple[Array, Array, Array]:
+    ticks = int(tick_of(scene, times[-1:])[0]) + 1
+    if ticks < scene.ticks:
+        scene = scene.changed({"time.duration_s": scene.time_of(ticks)})
+    integrator = Integrator(scene.system, continuous=not data.sampled)
+    carrier = carry(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
+    states = complete(scene, integrator, data.sampled, times)
+    carrier.finish(scene.duration)
+    return states, carrier.out, _touches(integrator)
+
+
+def _plant(scene: Scene) -> Scene:
+    """What is left of a scene where all that acts from outside is known: bodies and contacts."""
+    return replace(scene, values={
+        section: numbers for section, numbers in scene.values.items()
+        if BY_SECTION[section].node == "plant" and section != "loop" and not section.endswith(OUTSIDE)
+    })
+
+
+def _touches(integrator: Integrator) -> Array:
+    events = integrator.event_table
+    return np.asarray(events[events[:, Entry.KIND] == Transition.TOUCH][:, [Entry.TIME, Entry.BODY]])

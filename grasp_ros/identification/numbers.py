@@ -1,0 +1,92 @@
+"""The free numbers of a fit, each as a function of a number y that begins at 0 and changes by about 1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.identification.measured import CHANNELS, Measured
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.suggestion import allowed
+from grasp_ros.sensitivity.directions import check_key
+
+OFFSET = "offset."  # of a sensor; the name of its channel follows
+OUTSIDE = ("_pulse", "_sine", "_table")  # sections of external forces
+DECADE = math.log(10.0)
+
+
+class Number(NamedTuple):
+    """One free number.
+
+    Positive ones are searched by their logarithm, y = 1 is a factor of ten; of others it is their size, or their unit.
+    """
+
+    key: str
+    start: float
+    positive: bool
+    width: float = 1.0  # of y = 1, where it is not positive; 0: it is fixed
+
+    def at(self, y: float | Array) -> float | Array:
+        """Its value."""
+        with np.errstate(over="ignore"):
+            return self.start * np.exp(DECADE * y) if self.positive else self.start + self.width * y
+
+    def slope(self, value: float) -> float:
+        """Derivative of its value by y."""
+        return DECADE * value if self.positive else self.width
+
+    @property
+    def channel(self) -> int | None:
+        """Column of the state that it is an offset of."""
+        return CHANNELS.index(self.key.removeprefix(OFFSET)) if self.key.startswith(OFFSET) else None
+
+
+def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Number, ...]:
+    """The free numbers, with the values of the scene as starts.
+
+    Raises
+    ------
+    Refused
+        If a key is given twice, not in the scene, does not enter smoothly, or starts from 0 where only positive
+        numbers are allowed.
+    """
+    twice = [key for place, key in enumerate(keys) if key in keys[:place]]
+    if twice:
+        raise Refused(f"--free {twice[0]}: given twice")
+    if all(key.startswith(OFFSET) for key in keys):
+        raise Refused(f"--free: {', '.join(keys) or 'nothing'}; allowed: at least one number of the scene, such as"
+                      " left_contact.hertz_N_per_m1_5")
+    return tuple(_offset(key, data) if key.startswith(OFFSET) else _number(scene, key) for key in keys)
+
+
+def acts(key: str) -> bool:
+    """Whether a number decides what acts on the bodies from outside: one of a controller, or an external force."""
+    section = key.partition(".")[0]
+    return section.endswith(OUTSIDE) or (section in BY_SECTION and BY_SECTION[section].node != "plant")
+
+
+def _offset(key: str, data: Measured) -> Number:
+    known = [CHANNELS[place] for place in data.channels]
+    if key.removeprefix(OFFSET) not in known:
+        raise Refused(f"--free {key}: not measured; {allowed(key, [OFFSET + name for name in known])}")
+    return Number(key, 0.0, False)
+
+
+def _number(scene: Scene, key: str) -> Number:
+    section, _, name = key.partition(".")
+    if name not in scene.values.get(section, {}):
+        known = [f"{own}.{entry}" for own, found in scene.values.items() for entry in found]
+        raise Refused(f"--free {key}: not in {scene.name}; {allowed(key, known, f'{OFFSET}CHANNEL, or ')}")
+    parameter, value = check_key(scene, key), float(scene.values[section][name])
+    if parameter.low < 0.0:
+        return Number(key, value, False, max(abs(value), 1.0))
+    if value == 0.0:
+        raise Refused(f"--free {key}: the search starts from the scene's value, 0; allowed: a start > 0, as with"
+                      f" --set {key}=VALUE")
+    return Number(key, value, True)

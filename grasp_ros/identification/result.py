@@ -1,0 +1,162 @@
+"""What a fit delivers: estimates, how certain they are, what the data do not see, and what is left over."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from grasp_ros.physics.frozen import Frozen
+from grasp_ros.physics.layout import LEFT
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+
+CONFIDENCE = 0.95
+BLIND = 1e-9  # singular value, of the largest, below which derivatives are no more than their rounding
+PART = 1e-3  # of a direction, from which on a number belongs to it
+LAGS = 10
+ROUNDING = 1e-3  # of the least noise
+REJECTED = 0.01  # probability below which a test rejects
+
+
+class Against(NamedTuple):
+    """F test of one value of a number that was free."""
+
+    value: float
+    F: float  # growth of the sum of squares in variances, where the number has this value and the others are free
+    probability: float  # of an F as large by chance
+
+    @property
+    def rejected(self) -> bool:
+        """Whether the data reject the value, at 1 %."""
+        return self.probability < REJECTED
+
+
+class Residuals(NamedTuple):
+    """Residuals from one touch to the next."""
+
+    side: str  # of the touch; "none" before the first
+    begin: float  # s
+    samples: int
+    rms: float  # in standard deviations of the noise
+    white: float  # Ljung-Box test: probability of correlations as large by chance; see `whiteness`
+
+
+@dataclass(frozen=True)
+class Fit(Frozen):
+    """Numbers of a scene, estimated from a measured motion.
+
+    Attributes
+    ----------
+    scene : Scene
+        With the estimates.
+    source : str
+        What the data came from.
+    keys : tuple of str
+    estimates, low, high : arrays (n,)
+        With 95 % intervals; infinite, or from 0, for what is not identifiable.
+    covariance : array (n, n)
+        In the units of the keys; NaN for what is not identifiable.
+    not_identifiable : tuple of tuples of str
+        Numbers that can change together without a trace in these data: by a factor of ten, or, where negative ones
+        are allowed, by their size or unit.
+    t : array (m,), s
+    measured, fitted : arrays (m, 6), m and m/s
+        NaN for channels that are not measured.
+    noise : array (6,), m and m/s
+        Standard deviation of each channel, as its residuals have it.
+    contacts : tuple of Residuals
+        From each touch of the fitted motion to the next.
+    against : mapping of str to Against
+        Tests of values.
+    """
+
+    scene: Scene
+    source: str
+    keys: tuple[str, ...]
+    estimates: Array
+    low: Array
+    high: Array
+    covariance: Array
+    not_identifiable: tuple[tuple[str, ...], ...]
+    t: Array
+    measured: Array
+    fitted: Array
+    noise: Array
+    contacts: tuple[Residuals, ...]
+    against: Mapping[str, Against]
+
+    @property
+    def residuals(self) -> Array:
+        """Measured minus fitted, (m, 6), m and m/s."""
+        return self.measured - self.fitted
+
+    @property
+    def correlation(self) -> Array:
+        """Correlation (n, n) of the estimates."""
+        deviation = np.sqrt(np.diag(self.covariance))
+        return np.asarray(self.covariance / np.outer(deviation, deviation))
+
+
+class Sight(NamedTuple):
+    """What the data see of n numbers y."""
+
+    covariance: Array  # (n, n); NaN: not identifiable
+    reach: Array  # (n,) half of the confidence interval; inf: not identifiable
+    unseen: list[list[int]]  # places of the numbers of each direction that is not seen
+
+
+def seen_by(slopes: Array, residuals: Array, n: int) -> Sight:
+    """What residuals (m,) in standard deviations, with derivatives (m, n), say of n numbers y.
+
+    A direction of the derivatives is seen if its standard deviation is below 1.
+    """
+    from scipy import stats
+
+    _, singular, directions = np.linalg.svd(slopes, full_matrices=False)
+    free = len(residuals) - n
+    variance = max(float(residuals @ residuals) / free, 1.0)  # less is rounding: data without noise
+    blind = singular <= BLIND * singular[0]
+    unseen = [np.flatnonzero(np.abs(direction) > PART).tolist()
+              for direction in directions[blind | (singular < math.sqrt(variance))]]
+    scaled = directions[~blind] / singular[~blind, None]
+    covariance = variance * scaled.T @ scaled
+    lost = sorted({place for places in unseen for place in places})
+    reach = np.sqrt(np.diag(covariance)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, free)
+    reach[lost] = np.inf
+    covariance[lost], covariance[:, lost] = np.nan, np.nan
+    return Sight(covariance, reach, unseen)
+
+
+def residual_table(residuals: Array, t: Array, touches: Array) -> tuple[Residuals, ...]:
+    """Residuals (m, k) at times (m,) from each touch, time and side (j, 2), to the next; none without samples."""
+    begins = [(float(t[0]), "none"), *((time, "left" if side == LEFT else "right") for time, side in touches.tolist())]
+    rows = [*np.searchsorted(t, [begin for begin, _ in begins]).tolist(), len(t)]
+    return tuple(
+        Residuals(side, begin, end - first, float(np.sqrt(np.mean(residuals[first:end] ** 2))),
+                  whiteness(residuals[first:end]))
+        for (begin, side), first, end in zip(begins, rows[:-1], rows[1:], strict=True) if end > first
+    )
+
+
+def whiteness(residuals: Array) -> float:
+    """Probability that white noise has correlations as large as residuals (m, k) of k channels.
+
+    NaN for fewer than 10 samples, or where nothing is left over but rounding.
+
+    Source: G. M. Ljung, G. E. P. Box, On a measure of lack of fit in time series models, Biometrika 65 (1978).
+    """
+    from scipy import stats
+
+    m, channels = residuals.shape
+    if m < LAGS or np.abs(residuals).max() < ROUNDING:
+        return math.nan
+    lags = np.arange(1, min(LAGS, m // 5) + 1)
+    products = np.array([np.sum(residuals[lag:] * residuals[:-lag], axis=0) for lag in lags])
+    with np.errstate(invalid="ignore"):  # of residuals that are all 0
+        found = products / np.sum(residuals**2, axis=0)
+    total = m * (m + 2.0) * np.sum(found**2 / (m - lags)[:, None])
+    return float(stats.chi2.sf(total, channels * len(lags)))

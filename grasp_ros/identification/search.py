@@ -1,0 +1,201 @@
+"""Least squares with exact derivatives, over a horizon that grows, so that a wrong start does not end far away.
+
+A motion through many contacts has a sum of squares with many minima: contacts that come too late or too early look
+alike. Over a short horizon it has one, and what is found there starts the next horizon (a form of multiple shooting,
+H. G. Bock, Recent advances in parameter identification techniques for O.D.E., 1983, without states of its own).
+Beside the measurement each number is expected near its start, with a standard deviation of y = 1, a factor of ten: what
+the data do not see stays there. What they see to some percent is moved by a small part of its own uncertainty.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from grasp_ros.identification.measured import FEWEST, Measured
+from grasp_ros.identification.motion import motion
+from grasp_ros.identification.numbers import Number
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+
+GROWTHS = (2.0, math.sqrt(2.0))  # of the horizon; the second where the first does not lead to a fit
+FIRST = 16.0  # part of the motion that is the first horizon
+GOOD = 4.0  # mean square of residuals, in those of the noise, above which a search has not found the motion
+ROUGH, FINE = 1e-3, 1e-6  # relative change of the sum of squares at which a search ends, on the way and at last
+SHORTEST = 1e-10  # step of y, relative
+MOST = 30  # motions of one horizon
+FLOOR = 1e-9  # of the spread of a channel: the least noise
+
+
+class Problem(NamedTuple):
+    """What is searched: numbers of a scene that let its motion be the measured one."""
+
+    data: Measured
+    scene: Scene
+    numbers: tuple[Number, ...]
+    noise: Array  # (6,) standard deviation of each channel
+
+    def values(self, y: Array) -> dict[str, float]:
+        """The free numbers by key."""
+        return {number.key: float(number.at(own)) for number, own in zip(self.numbers, y.tolist(), strict=True)}
+
+    def scene_at(self, y: Array) -> Scene:
+        """The scene with the free numbers.
+
+        Raises
+        ------
+        Refused
+            If they are outside its domain.
+        """
+        free = zip(self.numbers, self.values(y).items(), strict=True)
+        return self.scene.changed({key: value for number, (key, value) in free if number.channel is None})
+
+    def predict(self, y: Array, rows: int) -> tuple[Array, Array, Array]:
+        """What is measured of the motion (rows, 6), its derivatives by y (rows, 6, n), and its touches.
+
+        Raises
+        ------
+        Refused
+            If the numbers are outside the domain, or the run does not get there.
+        """
+        keys = [number.key for number in self.numbers if number.channel is None]
+        states, found, touches = motion(self.data, self.scene_at(y), keys, rows)
+        rates = np.zeros((*states.shape, len(y)))
+        places = [place for place, number in enumerate(self.numbers) if number.channel is None]
+        rates[:, :, places] = found
+        for place, (number, value) in enumerate(zip(self.numbers, self.values(y).values(), strict=True)):
+            if number.channel is not None:
+                states[:, number.channel] += value
+                rates[:, number.channel, place] = 1.0
+            rates[:, :, place] *= number.slope(value)
+        return states, rates, touches
+
+    def residuals(self, y: Array, rows: int) -> tuple[Array, Array]:
+        """Residuals (rows k,) of the k channels in standard deviations, row by row, and their derivatives by y."""
+        states, rates, _ = self.predict(y, rows)
+        seen = self.data.channels
+        scaled = (states[:, seen] - self.data.state[:rows, seen]) / self.noise[seen]
+        return scaled.ravel(), (rates[:, seen] / self.noise[seen, None]).reshape(scaled.size, -1)
+
+
+def least_squares() -> Callable[..., Any]:
+    """scipy's.
+
+    Raises
+    ------
+    Refused
+        If it is not installed.
+    """
+    try:
+        from scipy.optimize import least_squares as found
+    except ModuleNotFoundError as error:
+        raise Refused(f"a fit needs {error.name}; pip install 'grasp_ros[fit]'") from None
+    return found  # type: ignore[no-any-return]
+
+
+def search(problem: Problem) -> Array:
+    """The free numbers (n,) as y, from their starts.
+
+    Raises
+    ------
+    Refused
+        If the scene cannot be run as it is.
+    """
+    begin = np.zeros(len(problem.numbers))
+    problem.residuals(begin, FEWEST)  # a start that is refused says why
+    best, least = begin, math.inf
+    for growth in GROWTHS:
+        y = begin
+        for rows in _horizons(len(problem.data.t), growth):
+            y = refine(problem, y, rows, ROUGH)
+        size = mean_square(problem, y)
+        if size < least:
+            best, least = y, size
+        if least <= GOOD:
+            break
+    if not math.isfinite(least):
+        raise Refused(f"{problem.data.name}: no motion of {problem.scene.name} gets to its end; allowed: another start")
+    return best
+
+
+def _horizons(rows: int, growth: float) -> list[int]:
+    steps = math.ceil(math.log(FIRST, growth) - 1e-9)
+    return [max(round(rows * growth**-step), min(FEWEST, rows)) for step in range(steps, -1, -1)]
+
+
+def mean_square(problem: Problem, y: Array) -> float:
+    """Mean square of the residuals in variances of the noise; infinite if the motion does not get to its end."""
+    try:
+        return float(np.mean(problem.residuals(y, len(problem.data.t))[0] ** 2))
+    except Refused:
+        return math.inf
+
+
+def refine(problem: Problem, begin: Array, rows: int, enough: float = FINE) -> Array:
+    """The next minimum of the sum of squares over the first rows, from y = begin (n,); `begin` if no motion gets there.
+
+    Parameters
+    ----------
+    enough : float
+        Relative change of the sum of squares at which it ends.
+    """
+    seen, n = len(problem.data.channels), len(begin)
+    last: dict[bytes, tuple[Array, Array]] = {}
+
+    def both(step: Array) -> tuple[Array, Array]:
+        y = begin + step
+        if y.tobytes() not in last:
+            last.clear()
+            try:
+                values, slopes = problem.residuals(y, rows)
+            except Refused:  # a step into nowhere: the next one is shorter
+                values, slopes = np.full(rows * seen, np.nan), np.zeros((rows * seen, n))
+            last[y.tobytes()] = np.concatenate([values, y]), np.concatenate([slopes, np.eye(n)])
+        return last[y.tobytes()]
+
+    nowhere = np.zeros(n)  # from 0 scipy tries steps up to 1 at first, from elsewhere up to as far as that is from 0
+    if not np.isfinite(both(nowhere)[0]).all():
+        return begin
+    with np.errstate(all="ignore"):  # of motions far off
+        found = least_squares()(lambda step: both(step)[0], nowhere, lambda step: both(step)[1], method="trf",
+                                ftol=enough, xtol=SHORTEST, gtol=None, max_nfev=MOST)
+    return np.asarray(begin + found.x)
+
+
+def first_noise(data: Measured) -> Array:
+    """Noise (6,) of each channel before any fit: the median distance of samples from the line of their neighbours."""
+    t, state = data.t, data.state
+    part = ((t[1:-1] - t[:-2]) / (t[2:] - t[:-2]))[:, None]
+    away = np.abs(state[1:-1] - (1.0 - part) * state[:-2] - part * state[2:])
+    away /= np.sqrt(1.0 + part**2 + (1.0 - part) ** 2)
+    return _at_least(np.median(away, axis=0) / 0.6745, data)  # of a normal distribution
+
+
+def residual_noise(data: Measured, fitted: Array) -> Array:
+    """Noise (6,) of each channel after a fit: the root mean square of its residuals."""
+    return _at_least(np.sqrt(np.mean((fitted - data.state) ** 2, axis=0)), data)
+
+
+def _at_least(noise: Array, data: Measured) -> Array:
+    least: Array = np.maximum(FLOOR * np.ptp(data.state, axis=0), np.finfo(float).tiny)
+    return np.asarray(np.maximum(noise, least))
+
+
+def fitted(problem: Problem) -> tuple[Problem, Array]:
+    """The free numbers as y (n,), of a problem whose noise is that of the residuals.
+
+    Raises
+    ------
+    Refused
+        See `search`.
+    """
+    y = search(problem)
+    rows = len(problem.data.t)
+    for _ in range(2):  # the weights of the channels, and the minimum that belongs to them
+        y = refine(problem, y, rows)
+        problem = problem._replace(noise=residual_noise(problem.data, problem.predict(y, rows)[0]))
+    return problem, refine(problem, y, rows)

@@ -1,0 +1,203 @@
+"""Numbers from measured motions: from wrong starts, with honest intervals, and nothing that the data do not show."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from grasp_ros import fit, load, read_bag, simulate
+from grasp_ros.identification.result import whiteness
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene
+from grasp_ros.simulation import Trajectory
+
+H_LEFT, H_RIGHT = "left_contact.hertz_N_per_m1_5", "right_contact.hertz_N_per_m1_5"
+P_LEFT, P_RIGHT = "left_contact.dissipation_s_per_m", "right_contact.dissipation_s_per_m"
+CONTACTS = {H_LEFT: 1e4, H_RIGHT: 1e4, P_LEFT: 0.1, P_RIGHT: 0.1}
+NOISE = 1e-4  # m
+SCENE = load("case_01").changed({"time.duration_s": 1.0, "time.control_period_s": 0.002})
+
+
+@pytest.fixture(scope="module")
+def held() -> Trajectory:
+    """A run whose inputs were recorded at every tick."""
+    return simulate(SCENE, sampled=True)
+
+
+def noisy(run: Trajectory, seed: int) -> Trajectory:
+    """Positions with noise, and no velocities."""
+    state = run.state + NOISE * np.random.default_rng(seed).normal(size=run.state.shape)
+    state[:, 1::2] = np.nan
+    return replace(run, state=state)
+
+
+def tenfold(factors: tuple[float, ...]) -> Scene:
+    return SCENE.changed({key: value * factor for (key, value), factor in zip(CONTACTS.items(), factors, strict=True)})
+
+
+@pytest.mark.parametrize("factors", [(0.1, 0.1, 0.1, 0.1), (10, 10, 10, 10), (0.1, 10, 10, 0.1), (10, 0.1, 0.1, 10)])
+def test_starts_that_are_wrong_by_ten_end_at_one_minimum(held: Trajectory, factors: tuple[float, ...]) -> None:
+    data = noisy(held, 1)
+    found, right = fit(data, [*CONTACTS], tenfold(factors)), fit(data, [*CONTACTS])
+    deviation = np.sqrt(np.diag(right.covariance))
+    assert (np.abs(found.estimates - right.estimates) < 0.05 * deviation).all()
+    assert (np.abs(found.estimates - [*CONTACTS.values()]) < 4.0 * deviation).all()
+    assert found.noise[::2] == pytest.approx(NOISE, rel=0.1)
+    assert {contact.side for contact in found.contacts} == {"none", "left"}  # both touch at once: one stretch
+    assert all(contact.white > 1e-4 and contact.rms == pytest.approx(1.0, abs=0.1) for contact in found.contacts)
+
+
+@pytest.mark.slow
+def test_intervals_hold_the_truth_as_often_as_they_say(held: Trajectory) -> None:
+    hits = np.zeros(2)
+    for seed in range(40):
+        found = fit(noisy(held, seed), [H_LEFT, P_LEFT])
+        hits += (found.low < [1e4, 0.1]) & (found.high > [1e4, 0.1])
+    assert (hits >= 34).all()  # of 40 with 95 %: fewer once in 1500
+    assert (hits < 40).any()
+
+
+def test_data_without_noise_give_the_numbers_back(held: Trajectory, tmp_path: Path, command: Any) -> None:
+    held.save(tmp_path / "run.npz")
+    result = command("fit", "run.npz", "--free", *CONTACTS, "--set", f"{H_LEFT}=3000", "--against", f"{P_LEFT}=0",
+                     "--json", "-o", "fit.png")
+    data = json.loads(result.stdout)
+    assert result.returncode == 0, result.stderr
+    for key, value in CONTACTS.items():
+        assert data["numbers"][key]["estimate"] == pytest.approx(value, rel=1e-9)
+    assert data["against"][P_LEFT]["rejected"]
+    assert (tmp_path / "fit.png").stat().st_size > 10_000
+
+
+def test_a_value_is_rejected_only_where_the_data_say_so(held: Trajectory) -> None:
+    found = fit(noisy(held, 2), [H_LEFT, P_LEFT], against={P_LEFT: 0.0, H_LEFT: 1e4})
+    assert found.against[P_LEFT].rejected
+    assert found.against[P_LEFT].F > 1e4
+    assert not found.against[H_LEFT].rejected
+    off = abs(found.estimates[0] - 1e4) / np.sqrt(found.covariance[0, 0])
+    assert np.sqrt(found.against[H_LEFT].F) == pytest.approx(off, rel=0.01)  # of one number, F is the square of t
+
+
+def test_what_the_data_do_not_show_is_named(command: Any) -> None:
+    gain, stiffness = "left_feedback.position_gain_N_per_m", "left_arm.stiffness_N_per_m"
+    command("simulate", "case_01", "--set", "time.duration_s=1", "--grid", "201", "-o", "run.csv")
+    words = "fit", "run.csv", "--scene", "case_01", "--free", stiffness, "--free", gain, "--free", P_LEFT
+    result = command(*words)
+    assert result.returncode == 1
+    assert f"not identifiable from these data: {stiffness}, {gain} together" in result.stdout
+    data = json.loads(command(*words, "--json").stdout)
+    assert data["not_identifiable"] == [[stiffness, gain]]
+    assert data["numbers"][P_LEFT]["low"] < 0.1 < data["numbers"][P_LEFT]["high"]
+    assert data["numbers"][gain]["high"] is None
+
+
+@pytest.mark.parametrize("loop", [(), ("loop={}",)])
+def test_a_table_says_what_its_run_says(tmp_path: Path, loop: tuple[str, ...]) -> None:
+    scene = load("case_01", ["time.duration_s=1", "time.control_period_s=0.005", *loop])
+    run = simulate(scene, grid=np.linspace(0.0, 1.0, 201) if not loop else None)
+    run = replace(run, state=run.state + NOISE * np.random.default_rng(5).normal(size=run.state.shape))
+    run.to_csv(tmp_path / "run.csv")
+    found, same = (fit(data, [H_LEFT, P_LEFT], scene) for data in (tmp_path / "run.csv", run))
+    assert found.estimates.tolist() == same.estimates.tolist()
+    off = np.abs(found.estimates - [1e4, 0.1]) / np.sqrt(np.diag(found.covariance))
+    assert ((off > 0.01) & (off < 4.0)).all()
+
+
+def test_masses_are_free_only_up_to_a_scale_without_a_known_force() -> None:
+    scene = load("case_01", ["time.duration_s=1"])
+    masses = ["left_arm.mass_kg", "object.mass_kg", H_LEFT, H_RIGHT, "left_arm.stiffness_N_per_m"]
+    scale = [*masses, "right_arm.mass_kg", "right_arm.stiffness_N_per_m", "left_arm.damping_Ns_per_m",
+             "right_arm.damping_Ns_per_m"]
+    freely = scene.changed({f"{side}_feedback.{key}": 0.0 for side in ("left", "right")
+                            for key in ("position_gain_N_per_m", "velocity_gain_Ns_per_m")})
+    run = simulate(freely, grid=np.linspace(0.0, 1.0, 201))
+    assert fit(run, scale).not_identifiable == (tuple(scale),)
+    assert fit(run, masses).not_identifiable == ()
+
+
+def test_offsets_and_initial_values(held: Trajectory) -> None:
+    state = noisy(held, 3).state.copy()
+    state[:, 4] += 0.02
+    keys = ["offset.x_right_m", "right_arm.position_m", "object.velocity_m_per_s", "right_arm.stiffness_N_per_m"]
+    wrong = SCENE.changed({"right_arm.position_m": 0.45, "right_arm.stiffness_N_per_m": 50.0})
+    found = fit(replace(held, state=state), keys, wrong)
+    truth = np.array([0.02, 0.5, 0.0, 10.0])
+    off = np.abs(found.estimates - truth) / np.sqrt(np.diag(found.covariance))
+    assert ((off > 0.01) & (off < 4.0)).all()
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.0, 0.0, 0.0, 0.0], abs=0.01)
+    assert found.scene.values["right_arm"]["stiffness_N_per_m"] == found.estimates[3]
+    assert found.correlation[0, 1] < 0.0
+
+
+def test_residuals_of_a_wrong_model_are_not_white(held: Trajectory) -> None:
+    wrong = SCENE.changed({P_LEFT: 0.0, P_RIGHT: 0.0})
+    found = fit(noisy(held, 4), [H_LEFT, H_RIGHT], wrong)
+    assert found.contacts[0].rms < 1.0 < found.contacts[-1].rms
+    assert found.contacts[-1].white < 1e-12
+    white = np.random.default_rng(0).normal(size=(500, 2))
+    assert whiteness(white) > 0.01
+    assert whiteness(np.cumsum(white, axis=0)) < 1e-12
+    assert np.isnan(whiteness(white[:9]))
+
+
+@pytest.mark.slow
+def test_a_bag(two_runs: tuple[Path, Path]) -> None:
+    recording = read_bag(two_runs[1] / "bag")
+    starts = recording.scene.changed({H_LEFT: 2e3, P_LEFT: 0.5, "left_feedback.position_gain_N_per_m": 3.0})
+    found = fit(two_runs[1] / "bag", [H_LEFT, P_LEFT], starts)  # the inputs act that were recorded
+    assert found.estimates == pytest.approx([1e4, 0.1], rel=1e-9)
+    closed = fit(recording, ["left_feedback.position_gain_N_per_m", P_LEFT], starts.changed({H_LEFT: 1e4}))  # the law
+    assert closed.estimates == pytest.approx([5.0, 0.1], rel=1e-9)
+
+
+ROWS = "t_s,x_left_m,x_object_m\n" + "".join(f"{0.01 * row},{-0.3 + 0.001 * row},0\n" for row in range(20))
+HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] == 't' else '0,0,0'}\n"
+               for line in ROWS.splitlines())  # inputs, but not at every tick
+
+
+@pytest.mark.parametrize(("content", "words", "complaint"), [
+    (ROWS, ("--free", P_LEFT), "a table does not name its scene; allowed: a scene beside it, --scene"),
+    (ROWS, ("--scene", "case_01", "--free", "left_contact.hertz"), f"did you mean {H_LEFT}"),
+    (ROWS, ("--scene", "case_01", "--free", "time.duration_s"), "has no derivative: it moves ticks"),
+    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", P_LEFT), "given twice"),
+    (ROWS, ("--scene", "case_01", "--free", "offset.x_left_m"), "at least one number of the scene"),
+    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", "offset.v_left_m_per_s"), "not measured"),
+    (ROWS, ("--scene", "case_02", "--free", P_LEFT), f"allowed: a start > 0, as with --set {P_LEFT}=VALUE"),
+    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{H_LEFT}=1"), "allowed: a number of the scene that"),
+    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", P_LEFT), "allowed: KEY=VALUE, with a number"),
+    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=-1"), "dissipation_s_per_m: -1.0 is not"),
+    (ROWS.replace("t_s", "t"), ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
+    (ROWS.replace("x_object_m", "x_left_m"), ("--scene", "case_01", "--free", P_LEFT), "allowed: each name once"),
+    (ROWS.replace("-0.298,", "nan,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: no number at t = 0.02 s"),
+    (ROWS.replace("-0.298,", "north,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
+    (ROWS.replace("-0.298,", ""), ("--scene", "case_01", "--free", P_LEFT), "line 4: 2 entries; allowed: 3"),
+    (ROWS.replace("0.02,", "0.2,"), ("--scene", "case_01", "--free", P_LEFT), "allowed: ascending from 0 to 20 s"),
+    ("\n".join(ROWS.splitlines()[:10]), ("--scene", "case_01", "--free", P_LEFT), "samples; allowed: at least 10"),
+    ("", ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
+    (ROWS, ("--scene", "arm_alone", "--free", "left_arm.mass_kg"), "x_object_m: arm_alone has no such body"),
+    (HELD, ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "not the ticks of case_01, every 0.001 s"),
+], ids=range(20))
+def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
+    (tmp_path / "data.csv").write_text(content)
+    result = command("fit", "data.csv", *words)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert complaint in result.stderr
+
+
+def test_the_law_of_another_controller_has_no_numbers() -> None:
+    run = simulate(SCENE, controllers={"left": lambda tick, time, x, v: -5.0 * x - 0.6 * v})
+    assert fit(run, [P_LEFT], SCENE.changed({P_LEFT: 0.2})).estimates == pytest.approx([0.1], rel=1e-9)
+    with pytest.raises(Refused, match=r"^run: other controllers acted; allowed: inputs at every tick"):
+        fit(run, [P_LEFT, "right_feedback.velocity_gain_Ns_per_m"])
+
+
+def test_scipy_is_needed_and_named(held: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
+    with pytest.raises(Refused, match=r"needs scipy.*; pip install 'grasp_ros\[fit\]'"):
+        fit(held, [P_LEFT])
