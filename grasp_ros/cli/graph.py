@@ -200,9 +200,10 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.comparison import compare_recording
+    from grasp_ros.graph.summary import summary
 
     recording = bag.read(graph.bag)
-    rows, whole = report.describe_recording(recording), _keeps(recording, options)
+    rows, whole = report.describe_recording(recording, summary(recording)), _keeps(recording, options)
     spent.note("reading")
     if not stopped:
         whole = whole and not recording.alarms and not any(recording.missing.values())
@@ -236,17 +237,18 @@ def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.comparison import compare_recording
+    from grasp_ros.graph.summary import summary, verified
 
     recording = bag.read(options.bag)
     warn(recording.scene)
-    rows, equal = report.describe_recording(recording), True
+    found = summary(recording)
+    rows, equal = report.describe_recording(recording, found), True
     if options.replay:
         prepare()
         comparison = compare_recording(recording)
         rows, equal = rows + comparison.rows, comparison.equal
-    show(options, report.table(rows), {
-        **report.data_of(rows), "ticks": len(recording.tick), "alarms": recording.alarms, "messages": recording.counts,
-        "missing": recording.missing, "equal": equal if options.replay else None})
+        found["replay"] = {"equal": equal, **verified(comparison.verification, comparison.answers)}
+    show(options, report.table(rows), found)
     return 0 if equal and _keeps(recording, options) else 1
 
 
@@ -277,12 +279,14 @@ def _ctl(options: argparse.Namespace) -> int:
 def _verify(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
-    from grasp_ros.graph.verify import laws_of, verify
+    from grasp_ros.graph.summary import verified
+    from grasp_ros.graph.verify import answers_of, verify
 
     recording = bag.read(options.bag)
     prepare()
-    found = verify(recording)
-    laws = [(f"{side} controller", law) for side, law in laws_of(recording).items()]
+    found, answers = verify(recording), answers_of(recording)
+    laws = [(f"{side} controller", str(law)) for side, law in answers.items()]
     rows = [("bag", str(recording.path)), ("run", recording.running.words), *laws, ("verified", found.words)]
-    show(options, report.table(rows), {**report.data_of(rows), "holds": found.holds})
+    show(options, report.table(rows), {"bag": str(recording.path), "lockstep": recording.running.lockstep,
+                                       **verified(found, answers)})
     return 0 if found.holds else 1

@@ -13,9 +13,8 @@ from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import printable
-from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.quantities import SETTLED
 from grasp_ros.simulation.summary import MOTION, OUTPUTS
@@ -28,11 +27,6 @@ def table(rows: Iterable[Row]) -> str:
     rows = list(rows)
     width = max(len(name) for name, _ in rows)
     return printable("\n".join(f"{name:<{width}}  {value}" for name, value in rows))
-
-
-def data_of(rows: Iterable[Row]) -> dict[str, str]:
-    """The same as data, by names without blanks."""
-    return {name.replace(",", "").replace(" ", "_"): value for name, value in rows}
 
 
 def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[Row]:
@@ -89,52 +83,56 @@ def _touches(found: dict[str, Any]) -> str:
     return text + (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
 
 
-def describe_recording(recording: Recording) -> list[Row]:
-    """What is in a bag."""
-    scene = recording.scene
-    per_topic = ", ".join(f"{name} {count}" for name, count in recording.counts.items())
-    resets = len(recording.starts) - 1
-    missing = {name: count for name, count in recording.missing.items() if count}
-    lost = ", ".join(f"{name} {count}" for name, count in missing.items()) or "nothing"
+def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]:
+    """What is in a bag, with its `summary`."""
+    resets, missing = found["resets"], [f"{name} {count}" for name, count in found["missing"].items()]
+    of = "" if recording.closed else f" of {PLANT_ALONE}"
+    left, right = found["contacts"].values()
+    none = "none: the law of a controller is not known"
     rows = [
-        ("bag", str(recording.path)),
-        ("scene", scene.title),
-        ("feedback", scene.feedback_in_words(sampled=True)),
-        ("run", recording.running.words + (f", {resets} resets" if resets > 0 else "")),
-        *_timing(recording),
-        ("recorded", f"{recording.t[-1] if len(recording.t) else 0.0:g} s of {scene.duration:g} s"),
-        ("messages", per_topic),
-        ("lost", lost),
-        ("end", recording.lost["end"]),
-        ("recorded with", ", ".join(f"{name} {version}" for name, version in recording.versions.items()) or "not said"),
+        ("bag", found["bag"]),
+        ("size", f"{found['size_bytes'] / 1e6:.3g} MB"),
+        ("scene", found["title"]),
+        ("feedback", found["feedback"]),
+        ("run", recording.running.words + (f", {resets} resets" if resets else "")),
+        *_timing(found),
+        ("recorded", f"{found['duration_s']:g} s of {found['scene_duration_s']:g} s"),
+        ("messages", _messages(found["topics"])),
+        ("contacts left, right", f"{left}, {right} seen at the ticks"),
+        (f"V{of}", _ends(found["V_J"])), (f"V_c{of}", _ends(found["V_c_J"])),
+        ("certificate", recording.scene.certificate_in_words(sampled=True) if recording.closed else none),
+        ("work of the held forces", f"{found['work_J']:.6g} J"),
+        ("energy balance", f"{found['alarms']} alarms" if found["alarms"] else "closes at every tick"),
+        ("lost", ", ".join(missing) or "nothing"),
+        ("end", found["end"]),
+        ("recorded with", ", ".join(f"{name} {version}" for name, version in found["recorded_with"].items())
+         or "not said"),
     ]
     for tick, numbers in recording.changes.items():
-        rows.append((f"set at {scene.time_of(tick):g} s", ", ".join(f"{name} {n:g}" for name, n in numbers.items())))
-    if len(recording.tick):
-        named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
-        mode, level = named["mode"], recording.energy
-        of = "" if recording.closed else " of the plant alone"
-        begun = [_beginnings(mode, flag) for flag in (Mode.LEFT, Mode.RIGHT)]
-        at = rows.index(("lost", lost))
-        rows[at:at] = [
-            ("contacts left, right", f"{begun[0]}, {begun[1]} seen at the ticks"),
-            (f"V{of}", _ends(level.V)), (f"V_c{of}", _ends(level.V_c)),
-            ("certificate", scene.certificate_in_words(sampled=True) if recording.closed else
-             "none: the law of a controller is not known"),
-            ("work of the held forces", f"{0.5 * float(np.nansum(named['work'])):.6g} J"),
-            ("energy balance", f"{recording.alarms} alarms" if recording.alarms else "closes at every tick"),
-        ]
-    return _with_words(scene, rows)
+        values = ", ".join(f"{name} {number:g}" for name, number in numbers.items())
+        rows.append((f"set at {recording.scene.time_of(tick):g} s", values))
+    return _with_words(recording.scene, rows)
 
 
-def _timing(recording: Recording) -> list[Row]:
+def _messages(topics: dict[str, dict[str, float]]) -> str:
+    """Topics by how many messages they have."""
+    alike: dict[tuple[float, float], list[str]] = {}
+    for name, numbers in topics.items():
+        rate = numbers["rate_Hz"]
+        alike.setdefault((numbers["messages"], 0.0 if np.isnan(rate) else rate), []).append(name)
+    return "; ".join(f"{count}{f' at {rate:.4g} Hz' if rate else ''}: {', '.join(names)}"
+                     for (count, rate), names in sorted(alike.items(), reverse=True))
+
+
+def _timing(found: dict[str, Any]) -> list[Row]:
     """What a free run came to."""
-    if not recording.timing:
+    if "overruns" not in found:
         return []
-    ages = "; ".join(f"{side} {most:.0f}, 99 % {usual:.0f}" for side, (usual, most) in recording.ages.items())
-    given_up = float(recording.timing["lost_s"][-1])
+    ages = "; ".join(f"{side} {age['max']:.0f}, 99 % {age['p99']:.0f}"
+                     for side, age in found["command_age_periods"].items())
     return [
-        ("reached", f"{recording.reached:.3g} s in a second, {recording.overruns} overruns, {given_up:.2g} s given up"),
+        ("reached", f"{found['reached_s_per_s']:.3g} s in a second, {found['overruns']} overruns,"
+                    f" {found['given_up_s']:.2g} s given up"),
         ("oldest commands", f"{ages or 'none'}, periods"),
     ]
 
@@ -148,7 +146,3 @@ def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
 def _ends(values: Array | Sequence[float]) -> str:
     return f"{values[0]:.6g} J, {values[-1]:.6g} J (twice the energy)"
 
-
-def _beginnings(mode: Array, flag: Mode) -> int:
-    touching = (np.nan_to_num(mode).astype(int) & int(flag)) != 0
-    return int(np.count_nonzero(touching[1:] & ~touching[:-1]) + touching[0])

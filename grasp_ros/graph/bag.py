@@ -107,11 +107,12 @@ class _Content:
 
     def __init__(self, path: Path, storage: Storage) -> None:
         self.path, self.storage, self.scene = path, storage, scene_of(storage, path)
-        self.changes, self.held, self.timing = _Changes(), Counter[Topic](), list[Any]()
-        known = {name: topic for topic, name in names_of(self.scene, storage.records[OWN_RECORD]).items()}
-        self.columns = {topic: _Columns(name, topic, self.scene) for name, topic in known.items()}
+        self.changes, self.timing = _Changes(), list[Any]()
+        names = names_of(self.scene, storage.records[OWN_RECORD])
+        self.columns = {topic: _Columns(name, topic, self.scene) for topic, name in names.items()}
+        self.counts = dict.fromkeys(names, 0)
         held = held_of(storage, self.scene)
-        self._takers = {(name, topic.type): self._taker(topic, held) for name, topic in known.items()}
+        self._takers = {(name, topic.type): (topic, self._taker(topic, held)) for topic, name in names.items()}
 
     def _taker(self, topic: Topic, held: Collection[Topic]) -> Callable[[Stored], object]:
         """What is done with the messages of a topic."""
@@ -119,15 +120,16 @@ class _Content:
             return lambda stored: self.changes.add(topic, stored, self.scene)
         if topic == TIMING:
             return lambda stored: self.timing.append(decode(topic, stored.cdr))
-        if topic in held:  # as they came, not one for each tick
-            return lambda _: self.held.update([topic])
-        return self.columns[topic].add if topic in self.scene.topics else lambda _: None
+        one_a_tick = topic in self.scene.topics and topic not in held  # the others as they came
+        return self.columns[topic].add if one_a_tick else lambda _: None
 
     def take(self, stored: Stored) -> None:
         """Take a message."""
-        taker = self._takers.get((stored.topic, stored.type))
-        if taker is None:
+        known = self._takers.get((stored.topic, stored.type))
+        if known is None:
             raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+        topic, taker = known
+        self.counts[topic] += 1
         taker(stored)
 
     def recording(self) -> Recording:
@@ -147,10 +149,9 @@ class _Content:
         for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
             command[:, side] = aligned(topic)[:, 0]
         own = storage.records[OWN_RECORD]
-        counts = {topic.name: self.held[topic] or len(self.columns[topic].of()[0]) for topic in scene.topics}
         return Recording(
             path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
-            counts, ticks, joints[:, :6], joints[:, 6:], command,
+            {topic.name: count for topic, count in self.counts.items()}, ticks, joints[:, :6], joints[:, 6:], command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
             dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
             dict(+self.changes.unheard),

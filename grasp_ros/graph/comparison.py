@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.verify import Verification, laws_of, verify
+from grasp_ros.graph.verify import Answers, Verification, answers_of, verify
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
 
@@ -19,12 +19,12 @@ class Comparison(NamedTuple):
     own: bool  # whether all commands are those of the scene's laws, in lockstep and without a reset
     offset: Array | None  # (6,), largest distance from continuous feedback, m and m/s; None if it has none of its own
     verification: Verification
-    laws: dict[str, str]  # whose commands these are, by side
+    answers: dict[str, Answers]  # whose commands these are, by side
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """For `table`."""
-        rows = [(f"{side} controller", law) for side, law in self.laws.items()]
+        rows = [(f"{side} controller", str(law)) for side, law in self.answers.items()]
         rows.append(("verified", self.verification.words))
         if self.own:
             rows.append(("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL"))
@@ -44,20 +44,17 @@ def compare_recording(recording: Recording) -> Comparison:
     With the scene's laws also under the paper's continuous feedback, to say how far from it the held commands lead.
     """
     times, scene, accuracy = recording.t, recording.scene, recording.running.accuracy
-    verification, laws = verify(recording), laws_of(recording)
-    own = recording.running.lockstep and len(recording.starts) <= 1 and not any(map(_foreign, laws.values()))
+    verification, answers = verify(recording), answers_of(recording)
+    one_run = recording.running.lockstep and len(recording.starts) <= 1
+    own = one_run and not any(found.foreign for found in answers.values())
     if not own:
-        return Comparison(verification.holds, own, None, verification, laws)
+        return Comparison(verification.holds, own, None, verification, answers)
     same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
     equal = verification.difference is None and _equal(same, recording)
     if scene.sampled or recording.changes:
-        return Comparison(equal, own, None, verification, laws)
+        return Comparison(equal, own, None, verification, answers)
     ideal = simulate(scene, grid=times, accuracy=accuracy)
-    return Comparison(equal, own, np.abs(ideal.state - recording.state).max(axis=0), verification, laws)
-
-
-def _foreign(law: str) -> bool:
-    return law.startswith(("foreign", "not known"))
+    return Comparison(equal, own, np.abs(ideal.state - recording.state).max(axis=0), verification, answers)
 
 
 def _equal(same: Trajectory, recording: Recording) -> bool:

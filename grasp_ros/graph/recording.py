@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -12,10 +13,12 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.running import Running
+from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.scene.topics import EXTERNAL_FORCES, LYAPUNOV_NAMES
@@ -32,7 +35,7 @@ class Recording(Frozen):
     versions : dict of str to str
         What the recording process ran with.
     counts : dict of str to int
-        Messages by topic, of those that have one per tick.
+        Messages by topic.
     tick : int array (n,)
         Ticks whose state is in the bag.
     state : array (n, 6), m and m/s
@@ -98,6 +101,49 @@ class Recording(Frozen):
         inputs[np.append(np.diff(self.tick) != 1, True)] = np.nan
         return inputs
 
+    @cached_property
+    def scene_tick(self) -> np.ndarray:
+        """Ticks (n,) of the scene: those of the bag since the last reset."""
+        starts = self.starts if len(self.starts) else np.zeros(1, dtype=np.int64)
+        ticks: np.ndarray = self.tick - starts[np.maximum(np.searchsorted(starts, self.tick, side="right") - 1, 0)]
+        return ticks
+
+    def laws(self) -> Iterator[Mapping[int, ControlLaw]]:
+        """The laws that the scene, or an announcement, names for each tick, by side."""
+        scene, due = self.scene, sorted(self.changes, reverse=True)
+        for tick in self.tick.tolist():
+            while due and due[-1] <= tick:
+                scene = scene.changed(self.changes[due.pop()])
+            yield scene.system.laws
+
+    @cached_property
+    def measured(self) -> Array:
+        """What the sensors of the scene made of the states (n, 6), m and m/s; NaN for a body that none measures.
+
+        This is what the laws were given. Noise is drawn from the seed of the scene and the tick, so it is the same here
+        as in the controllers, which measure the exact states that they receive. A node that is not ours does not.
+        """
+        measured = np.full_like(self.state, np.nan)
+        for row, (tick, state, laws) in enumerate(
+            zip(self.scene_tick.tolist(), self.state.tolist(), self.laws(), strict=True)
+        ):
+            for side, law in laws.items():
+                own = slice(COLUMN[side], COLUMN[side] + 2)
+                measured[row, own] = law.measured(tick, *state[own])
+        return measured
+
+    @property
+    def size(self) -> int:
+        """Bytes of the bag on the disk."""
+        files = self.path.iterdir() if self.path.is_dir() else [self.path]
+        return sum(file.stat().st_size for file in files)
+
+    @property
+    def rates(self) -> dict[str, float]:
+        """Mean rates of the messages in the bag's time, in Hz, by topic; NaN for one message alone."""
+        span = float(self.t[-1] - self.t[0]) or math.nan
+        return {name: (count - 1) / span if count > 1 else math.nan for name, count in self.counts.items()}
+
     @property
     def reached(self) -> float:
         """Simulated seconds in a second that a free run has reached, without pauses; NaN if it has not said it."""
@@ -151,5 +197,6 @@ class Recording(Frozen):
         And what is `unheard`.
         """
         ticks = int(self.tick.max(initial=-1)) + 1
-        held = () if self.running.lockstep else [topic.name for topic in self.scene.controllers.values()]
-        return {**{name: ticks - count for name, count in self.counts.items() if name not in held}, **self.unheard}
+        held = () if self.running.lockstep else self.scene.controllers.values()
+        every_tick = [topic.name for topic in self.scene.topics if topic not in held]
+        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard}

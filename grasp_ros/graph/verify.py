@@ -88,33 +88,49 @@ def verify(recording: Recording) -> Verification:
     return Verification(ticks, first, problem)
 
 
-def laws_of(recording: Recording) -> dict[str, str]:
-    """Whose law gave the commands, by side: compared with the law that the scene or an announcement names.
+class Answers(NamedTuple):
+    """How many commands of a controller are those of the law that the scene, or an announcement, names."""
 
-    In a free run the commands act when they come, and which state they answer is not compared.
-    """
-    if not recording.running.lockstep:
-        return {name.removesuffix("_controller"): "held, not compared" for name in recording.scene.controllers}
-    found = {}
-    scenes, scene = {}, recording.scene
-    for tick, numbers in recording.changes.items():
-        scenes[tick] = scene = scene.changed(numbers)
-    starts = _scene_ticks(recording)
+    commands: int  # in the bag
+    own: int | None  # those of the law; None: a free run, where they act when they come and are not compared
+    lost: int  # announcements of its numbers that the bag lacks, as far as that may be why commands differ
+    topic: str
+
+    @property
+    def foreign(self) -> bool:
+        """Whether some command is another one, or may be."""
+        return self.own is not None and self.own < self.commands
+
+    def __str__(self) -> str:
+        if self.own is None:
+            return "held, not compared"
+        if not self.foreign:
+            return "the scene's law"
+        if self.lost:
+            return f"not known: the bag lacks {self.lost} announcements of its numbers"
+        others = f"{self.commands - self.own} of {self.commands} commands on {self.topic}"
+        return f"foreign: {others} are not those of the scene's law"
+
+
+def answers_of(recording: Recording) -> dict[str, Answers]:
+    """Whose law gave the commands, by side: compared with the law that the scene or an announcement names."""
+    found, ticks = {}, recording.scene_tick.tolist()
     for name, topic in recording.scene.controllers.items():
         side = name.removesuffix("_controller")
-        body, laws, equal = SIDES[side], recording.scene.system.laws, 0
-        x, v = (recording.state[:, COLUMN[body] + i].tolist() for i in (0, 1))
-        for row, (tick, at) in enumerate(zip(recording.tick.tolist(), starts.tolist(), strict=True)):
-            laws = scenes[tick].system.laws if tick in scenes else laws
-            equal += laws[body].command(at, x[row], v[row]) == recording.command[row, body]
-        every = len(recording.tick)
-        if equal < every and (lost := recording.unheard.get(CHANGES[side].name)):
-            found[side] = f"not known: the bag lacks {lost} announcements of its numbers"
+        if not recording.running.lockstep:
+            found[side] = Answers(recording.counts[topic.name], None, 0, topic.name)
             continue
-        found[side] = "the scene's law" if equal == every else (
-            f"foreign: {every - equal} of {every} commands on {topic.name} are not those of the scene's law"
-        )
+        body = SIDES[side]
+        columns = [*recording.state[:, COLUMN[body] :][:, :2].T, recording.command[:, body]]
+        rows = zip(recording.laws(), ticks, *(column.tolist() for column in columns), strict=True)
+        equal = sum(laws[body].command(tick, x, v) == force for laws, tick, x, v, force in rows)
+        found[side] = Answers(len(ticks), int(equal), recording.unheard.get(CHANGES[side].name, 0), topic.name)
     return found
+
+
+def laws_of(recording: Recording) -> dict[str, str]:
+    """What `answers_of` says, in words."""
+    return {side: str(answers) for side, answers in answers_of(recording).items()}
 
 
 def _gap(recording: Recording) -> str:
@@ -145,14 +161,6 @@ def _episodes(recording: Recording) -> Iterator[np.ndarray]:
         rows = np.arange(begin, end)
         gaps = np.flatnonzero(np.diff(recording.tick[rows]) != 1)
         yield rows[: gaps[0] + 1] if len(gaps) else rows
-
-
-def _scene_ticks(recording: Recording) -> np.ndarray:
-    """Ticks of the scene: those of the bag since the last reset."""
-    starts = recording.starts if len(recording.starts) else np.zeros(1, dtype=np.int64)
-    since = starts[np.maximum(np.searchsorted(starts, recording.tick, side="right") - 1, 0)]
-    ticks: np.ndarray = recording.tick - since
-    return ticks
 
 
 def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:

@@ -1,0 +1,71 @@
+"""What is in a bag in a few numbers, as data: what `grasp inspect` prints, with `--json` and as a table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.verify import Answers, Verification
+from grasp_ros.physics.model import Array, Mode
+from grasp_ros.scene.topics import LYAPUNOV_NAMES
+
+
+def summary(recording: Recording) -> dict[str, Any]:
+    """Numbers of a bag by names that end with their unit; what the bag does not have is left out.
+
+    V is twice the energy. `topics` are those that have a message; their rates are means over the bag's time. `contacts`
+    is how often a pair began to touch, as far as the ticks show it.
+    """
+    scene, running, rates = recording.scene, recording.running, recording.rates
+    found: dict[str, Any] = {
+        "bag": str(recording.path), "size_bytes": recording.size, "title": scene.title, "watch": scene.watch,
+        "warnings": list(scene.warnings), "feedback": scene.feedback_in_words(sampled=True),
+        "lockstep": running.lockstep, "accuracy": running.accuracy, "resets": max(len(recording.starts) - 1, 0),
+        "ticks": len(recording.tick), "duration_s": float(recording.t[-1]), "scene_duration_s": scene.duration,
+        "topics": {name: {"messages": count, "rate_Hz": rates[name]} for name, count in recording.counts.items()
+                   if count},
+        "missing": {name: count for name, count in recording.missing.items() if count},
+        "end": recording.lost["end"], "recorded_with": dict(recording.versions),
+        "changes": [{"tick": tick, "time_s": scene.time_of(tick), **numbers}
+                    for tick, numbers in recording.changes.items()],
+        **_levels(recording),
+    }
+    if not running.lockstep:
+        found["real_time_factor"] = running.real_time_factor
+    if recording.timing:
+        found |= {
+            "reached_s_per_s": recording.reached, "overruns": recording.overruns,
+            "given_up_s": float(recording.timing["lost_s"][-1]),
+            "command_age_periods": {side: {"p99": usual, "max": most}
+                                    for side, (usual, most) in recording.ages.items()},
+        }
+    return found
+
+
+def _levels(recording: Recording) -> dict[str, Any]:
+    """Contacts, energies and their balance."""
+    named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
+    level = recording.energy
+    return {
+        "contacts": {"left": _beginnings(named["mode"], Mode.LEFT), "right": _beginnings(named["mode"], Mode.RIGHT)},
+        "energy_of": recording.energy_of, "V_J": level.V[[0, -1]], "V_c_J": level.V_c[[0, -1]],
+        "work_J": 0.5 * float(np.nansum(named["work"])), "alarms": recording.alarms,
+    }
+
+
+def _beginnings(mode: Array, flag: Mode) -> int:
+    touching = (np.nan_to_num(mode).astype(int) & int(flag)) != 0
+    return int(np.count_nonzero(touching[1:] & ~touching[:-1]) + touching[0])
+
+
+def verified(verification: Verification, answers: dict[str, Answers]) -> dict[str, Any]:
+    """What became of a bag that was simulated again, as data; `difference` is the first number that differs."""
+    difference = verification.difference
+    return {
+        "holds": verification.holds, "states_compared": verification.ticks, "problem": verification.problem or None,
+        "difference": difference._asdict() if difference else None,
+        "controllers": {side: {"commands": found.commands, "of_the_scene": found.own, "announcements_lost": found.lost}
+                        for side, found in answers.items()},
+    }

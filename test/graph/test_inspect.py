@@ -1,0 +1,79 @@
+"""What `grasp inspect` and `grasp verify` say of a bag, as data, and what the sensors measured in it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
+from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array
+from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.simulation.ticks import Loop
+from lab.drills import recorder
+
+NOISY = ["time.duration_s=0.5", "loop.delay_ticks=3", "left_sensor.noise_seed=7", "left_sensor.position_noise_m=1e-3",
+         "left_sensor.velocity_step_m_per_s=0.01"]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Trajectory]:
+    """A bag, and what it was made of."""
+    path, run = tmp_path_factory.mktemp("noisy") / "bag", simulate(scenes.load("case_01", NOISY))
+    recorder.write(path, run)
+    return path, run
+
+
+def test_inspect_says_size_duration_and_rates_in_numbers(recorded: tuple[Path, Trajectory], command: Any) -> None:
+    path, run = recorded
+    found = json.loads(command("inspect", str(path), "--json", "--replay").stdout)
+    assert found["size_bytes"] == sum(file.stat().st_size for file in path.iterdir())
+    assert (found["duration_s"], found["scene_duration_s"], found["ticks"]) == (0.5, 0.5, 501)
+    assert found["topics"]["joint_states"] == {"messages": 501, "rate_Hz": 1000.0}
+    assert found["topics"]["scene"] == {"messages": 1, "rate_Hz": None}
+    assert "/diagnostics" not in found["topics"]
+    assert found["V_J"] == run.energy.V[[0, -1]].tolist()
+    assert (found["missing"], found["alarms"], found["lockstep"], found["resets"]) == ({}, 0, True, 0)
+    assert (found["replay"]["equal"], found["replay"]["states_compared"]) == (True, 501)
+    shown = command("inspect", str(path)).stdout
+    assert f"\nsize                     {found['size_bytes'] / 1e6:.3g} MB\n" in shown
+    assert "501 at 1000 Hz: /clock, joint_states, left/effort_command, " in shown
+
+
+def test_verify_says_in_numbers_what_differs(recorded: tuple[Path, Trajectory], tmp_path: Path, command: Any) -> None:
+    path, run = recorded
+    found = json.loads(command("verify", str(path), "--json").stdout)
+    own = {"commands": 501, "of_the_scene": 501, "announcements_lost": 0}
+    assert found == {"bag": str(path), "lockstep": True, "holds": True, "states_compared": 501, "problem": None,
+                     "difference": None, "controllers": {"left": own, "right": own}}
+    command_of_all = run.command.copy()
+    command_of_all[20, RIGHT] += 1e-3
+    recorder.write(tmp_path / "wrong", replace(run, loop=Loop(command_of_all, run.inputs)))
+    asked = command("verify", str(tmp_path / "wrong"), "--json")
+    found = json.loads(asked.stdout)
+    assert (asked.returncode, found["holds"], found["controllers"]["right"]["of_the_scene"]) == (1, False, 500)
+    difference = found["difference"]
+    assert (difference["tick"], difference["topic"], difference["name"]) == (24, "joint_states", "right effort")
+    assert difference["computed"] - difference["recorded"] == pytest.approx(1e-3)
+
+
+def test_a_recording_gives_what_the_laws_were_given(recorded: tuple[Path, Trajectory]) -> None:
+    path, run = recorded
+    given: list[Array] = []
+
+    def notes(_: int, __: float, x: float, v: float) -> float:
+        given.append(np.array([x, v]))
+        return float(run.command[len(given) - 1, LEFT])
+
+    assert simulate(run.scene, controllers={"left": notes}).state.tobytes() == run.state.tobytes()
+    recording = bag.read(path)
+    assert recording.measured[:, :2].tobytes() == np.array(given).tobytes()
+    assert (recording.measured[:, 4:] == recording.state[:, 4:]).all()
+    assert np.isnan(recording.measured[:, 2:4]).all()
+    assert np.std(recording.measured[:, 0] - recording.state[:, 0]) == pytest.approx(1e-3, rel=0.1)
