@@ -30,6 +30,7 @@ from grasp_ros.graph.host import check_reach, network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
+from grasp_ros.physics.errors import Refused
 
 if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
     from grasp_ros.graph.recording import Recording
@@ -82,6 +83,7 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "watch", _watch)
     sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
+    sub.add_argument("--from", dest="first", type=float, metavar="S", help="time in the bag to begin at, in s")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     _add_network(sub)
     sub = add_command(commands, "ctl", _ctl)
@@ -262,12 +264,14 @@ def _replay(options: argparse.Namespace) -> int:
 
 def _watch(options: argparse.Namespace) -> int:
     if options.bag is None:
+        if options.first is not None:
+            raise Refused(f"--from {options.first!r} is not allowed; allowed: with a bag")
         _reach(options)
         become("watch", {}, options.namespace)
     from grasp_ros.cli.watch import play
     from grasp_ros.graph import bag
 
-    play(bag.read(options.bag), options.rate)
+    play(bag.read(options.bag), options.rate, options.first)
     return 0
 
 

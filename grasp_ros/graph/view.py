@@ -19,7 +19,7 @@ from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
 STYLES = {"left": "bold blue", "object": "bold white", "right": "bold red"}
 SIGNS = {"left": "[L]", "object": "(O)", "right": "[R]"}
-TRACK, BAR = 72, 30  # characters
+WIDEST, NARROW, LEAST = 80, 66, 40  # columns of the picture: at most, below which words are short, and at least
 CONTACT = {Mode.NONE: "none", Mode.LEFT: "left", Mode.RIGHT: "right", Mode.BOTH: "left and right"}
 
 
@@ -42,69 +42,75 @@ class View:
     ----------
     scene : Scene
         Its initial state gives the scale of the line.
+    hint : str, optional
+        Keys that there are.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, hint: str = "") -> None:
+        self.scene, self._hint = scene, hint
         places = np.abs(scene.initial_state[0::2])
         self._reach = 1.25 * float(places.max()) or 1.0
         self._most = 0.0  # energy shown so far, J
 
-    def draw(self, moment: Moment) -> RenderableType:
-        """A renderable of rich."""
+    def draw(self, moment: Moment, width: int = WIDEST) -> RenderableType:
+        """A renderable of rich for a terminal with so many columns."""
+        width = min(max(width, LEAST), WIDEST)
         self._reach = max(self._reach, float(np.nanmax(np.abs(moment.state[0::2]))))
+        hint = [Text(self._hint, style="dim")] if self._hint else []
         parts = Group(
-            self._line(moment.state), self._ruler(), "", self._bodies(moment), "", self._energy(moment.level)
+            self._line(moment.state, width - 8), self._ruler(width - 8), "", self._bodies(moment, width < NARROW), "",
+            *self._energy(moment.level, width), *hint,
         )
         below = f"t = {moment.time:.3f} s   {moment.words}"
-        return Panel(parts, title=self.scene.title, subtitle=below, width=80)
+        return Panel(parts, title=self.scene.title, subtitle=below, width=width)
 
-    def _line(self, state: Array) -> Text:
+    def _line(self, state: Array, track: int) -> Text:
         """Each body at its place; one that is behind another is moved aside by a character."""
-        row, taken = Text(" " * TRACK), -1
+        row, taken = Text(" " * track), -1
         for body in sorted(NAMES, key=lambda body: COLUMN[body]):
             x = float(state[COLUMN[body]])
             if np.isnan(x):
                 continue
             sign, style = SIGNS[NAMES[body]], STYLES[NAMES[body]]
-            middle = round((x / self._reach + 1.0) * 0.5 * (TRACK - 1))
-            begin = min(max(middle - 1, taken + 1, 0), TRACK - 3)
+            middle = round((x / self._reach + 1.0) * 0.5 * (track - 1))
+            begin = min(max(middle - 1, taken + 1, 0), track - 3)
             row = Text.assemble(row[:begin], (sign, style), row[begin + 3 :])
             taken = begin + 2
         return row
 
-    def _ruler(self) -> Text:
+    def _ruler(self, track: int) -> Text:
         left, right = f"{-self._reach:.3g} m", f"{self._reach:.3g} m"
-        gap = (TRACK - 1) // 2
-        return Text(f"{left:<{gap}}0{right:>{TRACK - gap - 1}}", style="dim")
+        gap = (track - 1) // 2
+        return Text(f"{left:<{gap}}0{right:>{track - gap - 1}}", style="dim")
 
-    def _bodies(self, moment: Moment) -> Table:
-        table = Table(box=None, padding=(0, 2))
-        force = "command, N" if moment.answers else "acted, N"
-        for heading in ("", "x, m", "v, m/s", force, "impact, N"):
+    def _bodies(self, moment: Moment, narrow: bool) -> Table:
+        table = Table(box=None, padding=(0, 1 if narrow else 2), collapse_padding=narrow, pad_edge=not narrow)
+        force = "f, N" if narrow else "command, N" if moment.answers else "acted, N"
+        for heading in ("", "x, m", "v, m/s", force, "fw, N" if narrow else "impact, N"):
             table.add_column(heading, justify="right" if heading else "left")
+        places = 3 if narrow else 5
         for body, name in NAMES.items():
             x, v = moment.state[COLUMN[body] : COLUMN[body] + 2]
             if not np.isnan(x):
                 forces = [moment.commands.get(name), moment.impacts.get(name)] if name in SIDES else [None, None]
-                words = ["" if force is None else f"{force:+.4f}" for force in forces]
-                table.add_row(Text(name, style=STYLES[name]), f"{x:+.5f}", f"{v:+.5f}", *words)
+                words = ["" if force is None else f"{force:+.{places - 1}f}" for force in forces]
+                table.add_row(Text(name, style=STYLES[name]), f"{x:+.{places}f}", f"{v:+.{places}f}", *words)
         return table
 
-    def _energy(self, level: Mapping[str, float]) -> Table:
-        closed = level.get("closed") == 1.0
+    def _energy(self, level: Mapping[str, float], width: int) -> list[RenderableType]:
+        closed, bar = level.get("closed") == 1.0, max(width - 50, 6)
         names = ("V_c", "V") if closed else ("V_plant",)
-        table = Table(box=None, padding=(0, 2), show_header=False)
+        table = Table(box=None, padding=(0, 1 if width < NARROW else 2), show_header=False, pad_edge=width >= NARROW)
         for name in names:
             value = level.get(name, np.nan)
             self._most = np.nanmax([self._most, value])
-            filled = 0 if np.isnan(value) or not self._most else round(BAR * max(value, 0.0) / self._most)
+            filled = 0 if np.isnan(value) or not self._most else round(bar * max(value, 0.0) / self._most)
             table.add_row(name, f"{value:.6g} J", Text("█" * filled, style="green" if closed else "yellow"))
         mode = Mode(int(np.nan_to_num(level.get("mode", 0.0))))
-        table.add_row("contact", CONTACT[mode], "" if closed else "V: no law is announced, or another one ran")
+        table.add_row("contact", CONTACT[mode], "")
         alarm = level.get("alarm", 0.0) == 1.0
         table.add_row("balance", Text("ALARM", style="bold red") if alarm else "closes", "")
-        return table
+        return [table] if closed else [table, "V: no law is announced, or another one ran"]
 
 
 def named(values: Iterable[float]) -> dict[str, float]:

@@ -27,7 +27,8 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.picture import ASIDE, NEWTONS_PER_METRE, TOUCHING, markers
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.view import SIGNS, TRACK, Moment, View
+from grasp_ros.graph.tools.watch import HINT
+from grasp_ros.graph.view import SIGNS, Moment, View
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces
@@ -36,6 +37,7 @@ from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRI
 from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real processes
+TRACK = 72  # columns
 CONFIG = Path(__file__).parents[2] / "config"
 
 
@@ -88,7 +90,7 @@ def test_the_markers_show_what_the_drawing_of_the_same_state_shows(two_runs: tup
     assert len(set(level.mode[ticks])) == 4
     for tick in ticks:
         state, impact = recording.state[tick], dict(zip(CONTACTS, impacts[tick], strict=True))
-        line = view._line(state).plain
+        line = view._line(state, TRACK).plain
         picture = markers(recording.scene, 0, state).markers
         boxes = {marker.id: marker for marker in picture if marker.ns == "masses"}
         places = {name: boxes[body].pose.position.x - ASIDE[name] for body, name in NAMES.items()}
@@ -180,7 +182,7 @@ def test_the_picture_of_the_page_is_one_state() -> None:
     tick = round(1000 * float(re.findall(r"t = (\S+) s", page)[0]))
     [words] = re.findall(r"t = \S+ s +(\d+ ticks/s)", page)
     run = simulate(scene.load("case_01", ["time.duration_s=8"]), sampled=True)
-    view, level, impacts = View(run.scene), run.energy, run.impacts
+    view, level, impacts = View(run.scene, HINT), run.energy, run.impacts
     for row in (0, tick):
         known = {"V": level.V[row], "V_c": level.V_c[row], "mode": float(level.mode[row]), "closed": 1.0}
         moment = Moment(float(run.t[row]), run.state[row], dict(zip(CONTACTS, run.command[row], strict=True)),
@@ -206,27 +208,3 @@ def test_layouts_name_topics_and_values_that_are_there() -> None:
     assert len(curves) == 10
     assert {f"/lyapunov/{name}/position" for name in ("V", "V_c", "V_plant")} <= set(curves)
     assert all(any(str(curve).startswith(f"{topic}/") for topic in topics) for curve in curves)
-
-
-def test_a_bag_is_watched_in_a_terminal(two_runs: tuple[Path, Path]) -> None:
-    ours, theirs = pty.openpty()
-    command = [sys.executable, "-m", "grasp_ros.cli", "watch", str(two_runs[0] / "bag"), "--rate", "3"]
-    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
-    watch = subprocess.Popen(command, stdout=theirs, stderr=theirs, env=environment)
-    os.close(theirs)
-    shown = b""
-    try:
-        while chunk := os.read(ours, 65536):
-            shown += chunk
-    except OSError:  # the other end is closed
-        pass
-    os.close(ours)
-    assert watch.wait(DEADLINE) == 0
-    text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown.decode())
-    pictures = text.split("Case 1, Fig. 2: standard parameters")[1:]
-    assert len(pictures) >= 4
-    last, level = bag.read(two_runs[0] / "bag").state[-1], bag.read(two_runs[0] / "bag").energy
-    assert f"{last[0]:+.5f}" in pictures[-1]
-    assert f"{level.V_c[-1]:.6g} J" in pictures[-1]
-    assert "t = 3.000 s" in pictures[-1]
-    assert all(sign in pictures[-1] for sign in ("[L]", "(O)", "[R]"))

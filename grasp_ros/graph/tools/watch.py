@@ -1,20 +1,24 @@
-"""`grasp watch`: a running graph in the terminal."""
+"""`grasp watch`: a running graph in the terminal, with keys that pause and step its plant."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from contextlib import suppress
 from functools import partial
 from typing import Any
 
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from rich.live import Live
+from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.host import place
+from grasp_ros.graph.keys import Key, Keys
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import GraspNode
@@ -23,6 +27,7 @@ from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of
 
 FRAME_SECONDS = 0.1
+HINT = "Space pause   → step   q quit"
 PATIENCE_SECONDS = 10.0  # for a plant to come
 STALE_SECONDS = 1.0  # after a reset: what waits here may still be of the time before it
 MOST_OPEN = WINDOW + 500  # states of which not all has come; a monitor may be WINDOW behind
@@ -63,7 +68,7 @@ class Newest:
 
 
 class Watch(GraspNode):
-    """Node `watch`: draws the newest whole state some times a second. No plant waits for it.
+    """Node `watch`: draws the newest whole state some times a second. No plant waits for it; keys steer one.
 
     Parameters
     ----------
@@ -88,10 +93,15 @@ class Watch(GraspNode):
                 messages.TYPES[topic.type], topic.name, partial(self._on_message, topic), messages.glance_qos(topic),
                 raw=True,
             )
-        self.wall_timer(FRAME_SECONDS, self._draw)
+        self._asks = {name: self.create_client(Trigger, f"plant/{name}") for name in ("pause", "resume", "step")}
+        self._asks["steps"] = self.create_client(SetParameters, "plant/set_parameters")
+        self.wall_timer(FRAME_SECONDS, self._look)
+        self._keys = Keys()
+        self._keys.start()
 
     def _on_scene(self, message: Any) -> None:
-        self._view = View(scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}"))
+        scene = scenes.parse(message.data, SCENE.name, f"topic {SCENE.name}")
+        self._view = View(scene, HINT if self._keys.there else "")
         self._newest = Newest()
 
     def _on_run(self, message: Any) -> None:
@@ -101,6 +111,25 @@ class Watch(GraspNode):
         if messages.SHORTEST <= len(cdr) <= messages.MOST_BYTES and (topic in self._needed or topic == JOINT_STATES):
             self._newest.put(topic, cdr, self._needed)
 
+    def _look(self) -> None:
+        """Do what keys ask for, and draw."""
+        for key in self._keys.pressed():
+            if key is Key.QUIT:
+                self.finished = True
+            elif key is Key.PAUSE:  # refused by a plant that is paused
+                self._ask("pause", lambda answer: None if answer.success else self._ask("resume"))
+            elif key is Key.FORWARD:
+                self._ask("pause", lambda _: self._ask("steps", lambda _: self._ask("step")))
+        self._draw()
+
+    def _ask(self, name: str, then: Callable[[Any], None] = lambda _: None) -> None:
+        """Call a service of the plant, if it is there; then go on with its answer."""
+        client = self._asks[name]
+        one = [Parameter("steps", value=1).to_parameter_msg()]
+        request = SetParameters.Request(parameters=one) if name == "steps" else Trigger.Request()
+        if client.service_is_ready():
+            client.call_async(request).add_done_callback(lambda future: then(future.result()))
+
     def _draw(self) -> None:
         held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
         there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.count_publishers(topic.name))
@@ -108,7 +137,8 @@ class Watch(GraspNode):
         alone = not self.count_publishers(JOINT_STATES.name)
         if self._view is not None and self._newest.found:
             with suppress(*messages.UNREADABLE):  # of a sender that says something else
-                self._live.update(self._view.draw(self._moment(self._newest.found, alone)), refresh=True)
+                moment = self._moment(self._newest.found, alone)
+                self._live.update(self._view.draw(moment, self._live.console.width), refresh=True)
         elif alone and time.monotonic() > self._created + PATIENCE_SECONDS:
             self.fail(self._nobody)
 
@@ -132,7 +162,8 @@ class Watch(GraspNode):
         return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)
 
     def close(self) -> None:
-        """Leave the last picture on the terminal."""
+        """Leave the last picture on the terminal, and give that back."""
+        self._keys.close()
         self._live.stop()
 
 

@@ -1,0 +1,221 @@
+"""`grasp watch` on a pseudo-terminal: its keys, the size of its picture, and the terminal that it gives back."""
+
+from __future__ import annotations
+
+import fcntl
+import io
+import json
+import os
+import pty
+import re
+import select
+import signal
+import struct
+import sys
+import termios
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import DEADLINE, START, wait_for
+from rclpy.executors import SingleThreadedExecutor
+from rich.console import Console
+from std_srvs.srv import Trigger
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.watch import HINT, moment_of
+from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.view import View
+from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.simulation import simulate
+from lab.drills import recorder
+
+pytestmark = pytest.mark.slow  # real processes
+SHELL = 'trap : INT TERM HUP; "$@"; echo "status $?"; read end'  # the terminal is there as long as it is
+RIGHT, LEFT, INTERRUPT = b"\x1b[C", b"\x1b[D", b"\x03"
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag of two seconds."""
+    path = tmp_path_factory.mktemp("watched") / "bag"
+    recorder.write(path, simulate(scenes.load("case_01", ["time.duration_s=2"]), sampled=True))
+    return path
+
+
+class Screen:
+    """A terminal of its own for a process."""
+
+    def __init__(self, launch: Callable[..., Any], *command: str, columns: int = 80) -> None:
+        self._ours, self._theirs = pty.openpty()
+        fcntl.ioctl(self._theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+        self._before, self._shown = termios.tcgetattr(self._theirs), ""
+        environment = {**os.environ, "TERM": "xterm-256color", "LC_ALL": "C.UTF-8"}
+        sides = dict.fromkeys(("stdin", "stdout", "stderr"), self._theirs)
+        self._shell = launch("setsid", "-c", "sh", "-c", SHELL, "sh", *command, env=environment, **sides)
+
+    def press(self, key: bytes) -> None:
+        """Press a key; what was shown before is forgotten."""
+        self._read(0.0)
+        self._shown = ""
+        os.write(self._ours, key)
+
+    def _read(self, seconds: float) -> None:
+        while select.select([self._ours], [], [], seconds)[0]:
+            self._shown += os.read(self._ours, 65536).decode(errors="replace")
+
+    def wait(self, pattern: str) -> str:
+        """The newest whole picture, once one matches."""
+        deadline = time.monotonic() + DEADLINE
+        while time.monotonic() < deadline:
+            self._read(0.02)
+            text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self._shown)
+            pictures = re.findall(r"╭[^╭]*╯", text)
+            if pictures and re.search(pattern, pictures[-1]):
+                return str(pictures[-1])
+        raise AssertionError(f"waited in vain for {pattern}: {self._shown[-2000:]!r}")
+
+    def kill(self, number: int) -> None:
+        """Send a signal to the process."""
+        children = Path(f"/proc/{self._shell.pid}/task/{self._shell.pid}/children").read_text().split()
+        os.kill(int(children[0]), number)
+
+    @property
+    def as_before(self) -> bool:
+        """Whether the terminal is as it was at first."""
+        return termios.tcgetattr(self._theirs) == self._before
+
+    def end(self) -> int:
+        """Exit status of the process."""
+        def status() -> list[str]:
+            self._read(0.02)
+            return re.findall(r"status (\d+)", self._shown)
+
+        wait_for(lambda: bool(status()), "the end")
+        return int(status()[0])
+
+
+def watch(path: Path, *options: str) -> list[str]:
+    """The command for a bag."""
+    return [sys.executable, "-m", "grasp_ros.cli", "watch", str(path), *options]
+
+
+def time_in(picture: str) -> float:
+    """The time that is shown, s."""
+    return float(re.findall(r"t = (\S+) s", picture)[0])
+
+
+def test_keys_pause_step_and_end_a_bag(launch: Any, path: Path) -> None:
+    recording = bag.read(path)
+    screen = Screen(launch, *watch(path, "--rate", "0.05", "--from", "1.5"))
+    assert time_in(screen.wait("0.05 s in a second")) == pytest.approx(1.5, abs=0.1)
+    assert not screen.as_before
+    screen.press(b" ")
+    at = time_in(screen.wait("paused"))
+    for key, ticks in ((RIGHT, 1), (RIGHT, 2), (LEFT, 1), (b"\x1bOD", 0), (LEFT, -1)):
+        screen.press(key)
+        picture = screen.wait(rf"t = {at + 0.001 * ticks:.3f} s   paused")
+        assert f"{recording.state[round(1000 * at) + ticks, 0]:+.5f}" in picture
+    screen.press(b" ")
+    screen.wait("0.05 s in a second")
+    screen.press(b"q")
+    assert screen.end() == 0
+
+
+def test_a_bag_is_shown_to_its_end(launch: Any, path: Path) -> None:
+    recording = bag.read(path)
+    screen = Screen(launch, *watch(path, "--rate", "3"), columns=90)
+    picture = screen.wait("t = 2.000 s")
+    assert f"{recording.state[-1, 0]:+.5f}" in picture
+    assert f"{recording.energy.V_c[-1]:.6g} J" in picture
+    assert screen.end() == 0
+
+
+@pytest.mark.parametrize(
+    ("ending", "status"), [(b"q", 0), (INTERRUPT, 130), (signal.SIGTERM, 130), (signal.SIGHUP, 130)]
+)
+def test_the_terminal_is_given_back_however_it_ends(launch: Any, path: Path, ending: Any, status: int) -> None:
+    screen = Screen(launch, *watch(path, "--rate", "0.01"), columns=40)
+    screen.wait("t = ")
+    assert not screen.as_before
+    if isinstance(ending, bytes):
+        screen.press(ending)
+    else:
+        screen.kill(ending)
+    assert screen.end() == status
+    assert screen.as_before
+
+
+@pytest.mark.parametrize("width", [100, 80, 66, 65, 40])
+def test_the_picture_is_whole_at_every_width(path: Path, width: int) -> None:
+    recording = bag.read(path)
+    row = int(np.argmax(recording.outputs["contact/left"]))
+    for closed in (1.0, 0.0):
+        console = Console(width=width, file=io.StringIO(), color_system=None)
+        moment = moment_of(recording, row, "paused")
+        moment = moment._replace(level={**moment.level, "closed": closed})
+        console.print(View(recording.scene, HINT).draw(moment, console.width))
+        picture = console.file.getvalue()  # type: ignore[attr-defined]
+        lines = picture.splitlines()
+        assert {len(line) for line in lines} == {min(width, 80)}
+        assert len(lines) < 24
+        assert "…" not in picture
+        places = 5 if width >= 66 else 3
+        for number in recording.state[row]:
+            assert f"{number:+.{places}f}" in picture
+        assert f"{moment.impacts['left']:+.{places - 1}f}" in picture
+        words = ("[L]", "(O)", "[R]", recording.scene.title, HINT, "closes", f"t = {moment.time:.3f} s   paused")
+        assert all(word in picture for word in words)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [(["--from", "2.5"], "--from: 2.5 is not allowed; allowed: 0 to 2 s"),
+     (["--from", "nan"], "--from: nan is not allowed; allowed: 0 to 2 s"),
+     (["--rate", "0"], "--rate: 0.0 is not allowed; allowed: a number > 0")],
+)
+def test_what_cannot_be_shown_is_refused(path: Path, command: Any, options: list[str], words: str) -> None:
+    found = command("watch", str(path), *options)
+    assert (found.returncode, found.stderr) == (2, f"grasp: {words}\n")
+    assert command("watch", "--from", "1").stderr == "grasp: --from 1.0 is not allowed; allowed: with a bag\n"
+
+
+def test_keys_pause_and_step_a_running_plant(
+    launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    client = peer.create_client(Trigger, "plant/status")
+
+    def status() -> dict[str, Any]:
+        assert client.wait_for_service(timeout_sec=DEADLINE)
+        future = client.call_async(Trigger.Request())
+        executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
+        found: dict[str, Any] = json.loads(future.result().message)
+        return found
+
+    case = scenes.load("case_01", ["time.duration_s=1000"])
+    graph = Graph(case, tmp_path / "run", ACCURACY, one_process=True)
+    graph.start()
+    try:
+        screen = Screen(launch, *START, "watch")
+        screen.wait(r"[1-9]\d* ticks/s")
+        screen.press(b" ")
+        wait_for(lambda: status()["state"] == "paused", "a pause")
+        tick = status()["tick"]
+        for step in (1, 2):
+            screen.press(RIGHT)
+            screen.wait(f"t = {case.time_of(tick + step):.3f} s")
+            assert (status()["tick"], status()["state"]) == (tick + step, "paused")
+        screen.press(b" ")
+        wait_for(lambda: status()["tick"] > tick + 10, "the run to go on")
+        screen.press(RIGHT)
+        wait_for(lambda: status()["state"] == "paused", "a pause")
+        screen.press(b"q")
+        assert screen.end() == 0
+        assert screen.as_before
+    finally:
+        graph.stop()
