@@ -48,7 +48,8 @@ def add_to(commands: Any) -> None:
     )
     sub.add_argument(
         "--controller", dest="laws", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
-        help="a law of your own in place of the scene's: called with tick, time, x and v it returns the force",
+        help="a law of your own in place of the scene's: called with tick, time, x, v and what else it asks for by name"
+        " it returns the force",
     )
     sub.add_argument(
         "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",

@@ -42,7 +42,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--grid", type=whole(2), metavar="N", help=f"equidistant output times (default {GRID_POINTS})")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
-                     help="a callable of tick, time, x and v that returns the force, in place of the scene's feedback")
+                     help="a callable of tick, time, x, v and what it asks for by name, in place of the feedback")
     sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
                      help="print derivatives by a number of the scene, section.key, through all impacts; repeatable")
     result = sub.add_argument_group("result")

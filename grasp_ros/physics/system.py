@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.control import ControlLaw, feedback
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Arm, Array, Grasp
+from grasp_ros.physics.model import Arm, Array, Grasp, impact_force_of
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
@@ -136,6 +136,13 @@ class System:
         for force in self.external:
             forces[:, force.body] += force.over(ticks)
         return forces
+
+    def impact(self, side: int, state: Sequence[float]) -> float:
+        """Impact force fw of a pair in N, in a state (6,)."""
+        front, back = (LEFT, OBJECT) if side == LEFT else (OBJECT, RIGHT)
+        u, u_rate = (state[COLUMN[front] + part] - state[COLUMN[back] + part] for part in (0, 1))
+        hertzian, dissipation = self.pairs[side].tolist()
+        return impact_force_of(hertzian, dissipation, u, u_rate)
 
     def commands(self, tick: int, state: Array) -> Array:
         """What the controllers answer to the state of a tick, in N by body; 0 without a controller.

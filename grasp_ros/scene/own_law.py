@@ -11,8 +11,7 @@ from typing import Any
 
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
-
-CALLABLE = "a callable of tick, time, x and v"
+from grasp_ros.physics.sight import CALLABLE, asked
 
 
 def find_law(place: str, what: str) -> Law | type:
@@ -67,7 +66,7 @@ def begin(law: Law | type, what: str) -> Law:
     Raises
     ------
     Refused
-        If it cannot be called with four arguments, or is a class that cannot be called without.
+        If it cannot be called with what `physics.sight.asked` says, or is a class that cannot be called without.
     """
     begun: Any = law
     if isinstance(law, type):
@@ -82,9 +81,7 @@ def begin(law: Law | type, what: str) -> Law:
     if not callable(begun):
         raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")
     try:
-        inspect.signature(begun).bind(0, 0.0, 0.0, 0.0)
-    except ValueError:
-        pass  # some built-in callables do not tell what they take
+        asked(begun)
     except TypeError as error:
         raise Refused(f"{what}: {begun!r}: {error}; allowed: {CALLABLE}") from None
     return begun  # type: ignore[no-any-return]

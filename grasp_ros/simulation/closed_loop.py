@@ -20,6 +20,7 @@ from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.sight import check
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
@@ -38,7 +39,7 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> 
     Raises
     ------
     Refused
-        If there is no such arm, or what is to control it cannot be called.
+        If there is no such arm, or what is to control it cannot be called or asks for what is not there.
     """
     found: dict[int, Foreign] = {}
     if not controllers:
@@ -48,7 +49,8 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> 
         if side not in arms:
             allowed = " or ".join(arms) or "none, without an arm"
             raise Refused(f"controllers: {side!r} is not allowed; allowed: {allowed}")
-        found[int(SIDES[side])] = Foreign(side, begin(law, f"controllers: {side}"))
+        own = found[int(SIDES[side])] = Foreign(side, begin(law, f"controllers: {side}"))
+        check(own.asks, scene.system, SIDES[side], f"controllers: {side}")
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from grasp_ros.exact.records import Loop, new_place
 from grasp_ros.physics.control import ControlLaw, normals_over
 from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.sight import Sight
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import NANOSECONDS
 
@@ -192,12 +193,17 @@ class SampledPlant:
                 law.normals[side] = normals_over(own.seed, self.tick, count)
         for side, other in (foreign or {}).items():
             law.callee[side] = other.address
+            other.sight = partial(self._sight, laws, side)
         record = self._go(outputs, np.zeros((count, 3)), law, rows)
         if foreign and record.failed is not None:
             x, v = self.state[COLUMN[record.failed] :][:2].tolist()
             x, v = laws[record.failed].measured(self.tick, x, v)
             raise foreign[record.failed].failure(self.tick, self.time, x, v)
         return record
+
+    def _sight(self, laws: Mapping[int, ControlLaw], side: int, tick: int) -> Sight:
+        """What the controller of an arm can see; the kernels have the state of the tick in place when they ask it."""
+        return Sight(self._system, laws, side, tick, self.state.tolist())
 
     def _go(self, outputs: Outputs, answers: Array, law: KernelLaw = GIVEN, rows: Array | None = None) -> Record:
         """Advance under answers that are given, or those of a law."""

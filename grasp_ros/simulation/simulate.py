@@ -70,9 +70,10 @@ def simulate(
     controllers : mapping of str to callable
         Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
         sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
-        as the scene says. The loop is sampled. Each is called once for every tick, the last one included. A function
-        that numba has compiled runs at full speed. A class is made anew for the run; of any other object `reset()` is
-        called before it, if it has one.
+        as the scene says. Further parameters are given what their names ask for, see `physics.sight.Sight`. The loop
+        is sampled. Each is called once for every tick, the last one included. A function that numba has compiled and
+        that asks for nothing more runs at full speed. A class is made anew for the run; of any other object `reset()`
+        is called before it, if it has one.
     progress : callable or True, optional
         True: a bar, in a terminal or in a notebook. A callable is told the time reached, in s: at the end of the
         horizon, if the run gets there, and on the way, except by methods with a fixed step.

@@ -98,7 +98,7 @@ def test_a_law_begins_each_run_alike_in_both(name: str) -> None:
     own = OwnLaw(place)
     for _ in range(2):
         commands = np.array([
-            own.command(case.system.laws[LEFT], tick, case.time_of(tick), *state[:2])
+            own.command(case.system, LEFT, tick, case.time_of(tick), state)
             for tick, state in enumerate(runs[0].state.tolist())
         ])
         assert (commands.tobytes() == runs[0].command[:, LEFT].tobytes()) == anew

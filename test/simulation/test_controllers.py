@@ -125,6 +125,48 @@ def test_an_arm_without_feedback_takes_one_and_the_energy_is_that_of_the_plant(t
     plots.draw(run, tmp_path / "run.png", "a controller from outside")
 
 
+def leans(tick: int, time: float, x: float, v: float, gain: float = 2.0, *, v_other: float, impact: float) -> float:
+    """Feedback with the other arm and the contact."""
+    return -gain * x - 0.5 * (v + v_other) - 0.01 * impact
+
+
+def leans_too(tick: int, time: float, x: float, v: float, v_other: float, impact: float) -> float:
+    """The same, in an order that numba compiles."""
+    return -2.0 * x - 0.5 * (v + v_other) - 0.01 * impact
+
+
+def test_a_controller_is_given_what_it_asks_for_by_name() -> None:
+    scene = scenes.load("case_01", [SHORT, "loop={}", "left_feedback.set_point_m=0.02", "right_sensor.noise_seed=3",
+                                    "right_sensor.velocity_step_m_per_s=0.1"])
+    seen: list[tuple[float, ...]] = []
+
+    def notes(
+        tick: int, time: float, x: float, v: float, set_point: float, x_object: float, v_object: float, x_other: float,
+        v_other: float, impact: float, impact_other: float,
+    ) -> float:
+        seen.append((x_object, v_object, x_other, v_other, impact, impact_other, set_point))
+        return leans(tick, time, x, v, v_other=v_other, impact=impact)
+
+    run = simulate(scene, controllers={"left": notes})
+    given = np.array(seen)
+    expected = np.column_stack([run.state[:, 2:5], given[:, 3], run.impacts, np.full(len(run.t), 0.02)])
+    assert given.tobytes() == expected.tobytes()
+    assert np.abs(given[:, 3] - run.state[:, 5]).max() <= 0.05 + 1e-12
+    assert np.abs(given[:, 3] / 0.1 - np.round(given[:, 3] / 0.1)).max() < 1e-9
+    assert run.impacts.max(axis=0).min() > 1.0
+    for law in (leans, leans_too, numba.njit(leans_too)):
+        again = simulate(scene, controllers={"left": law})
+        assert again.state.tobytes() == run.state.tobytes()
+
+
+def test_what_a_scene_does_not_have_cannot_be_asked_for() -> None:
+    def asks(tick: int, time: float, x: float, v: float, x_object: float, v_other: float) -> float:
+        return 0.0
+
+    with pytest.raises(Refused, match="controllers: left: asks for x_object; the scene has no object"):
+        simulate(scenes.load("arm_alone"), controllers={"left": asks})
+
+
 def fails_at_seven(tick: int, time: float, x: float, v: float) -> float:
     """1 / 0 at tick 7."""
     return 1.0 / (tick - 7)

@@ -3,7 +3,7 @@
     double command(int64 tick, double time, double x, double v)     s, m, m/s to N
 
 A function that numba has compiled runs at full speed. Any other callable is called through ctypes, which takes the
-interpreter's lock for as long as it runs.
+interpreter's lock for as long as it runs; so is a compiled one that asks for more than these, see `physics.sight`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from numba.extending import intrinsic, is_jitted
 
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.sight import Sight, asked
 
 SIGNATURE = float64(int64, float64, float64, float64)
 PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double)
@@ -60,6 +61,11 @@ if numba.config.DISABLE_JIT:
         return float(PROTOTYPE(int(address))(tick, time, x, v))
 
 
+def _nothing(tick: int) -> Sight:
+    """Before a run."""
+    raise RuntimeError(f"no run, tick {tick}")
+
+
 class Foreign:
     """A controller from outside, as the kernels call it.
 
@@ -68,10 +74,15 @@ class Foreign:
     side : str
         Whose arm it controls; what messages say.
     law : callable
-        From tick, time in s, and what is measured of the arm, x in m and v in m/s, to its command in N.
+        From tick, time in s, what is measured of the arm, x in m and v in m/s, and what it asks for, to its command
+        in N.
 
     Attributes
     ----------
+    asks : tuple of str
+        For what, see `physics.sight.SEEN`.
+    sight : callable
+        From the tick that is answered to what there is to see; to be set before the kernels run.
     name : str
         Module and name of the law, or of its class.
     address : int
@@ -84,8 +95,9 @@ class Foreign:
     """
 
     def __init__(self, side: str, law: Law) -> None:
-        compiled = is_jitted(law) or isinstance(law, CFunc)
-        named = getattr(law, "__wrapped__", law) if compiled else law
+        self.asks, self.sight = asked(law), _nothing
+        numba_law = is_jitted(law) or isinstance(law, CFunc)
+        named, compiled = getattr(law, "__wrapped__", law) if numba_law else law, numba_law and not self.asks
         named = named if hasattr(named, "__qualname__") else type(named)
         self.name = f"{named.__module__}:{named.__qualname__}"
         self._side, self._law = side, law
@@ -102,7 +114,8 @@ class Foreign:
     def _answer(self, tick: int, time: float, x: float, v: float) -> float:
         """What a callable of Python answers; NaN for what is kept for `failure`."""
         try:
-            return self._number(self._law(tick, time, x, v), tick, time)
+            seen = self.sight(tick).seen(self.asks) if self.asks else {}
+            return self._number(self._law(tick, time, x, v, **seen), tick, time)
         except BaseException as error:  # ctypes would print it and go on
             self._error = error
             return math.nan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import Any, TypeGuard
@@ -24,9 +24,10 @@ from grasp_ros.graph.ros.states import State, StateReader
 from grasp_ros.graph.rosbag2 import force_template
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
-from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE
+from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE, state_of
 from grasp_ros.scene.validation import SceneError
 
 ANNOUNCE_SECONDS = 1.0
@@ -70,7 +71,7 @@ class Controller(PeerNode):
         self._force = 0.0  # that answer
         self._number = 0  # of the last announcement for this scene
         self._ready_to_answer = self._listening = False
-        self._reader = StateReader((self._side,))
+        self._reader = StateReader(())  # before a scene
         self._held: State | None = None  # the state that came before this node was ready
         self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0, "skipped states": 0})
         self.add_on_set_parameters_callback(self._check)
@@ -118,6 +119,10 @@ class Controller(PeerNode):
         self.forget_scene()
         self._staged = self.declare_scene(scene, name)
         scene.changed(self._staged)  # refuses what was given at the start and cannot be run
+        if self._own:
+            self._own.check(scene.system, SIDES[self._side])
+            self._check_own(self._staged)
+        self._reader = StateReader([NAMES[body] for body in scene.system.present] if self._own else (self._side,))
         self._scene, self._answered, self.concern, self._number = scene, -1, "", 0
         self._law = scene.system.laws[SIDES[self._side]]
 
@@ -125,10 +130,17 @@ class Controller(PeerNode):
         """Whether numbers of the law may be set; somebody else may still refuse them."""
         try:
             if self._scene is not None:
-                self._scene.changed({**self._staged, **_numbers(parameters)})
+                numbers, before = _numbers(parameters), self._scene.numbers_of(self._executable)
+                self._check_own({name: number for name, number in numbers.items() if number != before.get(name)})
+                self._scene.changed({**self._staged, **numbers})
         except SceneError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
+
+    def _check_own(self, numbers: Mapping[str, Any]) -> None:
+        """Refuse other numbers of a feedback that does not act: neither a bag nor a run without ROS would have them."""
+        if self._own and numbers:
+            raise SceneError(f"{', '.join(numbers)}: another controller acts in place of this feedback")
 
     def _stage(self, parameters: list[Parameter]) -> None:
         """Let numbers that were set act from the next state on."""
@@ -147,7 +159,7 @@ class Controller(PeerNode):
         self._priority.take()
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
-            self._states = self.subscribe(JOINT_STATES, self._on_state, read=self._reader.read)
+            self._states = self.subscribe(JOINT_STATES, self._on_state, read=lambda cdr: self._reader.read(cdr))
         self._ready_to_answer = True
         if self._held is not None:
             held, self._held = self._held, None
@@ -200,13 +212,13 @@ class Controller(PeerNode):
             self._begin(time_ns)
         assert self._law is not None
         self._answered = time_ns
-        row, tick = state.name.index(self._side), time_ns // self._scene.period_ns
-        x, v = state.position[row], state.velocity[row]
+        tick, row = time_ns // self._scene.period_ns, state.name.index(self._side)
         try:
             if self._own:
-                force = self._own.command(self._law, tick, self._scene.time_of(tick), x, v)
+                numbers, system = state_of(state)[0].tolist(), self._scene.system
+                force = self._own.command(system, SIDES[self._side], tick, self._scene.time_of(tick), numbers)
             else:
-                force = self._law.command(tick, x, v)
+                force = self._law.command(tick, state.position[row], state.velocity[row])
         except Refused as error:
             self.fail(str(error))
             return

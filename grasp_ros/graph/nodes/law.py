@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from grasp_ros.physics.control import ControlLaw, limited, measured
+from collections.abc import Sequence
+
+from grasp_ros.physics.control import limited
 from grasp_ros.physics.errors import Refused, place_of
+from grasp_ros.physics.sight import Sight, asked, check
+from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.own_law import begin, find_law
 
 
@@ -29,20 +33,25 @@ class OwnLaw:
     def reset(self) -> None:
         """Begin anew, without memory."""
         self._law = begin(self._found, f"law: {self.words}")
+        self.asks = asked(self._law)
 
-    def command(self, stages: ControlLaw, tick: int, time: float, x: float, v: float) -> float:
-        """Command in N that answers the state of a tick, through the stages of the scene.
+    def check(self, system: System, side: int) -> None:
+        """Refuse a scene that does not have what the law asks for."""
+        check(self.asks, system, side, f"law: {self.words}")
+
+    def command(self, system: System, side: int, tick: int, time: float, state: Sequence[float]) -> float:
+        """Command in N that answers the state (6,) of a tick, through the stages of the scene.
 
         Raises
         ------
         Refused
             If the law itself raises, or returns what is no number.
         """
-        row = stages.row.tolist()
-        x, v = measured(row, stages.noise(tick).tolist(), x, v)
+        stages, seen = system.laws[side], Sight(system, system.laws, side, tick, state).seen(self.asks)
+        x, v = stages.measured(tick, *state[COLUMN[side] :][:2])
         try:
-            force = float(self._law(tick, time, x, v))
+            force = float(self._law(tick, time, x, v, **seen))
         except Exception as error:  # whatever a user's code may raise
             words = f"{type(error).__name__}: {error}, at tick {tick}, {place_of(error)}"
             raise Refused(f"law: {self.words}: {words}") from error
-        return float(limited(row, force))
+        return float(limited(stages.row.tolist(), force))

@@ -6,8 +6,8 @@ from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Array, impact_force_of, penetration
+from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
+from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections
 from grasp_ros.scene.parameter import Parameter
@@ -29,11 +29,7 @@ def _build(side: str, sections: Sections, system: System) -> None:
 
 def _force(side: int, system: System, _: int, state: Array) -> float:
     """Impact force fw at a tick."""
-    left, right = (LEFT, OBJECT) if side == LEFT else (OBJECT, RIGHT)
-    numbers = state.tolist()
-    u, u_rate = (numbers[COLUMN[left] + place] - numbers[COLUMN[right] + place] for place in (0, 1))
-    hertzian, dissipation = system.pairs[side].tolist()
-    return impact_force_of(hertzian, dissipation, u, u_rate)
+    return system.impact(side, state.tolist())
 
 
 def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
