@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from pathlib import Path
 
 import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.running import Running
-from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
@@ -108,13 +106,13 @@ class Recording(Frozen):
         ticks: np.ndarray = self.tick - starts[np.maximum(np.searchsorted(starts, self.tick, side="right") - 1, 0)]
         return ticks
 
-    def laws(self) -> Iterator[Mapping[int, ControlLaw]]:
-        """The laws that the scene, or an announcement, names for each tick, by side."""
-        scene, due = self.scene, sorted(self.changes, reverse=True)
-        for tick in self.tick.tolist():
-            while due and due[-1] <= tick:
-                scene = scene.changed(self.changes[due.pop()])
-            yield scene.system.laws
+    @cached_property
+    def parts(self) -> list[tuple[scenes.Scene, slice]]:
+        """The scene with the numbers in force, and the rows of the ticks at which they were; in their order."""
+        changes = sorted(self.changes)
+        bounds = [0, *np.searchsorted(self.tick, changes).tolist(), len(self.tick)]
+        known = accumulate(changes, lambda scene, tick: scene.changed(self.changes[tick]), initial=self.scene)
+        return [(scene, slice(*rows)) for scene, rows in zip(known, pairwise(bounds), strict=True)]
 
     @cached_property
     def measured(self) -> Array:
@@ -124,12 +122,12 @@ class Recording(Frozen):
         as in the controllers, which measure the exact states that they receive. A node that is not ours does not.
         """
         measured = np.full_like(self.state, np.nan)
-        for row, (tick, state, laws) in enumerate(
-            zip(self.scene_tick.tolist(), self.state.tolist(), self.laws(), strict=True)
-        ):
-            for side, law in laws.items():
+        for scene, rows in self.parts:
+            for side, law in scene.system.laws.items():
                 own = slice(COLUMN[side], COLUMN[side] + 2)
-                measured[row, own] = law.measured(tick, *state[own])
+                ticks, states = self.scene_tick[rows].tolist(), self.state[rows, own].tolist()
+                seen = [law.measured(tick, *state) for tick, state in zip(ticks, states, strict=True)]
+                measured[rows, own] = np.reshape(seen, (-1, 2))
         return measured
 
     @property
@@ -178,11 +176,7 @@ class Recording(Frozen):
         """
         if not self.closed:
             return energy(self.scene.system, self.state, feedback=False)
-        scene, begins = self.scene, [0, *sorted(self.changes), int(self.tick[-1]) + 1]
-        parts = []
-        for begin, end in pairwise(begins):
-            scene = scene.changed(self.changes.get(begin, {}))
-            parts.append(energy(scene.system, self.state[(self.tick >= begin) & (self.tick < end)]))
+        parts = [energy(scene.system, self.state[rows]) for scene, rows in self.parts]
         return Energy(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
     @property

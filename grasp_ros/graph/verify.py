@@ -114,17 +114,19 @@ class Answers(NamedTuple):
 
 def answers_of(recording: Recording) -> dict[str, Answers]:
     """Whose law gave the commands, by side: compared with the law that the scene or an announcement names."""
-    found, ticks = {}, recording.scene_tick.tolist()
+    found = {}
     for name, topic in recording.scene.controllers.items():
         side = name.removesuffix("_controller")
         if not recording.running.lockstep:
             found[side] = Answers(recording.counts[topic.name], None, 0, topic.name)
             continue
-        body = SIDES[side]
-        columns = [*recording.state[:, COLUMN[body] :][:, :2].T, recording.command[:, body]]
-        rows = zip(recording.laws(), ticks, *(column.tolist() for column in columns), strict=True)
-        equal = sum(laws[body].command(tick, x, v) == force for laws, tick, x, v, force in rows)
-        found[side] = Answers(len(ticks), int(equal), recording.unheard.get(CHANGES[side].name, 0), topic.name)
+        body, equal = SIDES[side], 0
+        for scene, rows in recording.parts:
+            law, states = scene.system.laws[body], recording.state[rows, COLUMN[body] :][:, :2]
+            given = zip(recording.scene_tick[rows].tolist(), states.tolist(), recording.command[rows, body].tolist(),
+                        strict=True)
+            equal += sum(bool(law.command(tick, x, v) == force) for tick, (x, v), force in given)
+        found[side] = Answers(len(recording.tick), equal, recording.unheard.get(CHANGES[side].name, 0), topic.name)
     return found
 
 
