@@ -39,8 +39,8 @@ class Controller(PeerNode):
     It takes its law from the scene that the plant announces and answers every state with a command of the same stamp,
     in a free run the newest one that has come. It announces the numbers of its law before the first command that rests
     on them: at the beginning, after a reset, and when they were set while it runs. With a law of the user's own it
-    announces nothing. When a plant comes with another scene it goes on with that. Other parameters are
-    `real_time_priority` and the numbers of the scene.
+    announces nothing, and takes no other numbers. When a plant comes with another scene it goes on with that. Other
+    parameters are `real_time_priority` and the numbers of the scene.
 
     Parameters
     ----------
