@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from grasp_ros.identification.numbers import OUTSIDE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, compose
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.sensitivity.directions import directions
 from grasp_ros.sensitivity.sensitivities import carry, complete
@@ -57,7 +56,7 @@ def _closed_loop(data: Measured, scene: Scene, keys: Sequence[str], times: Array
 
 def _plant(scene: Scene) -> Scene:
     """What is left of a scene where all that acts from outside is known: bodies and contacts."""
-    return replace(scene, values={
+    return compose(scene.name, {
         section: numbers for section, numbers in scene.values.items()
         if BY_SECTION[section].node == "plant" and section != "loop" and not section.endswith(OUTSIDE)
     })

@@ -227,6 +227,7 @@ print(*np.concatenate([*ensemble(scene, {}, ("energy", "settling_time", "touches
 """
 
 
+@pytest.mark.slow
 def test_everything_runs_uncompiled() -> None:
     outputs = []
     for disabled in ("0", "1"):

@@ -73,6 +73,7 @@ def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
     assert answer(cached, cached.read_bytes()) == (42.0, False)
 
 
+@pytest.mark.slow
 def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
     (tmp_path / "ours.py").write_text(OURS)
     environment = {

@@ -98,10 +98,9 @@ def test_rest_is_kept_in_a_file(tmp_path: Path) -> None:
 
 def test_a_motion_that_leaves_the_domain_ends_with_a_status() -> None:
     """A loop of held commands far beyond its stability limit."""
-    gains = {f"{side}_feedback.{key}": value for side in ("left", "right") for key, value in (
-        ("position_gain_N_per_m", 50.0), ("velocity_gain_Ns_per_m", 5.0))}
-    run = simulate(scenes.load("case_01").changed({**gains, "time.duration_s": 500.0, "time.control_period_s": 1.0}),
+    gains = {"left_feedback.position_gain_N_per_m": 50.0, "left_feedback.velocity_gain_Ns_per_m": 5.0}
+    run = simulate(scenes.load("arm_alone").changed({**gains, "time.duration_s": 500.0, "time.control_period_s": 1.0}),
                    sampled=True)
     assert run.status.name == "OUTSIDE"
     assert "farther away or faster" in run.stop
-    assert 1.0 < np.abs(run.state).max() <= 1e12
+    assert 1.0 < np.nanmax(np.abs(run.state)) <= 1e12

@@ -41,6 +41,7 @@ def tenfold(factors: tuple[float, ...]) -> Scene:
     return SCENE.changed({key: value * factor for (key, value), factor in zip(CONTACTS.items(), factors, strict=True)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factors", [(0.1, 0.1, 0.1, 0.1), (10, 10, 10, 10), (0.1, 10, 10, 0.1), (10, 0.1, 0.1, 10)])
 def test_starts_that_are_wrong_by_ten_end_at_one_minimum(held: Trajectory, factors: tuple[float, ...]) -> None:
     data = noisy(held, 1)

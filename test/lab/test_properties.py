@@ -60,6 +60,7 @@ def test_regression_scenes_keep_all_properties(name: str) -> None:
     assert examine(regression.load(name), every=False, max_work=most).broken == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rubbish", [np.nan, 1e300])
 def test_no_kernel_reads_what_it_has_not_written(rubbish: float) -> None:
     """The workspace is shared: what another run left in it must not show."""
@@ -112,6 +113,7 @@ def test_degenerate_scenes_cover_all_habits() -> None:
     assert max(len(scene.title.split(", ")) for scene in drawn) > 5
 
 
+@pytest.mark.slow
 def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes of the same kind at the coarsest accuracy."""
     rng = np.random.default_rng(0)

@@ -134,6 +134,7 @@ def test_the_first_derivative_that_differs_decides(push: float, together: bool) 
     assert bool(found.touches[0]) == together
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["through_the_finger", "together", "rest_on_a_slope", "touching_chain",
                                   "a_finger_rests", "tiny_gap_pulse_1", "pressed_for_a_moment"])
 def test_more_digits_change_nothing(name: str) -> None:

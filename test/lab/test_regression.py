@@ -14,10 +14,12 @@ FEW, MORE = 10.0, 100.0  # roundings
 MANY_IMPACTS = (
     "chain_friction_pulse_1", "chain_loop_set_point_feed_forward_friction_table_1", "rest_then_pushed_alarm",
 )
+MANY_STEPS = ("light_arm_beside_one_that_creeps",)
 CHEAP = ("through_the_finger", "together", "free_fall", "pressed_for_a_moment")
 
 
-@pytest.mark.parametrize("name", ANSWERS)
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=pytest.mark.slow if name in MANY_STEPS else ()) for name in ANSWERS])
 def test_the_motion_is_right_within_roundings(name: str) -> None:
     found = verdict(load(name), ANSWERS[name])
     limit = MORE if name in MANY_IMPACTS else FEW
@@ -37,6 +39,7 @@ def test_answers_belong_to_scenes() -> None:
     assert all(len(row) == 6 for right in ANSWERS.values() for row in right.state)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CHEAP)
 def test_answers_are_those_of_the_reference(name: str) -> None:
     found, right = answer(load(name)), ANSWERS[name]

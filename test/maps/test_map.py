@@ -80,6 +80,7 @@ def test_a_sample_does_not_depend_on_chunks(tmp_path: Path, monkeypatch: pytest.
     assert len(set(values)) == 20
 
 
+@pytest.mark.slow
 def test_it_goes_on_after_a_kill_and_computes_only_the_rest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tiny_chunks: None
 ) -> None:
@@ -132,6 +133,7 @@ def test_what_is_something_else_is_left_alone(tmp_path: Path) -> None:
         run(plan, tmp_path / "map.zarr")
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_refused_and_what_was_done_is_kept(tmp_path: Path, tiny_chunks: None) -> None:
     """Files of a process that may not grow stand for a full disk: both are an OSError of the write."""
     path, plan = tmp_path / "map.zarr", small_plan()

@@ -73,6 +73,7 @@ def test_a_bound_is_written_in_one_way(text: str) -> None:
     assert read_bound("peak_input <= 3").most == 3.0
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_scene_and_figures(command: Any, tmp_path: Path) -> None:
     words = ("design", "case_01", "--free", f"{BOTH_KV}=0.5:30", "--minimise", "settling_time")
     result = command(*words, "-o", "best.yaml", "--figure", "best.png")
