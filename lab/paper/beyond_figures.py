@@ -6,8 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator
 
 from grasp_ros.physics.layout import Law
@@ -19,9 +22,15 @@ from lab.paper.arms import STEPS, Damped, Stiffer
 from lab.paper.beyond import Chaos, Gap, Tail
 from lab.paper.figures import PAGE, style
 from lab.paper.knife_edge import MOVED, SMALLEST, Edge
+from lab.paper.measures import MARGIN
 from lab.paper.scatter import Median
 
 WIDE = (PAGE, 3.0)
+AGAINST = "#e6e6e6"
+STATED, OTHER, NEITHER = "interval as stated", "interval on the other side", "neither"
+POINTS = {  # colour, mark, inside of the mark
+    STATED: (LEFT_COLOR, "o", LEFT_COLOR), OTHER: (RIGHT_COLOR, "X", RIGHT_COLOR), NEITHER: ("black", "o", "white"),
+}
 
 
 def gap(found: Gap) -> Drawing:
@@ -226,19 +235,35 @@ def sweeps(curves: Sequence[Curve]) -> Drawing:
             _sweep(axes, each)
         for axes in panels.ravel()[len(curves) :]:
             axes.set_axis_off()
+        handles: list[Artist] = [
+            Line2D([], [], color=color, marker=mark, markersize=5, markerfacecolor=face, label=label)
+            for label, (color, mark, face) in POINTS.items()
+        ]
+        handles.append(Patch(color=AGAINST, label="not as stated"))
+        figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
         return figure
+
+
+def _side(point: Median, higher: bool) -> str:
+    """On which side of 1 a whole interval lies, by the margin of the verdicts."""
+    above, below = point.low > MARGIN, point.high < 1.0 / MARGIN
+    as_stated, against = (above, below) if higher else (below, above)
+    return STATED if as_stated else OTHER if against else NEITHER
 
 
 def _sweep(axes: Axes, each: Curve) -> None:
     x, found = zip(*each.points, strict=True)
     y = [point.middle for point in found]
-    axes.axhspan(1.0, 1e9, color="#009e73" if each.higher else RIGHT_COLOR, alpha=0.10, linewidth=0)
-    axes.axhspan(1e-9, 1.0, color=RIGHT_COLOR if each.higher else "#009e73", alpha=0.10, linewidth=0)
+    axes.axhspan(*((1e-9, 1.0) if each.higher else (1.0, 1e9)), color=AGAINST, linewidth=0)
     axes.axhline(1.0, color="black", linewidth=0.7)
     axes.axvline(each.printed, color="black", linewidth=0.7, linestyle=":")
     finite = np.clip(y, 1e-3, 1e3)
     axes.loglog(x, finite, "-", color="black", linewidth=0.6)
-    _bars(axes, x, [Median(*np.clip(point, 1e-3, 1e3)) for point in found], "o", "black", "")
+    for value, point in each.points:
+        color, mark, face = POINTS[_side(point, each.higher)]
+        middle, low, high = np.clip([point.middle, point.low, point.high], 1e-3, 1e3)
+        axes.errorbar(value, middle, [[middle - low], [high - middle]], fmt=mark, color=color, markersize=4.5,
+                      markerfacecolor=face, capsize=3.0, elinewidth=1.3, capthick=1.3, zorder=3)
     axes.set_ylim(min(0.8 * finite.min(), 0.5), max(1.25 * finite.max(), 2.0))
     axes.set_title(each.title, fontsize="small", loc="left")
     axes.set_xlabel(each.label)

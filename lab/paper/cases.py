@@ -47,9 +47,13 @@ SIDES = ("left", "right")
 KEYS: Mapping[str, tuple[str, ...]] = {  # letters of the paper to keys of a scene, both sides where there are two
     "m": ("left_arm.mass_kg", "right_arm.mass_kg"),
     "m_l": ("left_arm.mass_kg",),
+    "m_r": ("right_arm.mass_kg",),
     "k_l": ("left_arm.stiffness_N_per_m",),
     "c_l": ("left_arm.damping_Ns_per_m",),
+    "Kp_l": ("left_feedback.position_gain_N_per_m",),
     "Kv_l": ("left_feedback.velocity_gain_Ns_per_m",),
+    "p_l": ("left_contact.dissipation_s_per_m",),
+    "H_l": ("left_contact.hertz_N_per_m1_5",),
     "m_o": ("object.mass_kg",),
     "k": ("left_arm.stiffness_N_per_m", "right_arm.stiffness_N_per_m"),
     "c": ("left_arm.damping_Ns_per_m", "right_arm.damping_Ns_per_m"),

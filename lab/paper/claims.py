@@ -63,6 +63,17 @@ class Check(NamedTuple):
         error = (self.share * (1.0 - self.share) / self.runs) ** 0.5 if self.runs else 0.0
         return any(abs(self.share - bound) < 2.0 * error for bound in (ALMOST_ALL, HALF))
 
+    @property
+    def short(self) -> str:
+        """In a line: of a sweep how many of its values, not each; of random starts no range."""
+        value = self.value
+        if self.kind is Kind.SWEEP and ": " in value:
+            _, _, other = value.partition("; ")
+            value = f"in {self.share:.0%} of its values" + (f", {other}" if other else "")
+        elif self.kind is Kind.RANDOM:
+            value = value.partition(", from")[0]
+        return f"{self.kind.value}, {self.text}: {value}"
+
 
 class Part(NamedTuple):
     """One statement with one threshold."""
@@ -87,6 +98,17 @@ class Part(NamedTuple):
     def limits(self) -> list[Check]:
         """Checks that fail, of those that decide."""
         return [check for check in self.checks if check.kind in DECISIVE and not check.holds]
+
+    @property
+    def limits_in_short(self) -> str:
+        """What weighs most of them, and how many more there are."""
+        drawn = [check for check in self.limits if check.kind is Kind.RANDOM]
+        return _first([check.short for check in drawn or self.limits], len(self.limits))
+
+    @property
+    def turned_in_short(self) -> str:
+        """The first of `turned`, and how many more there are."""
+        return _first([check.text for check in self.turned], len(self.turned))
 
     @property
     def close(self) -> list[Check]:
@@ -122,6 +144,11 @@ class Claim(NamedTuple):
     def turned(self) -> list[Part]:
         """Parts that read the sentence in another way and come to another verdict."""
         return [part for part in self.parts if part.reading and part.verdict is not self.verdict]
+
+
+def _first(texts: Sequence[str], whole: int) -> str:
+    """The first of so many."""
+    return texts[0] + (f", and {whole - 1} more" if whole > 1 else "")
 
 
 def almost_all(share: float) -> bool:

@@ -20,7 +20,7 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.claims import HALF, Check, Kind, Part, almost_all
-from lab.paper.measures import MARGIN, NAMES, UNITS, measure, over, ratio, seconds, settlings
+from lab.paper.measures import MARGIN, NAMES, UNITS, measure, over, ratio, seconds, settles, settlings
 from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
 
@@ -57,7 +57,6 @@ class Comparison(NamedTuple):
     words: tuple[str, ...] = ()  # other measures that the sentence may mean
     others: tuple[Variant, ...] = (FIRST,)  # each decides
     pairs: tuple[tuple[Variant, Variant], ...] = ()  # more comparisons that decide
-    beside: tuple[Variant, ...] = ()  # others that the sentence may mean, too
     reading: bool = False
 
     @property
@@ -87,7 +86,7 @@ class Comparison(NamedTuple):
     @property
     def settle(self) -> bool:
         """Whether it needs settling times, which take longer runs than the paper's 20 s."""
-        return any(name.startswith("settling") for name in (self.measure, *self.words))
+        return any(map(settles, (self.measure, *self.words)))
 
     def _value(self, scene: Scene, name: str) -> float:
         """A measure of a scene."""
@@ -105,8 +104,6 @@ class Comparison(NamedTuple):
                     yield scene
                     yield from (started(scene, start) for start in (*ALIKE, *read_starts(a, b).values()))
                 yield from (started(scene, start) for start in starts)
-        for scene in (each.scene(cases) for each in self.beside):
-            yield from (started(scene, start) for start in starts)
 
     def _several(self, scene: Scene) -> list[float]:
         """The measure of a scene; of times that from starts that differ beyond what can be read."""
@@ -123,10 +120,6 @@ class Comparison(NamedTuple):
         for pair in self.decisive:
             checks += [*self._readings(cases, *pair), self._at_all(cases, starts, *pair)]
         checks += [self._random(cases, starts, word, self.changed, self.other) for word in self.words]
-        checks += [
-            self._random(cases, starts, self.measure, self.changed, other)._replace(kind=Kind.READING)
-            for other in self.beside
-        ]
         return Part(self.statement, self.threshold, self.why, checks, self.reading, curve)
 
     def _check(self, kind: Kind, text: str, changed: Scene, other: Scene) -> Check:

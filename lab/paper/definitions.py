@@ -16,8 +16,15 @@ SUBTITLE = (
     " and number; T1 on stand in its running text."
 )
 SWEEPS = (
-    "Ratio of the measure to that of No. 1 (O1: of No. 2), median over random starts. Green: where the statement says"
-    " it should be; red: the other side; dotted: the value of the paper's case."
+    "Ratio of the measure to that of No. 1 (O1: of No. 2), median over random starts with its 95 % interval. Grey:"
+    " where the statement says that it is not. Blue, full: the whole interval is where it says; orange, a cross:"
+    " the whole interval is on the other side; black, open: neither. Dotted: the value of the paper's case."
+)
+PRINTS = (
+    "The source at hand is the text of a scan: captions, letters of curves and numbers at axes are in it, curves are"
+    " not, and of the displacement axes the upper ends are lost. What can be read is compared: the caption with the"
+    " numbers that change, and each axis with our curve, which may pass its end by 1 % of the axis, a line's width."
+    " What the paper says of its curves is judged in its statements, named in the last column."
 )
 RANDOM_STARTS = 200
 

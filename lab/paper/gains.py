@@ -78,7 +78,7 @@ def position_gain() -> tuple[Comparison | Share, ...]:
             "The envelope of an arm, exp(-C t / 2m), does not know Kp; more and faster impacts take more.",
             "Kp",
             tenfold(5.0),
-            SETTLING,
+            (*SETTLING, "swings"),
         ),
         Share(
             "The damping ratio of an arm falls.",

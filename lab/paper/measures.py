@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED, settled_distance, settling_times
-from lab.paper.cases import OFFSETS, Start, columns_of, start_of, started, text_of
+from lab.paper.cases import OFFSETS, Start, columns_of, start_of, started, text_of, value_of
 
 STRETCH = 20.0  # s, the paper's time axis
 SAMPLE = 4e-3  # s, of means and of changes of a sign
@@ -30,6 +31,7 @@ class Measures(NamedTuple):
     settling: float  # s, the last of the three masses, 2 %
     settling_1: float  # s, 1 %
     settling_5: float  # s, 5 %
+    swings: float  # settling, 2 %, in periods of a free arm
     rest: float  # V_c at 20 s, in V_c(0)
     size: float  # root of the mean square of the arms' displacements over 20 s, in the larger initial displacement
     frequency: float  # Hz: half the changes of the sign of x_l' and x_r' per second and arm, up to 20 s
@@ -42,6 +44,7 @@ NAMES: Mapping[str, str] = {
     "settling": "settling time, 2 %",
     "settling_1": "settling time, 1 %",
     "settling_5": "settling time, 5 %",
+    "swings": "settling time, 2 %, in swings of a free arm",
     "rest": "V_c at 20 s in V_c(0)",
     "size": "root mean square displacement of the arms over 20 s",
     "frequency": "frequency of the arms over 20 s",
@@ -52,6 +55,7 @@ UNITS: Mapping[str, str] = {
     "settling": " s",
     "settling_1": " s",
     "settling_5": " s",
+    "swings": "",
     "rest": "",
     "size": "",
     "frequency": " Hz",
@@ -103,12 +107,23 @@ def _measure(scene: Scene, settle: bool) -> Measures:
     farthest = settled_distance(scene, 1.0)
     turns = sum(np.count_nonzero(np.diff(np.sign(states[1:, column]))) for column in (1, 5))
     return Measures(
-        settling=two, settling_1=one, settling_5=five, rest=float(V_c[-1] / V_c[0]),
+        settling=two, settling_1=one, settling_5=five, swings=two / _period(scene), rest=float(V_c[-1] / V_c[0]),
         size=float(np.sqrt(np.mean(states[:, [0, 4]] ** 2))) / farthest, frequency=turns / 4.0 / STRETCH,
         input=over(scene, [start_of(scene)], "input")[0],
         contacts=int(np.count_nonzero(run.event_table[:, 2] == Transition.TOUCH)),
         lopsided=float(np.abs(states[:, 0] + states[:, 4]).max()) / farthest,
     )
+
+
+def _period(scene: Scene) -> float:
+    """Of the left arm where nothing touches and nothing damps it, in s."""
+    stiffness = value_of(scene, "k") + value_of(scene, "Kp")
+    return 2.0 * math.pi * math.sqrt(value_of(scene, "m_l") / stiffness) if stiffness else np.inf
+
+
+def settles(name: str) -> bool:
+    """Whether a measure needs longer runs than the paper's 20 s."""
+    return name == "swings" or name.startswith("settling")
 
 
 def ratio(changed: float, other: float) -> float:
@@ -142,8 +157,7 @@ def _over(scene: Scene, starts: Sequence[Start], name: str) -> list[float]:
     if name == "input":
         found = ensemble(scene, columns_of(starts), ("peak_input",), threads=1)
         return [float(force) for force in np.max([*found.columns.values()], axis=0)]
-    settle = name.startswith("settling")
-    return [float(getattr(measure(started(scene, start), settle), name)) for start in starts]
+    return [float(getattr(measure(started(scene, start), settles(name)), name)) for start in starts]
 
 
 def seconds(times: Sequence[float]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -18,14 +17,15 @@ from lab.paper.answer import FIGURE
 from lab.paper.claims import Claim, Verdict
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
+from lab.paper.prints import Compared
 from lab.paper.results import Result
 from lab.paper.sample import ALGEBRA, Equation
+from lab.paper.svg import data_uri
 from lab.studies import pages
 
 Row = tuple[str, ...]
 FIGURES = "paper"  # directory of the figures beside the Markdown page
-PATH = re.compile(rb'\bd="[^"]*"')
-ROUNDED = re.compile(rb"(\d+\.\d\d)\d+")
+SIGNS = {Verdict.HOLDS: "\u2713", Verdict.LIMITED: "~", Verdict.FAILS: "\u2717"}  # so that no verdict needs a colour
 
 
 class Picture(NamedTuple):
@@ -35,6 +35,7 @@ class Picture(NamedTuple):
     title: str
     caption: str
     readings: Sequence[str]
+    compared: Compared  # with the print
 
 
 class Image(NamedTuple):
@@ -57,6 +58,7 @@ class Report(NamedTuple):
     pictures: Sequence[Picture]
     quantity_heads: Row
     quantities: Sequence[Row]
+    prints: str  # how the figures of the paper are read
     agreement: str
     equations: Sequence[Equation]
     results: Sequence[Result]
@@ -93,6 +95,7 @@ def write_html(report: Report, path: Path) -> None:
         figure=lambda key, text: _figure(report.images[key].svg, text),
         beside=FIGURE,
         printed=PRINTED,
+        signs=SIGNS,
     )
     pages.put(path, text)
 
@@ -113,13 +116,9 @@ def write_markdown(report: Report, path: Path) -> None:
         for key, image in report.images.items():
             (directory / f"{key}.png").write_bytes(image.png)
         (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
-    text = environment.from_string(template("paper.md")).render(report=report, beside=FIGURE, printed=PRINTED)
+    text = environment.from_string(template("paper.md")).render(
+        report=report, beside=FIGURE, printed=PRINTED, signs=SIGNS, told=_told(report.claims))
     pages.put(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
-
-
-def short_svg(svg: bytes) -> bytes:
-    """An SVG file whose paths have two decimals, which are a hundredth of a point."""
-    return PATH.sub(lambda found: ROUNDED.sub(rb"\1", found[0]), svg)
 
 
 def summary(claims: Sequence[Claim]) -> str:
@@ -145,9 +144,16 @@ def agreement(rows: Sequence[Equation]) -> str:
     )
 
 
+def _told(claims: Sequence[Claim]) -> dict[str, str]:
+    """By the words of a part, the key of the first statement that has it: it is told there."""
+    return {part.statement: claim.key for claim in reversed(claims) for part in claim.parts}
+
+
 def _figure(svg: bytes, text: str) -> Markup:
-    data = base64.b64encode(svg).decode("ascii")
-    return Markup('<figure><img alt="{}" src="data:image/svg+xml;base64,{}"></figure>').format(text, data)
+    """An image with its caption."""
+    text = text.rstrip(".")
+    form = Markup('<figure><img alt="{0}" src="{1}"><figcaption>{0}.</figcaption></figure>')
+    return form.format(text, Markup(data_uri(svg)))
 
 
 def _cell(text: str) -> str:

@@ -22,12 +22,13 @@ def wide(standard: float) -> tuple[float, ...]:
     return tuple(round(standard * factor, 12) for factor in WIDE)
 
 
-def _unequal(letter: str, value: float, case: int, why: str, *beside: Variant) -> Comparison:
+def _unequal(letter: str, value: float, case: int, why: str) -> Comparison:
     """A left arm that differs in one number, against the pair of which both have the one value, and the other."""
     left = f"{letter}_l"
     numbers = ((left, value),)
     changed = Variant(case) if case != STANDARD else Variant(STANDARD, numbers, f"No. 1 with {left} = {value:g} alone")
-    both = Variant(BOTH[letter]) if value == 10.0 * BASE[letter] else Variant(STANDARD, ((letter, value),))
+    tenfold_pair = letter in BOTH and value == 10.0 * BASE[letter]
+    both = Variant(BOTH[letter]) if tenfold_pair else Variant(STANDARD, ((letter, value),))
     return Comparison(
         f"With {left} = {value:g} alone the arms settle later than either equal pair.",
         "settling",
@@ -38,22 +39,19 @@ def _unequal(letter: str, value: float, case: int, why: str, *beside: Variant) -
         tuple(round(factor * BASE[letter], 12) for factor in (0.1, 0.3, 3.0, 10.0, 30.0)),
         ("settling_1", "settling_5", "rest"),
         others=(FIRST, both),
-        beside=beside,
     )
 
 
-BASE = {"m": 1.0, "k": 10.0, "c": 0.2, "Kv": 0.5}
-BOTH = {"m": 5, "k": 7, "c": 8, "Kv": 10}  # the cases in which both arms have ten times that
+BASE = {"m": 1.0, "k": 10.0, "c": 0.2, "Kv": 0.5, "Kp": 5.0, "p": 0.1, "H": 1e4}
+BOTH = {"m": 5, "k": 7, "c": 8, "Kv": 10, "Kp": 9, "p": 4}  # the cases in which both arms have ten times that
 
 
 def unequal_pairs() -> tuple[Comparison, ...]:
     """Conclusion (3), and the second half of observation (8)."""
     between = "An unequal pair lies between the equal ones: "
-    same_mass = Variant(STANDARD, (("m", 5.5),), "both arms with 5.5 kg, the same mass in all")
     return (
         _unequal(
             "m", 10.0, 6, between + "the envelope exp(-C t / 2m) is slow in one arm, and in two of two heavy arms.",
-            same_mass,
         ),
         _unequal(
             "m", 0.1, STANDARD, "The lighter arm stops sooner, and then hardly hinders the object on its way to the"
@@ -65,6 +63,27 @@ def unequal_pairs() -> tuple[Comparison, ...]:
         ),
         _unequal("c", 2.0, STANDARD, between + "one damper more is better than none more, and worse than two."),
         _unequal("Kv", 5.0, STANDARD, between + "one arm with more feedback takes energy for both."),
+        _unequal("Kp", 50.0, STANDARD, "To the motion Kp_l is a stiffness, as k_l is: arms of"
+            " different periods meet the object at different times and keep it moving."),
+        _unequal("p", 1.0, STANDARD, between + "one contact that loses more takes energy for both."),
+        _unequal("H", 1e5, STANDARD, "A harder contact is a shorter one, but what an impact takes, 1 - e = 2 p v / 3"
+            " to first order, does not depend on H."),
+        _same_mass(),
+    )
+
+
+def _same_mass() -> Comparison:
+    """Unequal masses against equal ones with the same sum."""
+    changed, light = Variant(6), Variant(STANDARD, (("m_l", 1.8), ("m_r", 0.2)), "masses 1.8 and 0.2 kg")
+    return Comparison(
+        "With the sum of the masses kept, unequal arms settle later than equal ones.",
+        "settling",
+        changed,
+        True,
+        "The heavier arm has a slower envelope, exp(-C t / 2m), than two of the mean mass; but only one has it.",
+        words=("settling_1", "settling_5", "rest"),
+        others=(Variant(STANDARD, (("m", 5.5),), "both arms with 5.5 kg"),),
+        pairs=((light, FIRST),),
     )
 
 
@@ -115,7 +134,7 @@ def stiffer_arms() -> tuple[Comparison, ...]:
             " / 3). Far beyond No. 7 an arm hardly gives way and takes little from the object.",
             "k",
             (*tenfold(10.0), 400.0, 1000.0),
-            ("settling_1", "settling_5"),
+            ("settling_1", "settling_5", "swings"),
         ),
     )
 

@@ -13,7 +13,6 @@ import PIL.Image
 from tqdm import tqdm
 
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
-from grasp_ros.scene import Scene
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation import canvas, simulate
 from lab.paper import arms, beyond, beyond_figures, figures
@@ -32,17 +31,19 @@ from lab.paper.cases import (
 )
 from lab.paper.claims import Claim
 from lab.paper.compare import Comparison, Variant
-from lab.paper.definitions import SUBTITLE, SWEEPS, TITLE, definitions
+from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
 from lab.paper.judgement import Wanted, judged, measured, statements, tasks, wanted_of
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import SHORT, Measures, remember
-from lab.paper.page import Image, Picture, Report, agreement, short_svg, summary
+from lab.paper.page import Image, Picture, Report, agreement, summary
+from lab.paper.prints import compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import replay
 from lab.paper.results import Beyond, results
 from lab.paper.ros import HEADS, through_the_graph
+from lab.paper.svg import short_svg
 
 DPI = 220
 COLORS = 256  # of a PNG file
@@ -174,8 +175,9 @@ def _replays(cases: Cases) -> list[dict[str, Any]]:
     return [replay(figure, cases[figure.case]) for figure in FIGURES]
 
 
-def picture(figure: Figure, scene: Scene) -> Picture:
-    """Caption of a figure: parameters, start, touches; and the readings of its scene."""
+def picture(figure: Figure, cases: Cases, claims: Sequence[Claim]) -> Picture:
+    """Caption of a figure: parameters, start, touches; the readings of its scene, and what the print says."""
+    scene = cases[figure.case]
     run = simulate(scene)
     left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     values = ", ".join(f"{letter} = {value_of(scene, letter):g}" for letter in ("k", "c", "Kp", "Kv", "p", "H", "m_o"))
@@ -188,7 +190,8 @@ def picture(figure: Figure, scene: Scene) -> Picture:
         " the contact with the fastest approach, from the dense output."
     )
     return Picture(
-        figure.number, figure.title, caption, [each for each in scene.readings if "control period" not in each]
+        figure.number, figure.title, caption, [each for each in scene.readings if "control period" not in each],
+        compared(figure, cases, claims),
     )
 
 
@@ -229,8 +232,8 @@ def _put_together(
     return Report(
         title=TITLE, subtitle=SUBTITLE, answer=answer(claims, further), definitions=definitions(len(drawn)),
         summary=summary(claims), claims=claims,
-        sweeps=SWEEPS, pictures=[picture(figure, cases[figure.case]) for figure in FIGURES], quantity_heads=heads,
-        quantities=amounts, agreement=agreement(rows), equations=rows, results=results(further),
+        sweeps=SWEEPS, pictures=[picture(figure, cases, claims) for figure in FIGURES], quantity_heads=heads,
+        quantities=amounts, prints=PRINTS, agreement=agreement(rows), equations=rows, results=results(further),
         doubts=doubtful, replays=replays, graph_heads=HEADS, graph=graph, images=images,
         origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
     )

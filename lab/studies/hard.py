@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -72,9 +73,8 @@ def run(docs: Path | None, *, alone: bool) -> int:
     right = sum(row.own.right(row.case) for row in rows)
     print(f"{right} of {len(rows)} cases are right")
     if docs is not None:
-        drawn = [(row.case.family.name, row.case.bound, row.own.error, [other.error for other in row.others])
-                 for row in rows]
-        page_figures.hard_cases(drawn, [other.name for other in others], docs / "hard.png")
+        names = ["this package", *(other.name for other in others)]
+        page_figures.hard_cases(_counts(rows, len(others)), names, docs / "hard.png")
         pages.write(docs, "hard", rows=rows, right=right, others=others, compared=_compared(others, rows),
                     families=_families(rows), seconds=SECONDS, far=FAR)
     return 0 if right == len(rows) else 1
@@ -88,6 +88,25 @@ def _other(case: Case, other: Other) -> Verdict:
         return Verdict(None, f"not done in {SECONDS:g} s")
     except (ValueError, ArithmeticError, IndexError) as error:  # what it raises is its answer
         return Verdict(None, f"{type(error).__name__}: {error}")
+
+
+def _counts(rows: Sequence[Row], others: int) -> dict[str, list[Counter[str] | None]]:
+    """By family: of this package and of each other method how many cases are kept, broken, or without a result."""
+    found: dict[str, list[Counter[str] | None]] = {}
+    for name, group in groupby(rows, key=lambda row: row.case.family.name):
+        members = list(group)
+        asked = [row for row in members if row.others]
+        found[name] = [Counter(_outcome(row.own, row.case) for row in members)]
+        found[name] += [Counter(_outcome(row.others[place], row.case) for row in asked) if asked else None
+                        for place in range(others)]
+    return found
+
+
+def _outcome(verdict: Verdict, case: Case) -> str:
+    """Whether a method keeps the bound of a case."""
+    if verdict.right(case):
+        return page_figures.KEPT
+    return page_figures.NONE if verdict.error is None else page_figures.BROKEN
 
 
 def _compared(others: Sequence[Other], rows: Sequence[Row]) -> list[list[str]]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from matplotlib.patches import Rectangle
+from matplotlib.colors import ListedColormap
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
 
 from grasp_ros.maps.figures import heat
 from grasp_ros.simulation import canvas
@@ -12,6 +14,8 @@ from grasp_ros.simulation.plots import save
 from lab.studies.maps import Limits, Settling
 
 DPI = 130
+STABLE, UNSTABLE, FREE = "#fff5e8", "#e8853a", "#004a75"
+LIMIT = 2.0  # pt, of the line
 GAIN, LOSS = "Kp of both arms, N/m", "p of both contacts, s/m"
 
 
@@ -34,14 +38,18 @@ def settling(found: Settling, path: Path) -> None:
 @canvas.style()
 def limits(found: Limits, path: Path) -> None:
     """Unstable runs of the four loops over period and gain, with the exact limit of a free arm."""
+    colors = ListedColormap([STABLE, UNSTABLE])
     figure, all_axes = canvas.subplots(2, 2, figsize=(10.0, 7.5), sharex=True, sharey=True, layout="constrained")
     for axes, loop in zip(all_axes.flat, found.loops, strict=True):
-        axes.pcolormesh(1e3 * found.periods, found.gains, loop.unstable, cmap="Oranges", vmin=0.0, vmax=1.5)
-        axes.contour(1e3 * found.periods, found.gains, found.radius[loop.delay], levels=[1.0], colors="#0072b2")
+        axes.pcolormesh(1e3 * found.periods, found.gains, loop.unstable, cmap=colors, vmin=0, vmax=1)
+        axes.contour(1e3 * found.periods, found.gains, found.radius[loop.delay], [1.0], colors=FREE, linewidths=LIMIT)
         axes.set_title(loop.name, fontsize="small")
     for axes in all_axes[-1]:
         axes.set_xlabel("control period, ms")
     for axes in all_axes[:, 0]:
         axes.set_ylabel(GAIN)
-    figure.suptitle("case 1 sampled: orange is unstable; blue: the limit of a free arm", fontsize="medium")
+    figure.suptitle("case 1 with held commands", fontsize="medium")
+    handles = [Patch(facecolor=UNSTABLE, label="unstable"), Patch(facecolor=STABLE, edgecolor="grey", label="stable"),
+               Line2D([], [], color=FREE, linewidth=LIMIT, label="exact limit of a free arm")]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
     save(figure, path, DPI)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
 
 from grasp_ros.physics.model import penetration
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, Motion, save
 
+KEPT, BROKEN, NONE = "kept", "broken", "no result"
+OUTCOMES = {KEPT: (LEFT_COLOR, "", "white"), BROKEN: ("#f2a65a", "////", "black"), NONE: ("#d8d8d8", "", "black")}
 
 @canvas.style()
 def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
@@ -43,41 +49,51 @@ def v_jumps(motions: Sequence[Motion], path: Path) -> None:
             (d_r, pairs[1, 1], "$p\\,\\dot u_r$", RIGHT_COLOR, "--"),
         ):
             bottom.plot(motion.t, p * d, color=color, linestyle=style, linewidth=1.2, label=label)
-        bottom.axhline(-1.0, color="black", linewidth=0.8, label="$-1$: second surface of (10)")
+        bottom.axhline(-1.0, color="black", linewidth=0.8, label="$-1$: second half of (10)")
         bottom.set_ylim(-1.6, 0.6)
         bottom.set_xlabel("time, s")
         for axes in (top, bottom):
             axes.grid(alpha=0.3)
-            axes.legend(loc="upper right", fontsize="small")
-    panels[0, 0].set_ylabel("J")
-    panels[1, 0].set_ylabel("1")
+            axes.set_xlim(0.0, motion.t[-1])
+    panels[0, 0].set_ylabel("twice the energy, J")
+    panels[1, 0].set_ylabel("speed of deformation, in $1/p$")
+    lines = [line for axes in panels[:, 0] for line in axes.get_lines()]
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
     save(figure, path)
 
 
 @canvas.style()
-def hard_cases(
-    rows: Sequence[tuple[str, float, float | None, Sequence[float | None]]], others: Sequence[str], path: Path
-) -> None:
-    """Draw the errors of hard cases: family, what is promised, ours, those of other methods; None: no result."""
-    figure, axes = canvas.subplots(figsize=(11.0, 5.0), layout="constrained")
-    floor = 1e-17  # where an exact 0 is drawn
-    series = [("this package", LEFT_COLOR, "o", [own for _, _, own, _ in rows])]
-    for place, name in enumerate(others):
-        color, marker = ((RIGHT_COLOR, "x"), ("#cc79a7", "+"))[place % 2]
-        series.append((name, color, marker, [found[place] if found else None for _, _, _, found in rows]))
-    for label, color, marker, values in series:
-        shown = [(place, max(value, floor)) for place, value in enumerate(values) if value is not None]
-        if shown:
-            axes.plot(*zip(*shown, strict=True), marker, color=color, markersize=4, label=label)
-    axes.plot([max(row[1], floor) for row in rows], "_", color="black", markersize=6, label="promised")
-    families = [row[0] for row in rows]
-    begins = [place for place, family in enumerate(families) if place == 0 or families[place - 1] != family]
-    for place in begins:
-        axes.axvline(place - 0.5, color="black", linewidth=0.5, alpha=0.4)
-    axes.set_xticks(begins, [families[place] for place in begins], rotation=45, ha="right", fontsize="small")
-    axes.set_yscale("log")
-    axes.set_ylim(floor / 3.0, 1e3)
-    axes.set_ylabel("error by the case's oracle")
-    axes.grid(axis="y", alpha=0.3)
-    axes.legend(loc="upper right", ncols=3, fontsize="small")
+def hard_cases(rows: Mapping[str, Sequence[Counter[str] | None]], solvers: Sequence[str], path: Path) -> None:
+    """Draw how many cases of each family each solver keeps, breaks, or has no result of; None: it was not asked."""
+    size = (2.2 + 2.6 * len(solvers), 0.33 * len(rows) + 1.2)
+    figure, panels = canvas.subplots(1, len(solvers), sharey=True, squeeze=False, figsize=size, layout="constrained")
+    for place, (axes, solver) in enumerate(zip(panels[0], solvers, strict=True)):
+        for row, counts in enumerate(each[place] for each in rows.values()):
+            _outcomes(axes, row, counts)
+        axes.set_xlim(0.0, 1.0)
+        axes.set_xticks([])
+        axes.set_title(solver, fontsize="medium")
+        axes.spines[:].set_visible(False)
+        axes.tick_params(left=False)
+    panels[0, 0].set_yticks(range(len(rows)), list(rows))
+    panels[0, 0].invert_yaxis()
+    handles = [Patch(facecolor=color, hatch=hatch, edgecolor="white", label=name)
+               for name, (color, hatch, _) in OUTCOMES.items()]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False,
+                  title="cases of each family: error against the promised bound", title_fontsize="small")
     save(figure, path)
+
+
+def _outcomes(axes: Axes, row: int, counts: Counter[str] | None) -> None:
+    """A bar with a part for each outcome, and its number."""
+    if counts is None:
+        axes.text(0.0, row, "not asked", va="center", fontsize="small", color="#555555")
+        return
+    left, whole = 0.0, counts.total()
+    for name, (color, hatch, ink) in OUTCOMES.items():
+        if counts[name]:
+            width = counts[name] / whole
+            axes.barh(row, width, left=left, height=0.8, color=color, hatch=hatch, edgecolor="white", linewidth=0.8)
+            axes.text(left + 0.5 * width, row, str(counts[name]), ha="center", va="center", fontsize="small", color=ink,
+                      bbox={"facecolor": color, "edgecolor": "none", "pad": 1.0})
+            left += width

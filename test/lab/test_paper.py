@@ -13,7 +13,7 @@ from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.simulation import simulate
 from lab.oracles.closed_forms import elastic_period
 from lab.paper import arms, beyond, by_hand
-from lab.paper.cases import SYMMETRIC, load_cases, random_starts, started
+from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, started, with_values
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
 from lab.paper.conditions import condition_rows
 from lab.paper.doubts import doubts
@@ -21,10 +21,12 @@ from lab.paper.equations import equations, form_equations
 from lab.paper.judgement import judge, statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
+from lab.paper.prints import CAPTIONS, compared
 from lab.paper.quantities import quantities
-from lab.paper.replay import COLUMNS, frames
+from lab.paper.replay import COLUMNS, TICKS, frames, pack
 from lab.paper.sample import Sample
 from lab.paper.scatter import median
+from lab.paper.svg import data_uri, seen, short_svg
 from lab.paper.symmetry import asymmetry, where_false
 
 CASES = load_cases()
@@ -240,3 +242,58 @@ def test_frames_are_states_of_the_run() -> None:
     assert np.count_nonzero(touching) > 30 * len(run.times(Transition.TOUCH, LEFT))
     assert np.diff(table[:, 0]).max() <= 1.0 / 60.0 + 1e-12
     assert (table[:, COLUMNS.index("fw_r")] > 0.0).any()
+
+
+def test_a_packed_column_is_what_it_was_to_16_bits() -> None:
+    for name, values in zip(COLUMNS, frames(CASES[8]).T, strict=True):
+        packed = pack(name, values)
+        numbers = packed.numbers.astype("<i2")
+        assert (numbers == packed.numbers).all()
+        if name == "t":
+            assert np.cumsum(numbers) / TICKS == pytest.approx(values, abs=1e-12)
+        elif name == "V_c":
+            assert packed.low is not None
+            assert np.exp(packed.low + packed.scale * numbers) == pytest.approx(values, rel=packed.scale)
+        else:
+            assert packed.scale * numbers == pytest.approx(values, abs=0.51 * np.abs(values).max() / 32767)
+
+
+def claim_that_holds(key: str) -> Claim:
+    return Claim(key, "", "", [part((Kind.PRINTED, 1.0, True))])
+
+
+def test_a_figure_is_read_and_judged() -> None:
+    """Fig. 10 ends at 10 N, where ours needs 25 N; each caption is what our scene changes, and no other scene's."""
+    claims = [claim_that_holds(key) for key in statements()]
+    found = {figure.number: compared(figure, CASES, claims) for figure in FIGURES}
+    assert [number for number, each in found.items() if not each.agrees] == [10]
+    assert "input axis" in found[10].verdict
+    assert set(found) == set(CAPTIONS)
+    for figure in FIGURES[1:]:
+        other = {**CASES, figure.case: with_values(CASES[figure.case], {"m_o": 7.0})}
+        assert "caption" in compared(figure, other, claims).verdict
+
+
+def test_settling_is_counted_in_swings_too() -> None:
+    """O6 and O10 come out the other way, if times are counted in swings of the arm."""
+    for key in ("O6", "O10"):
+        swept: Any = statements()[key].parts[1]
+        judged = swept._replace(values=(), words=("swings",)).judge(CASES, STARTS)
+        assert any("in swings" in check.text for check in judged.turned)
+
+
+def test_a_path_loses_no_point_that_is_seen() -> None:
+    x = np.linspace(0.0, 400.0, 4001)
+    line = np.column_stack([x, 50.0 + 40.0 * np.sin(x / 20.0)])
+    kept = seen(line, 0.04)
+    assert kept.sum() < 400
+    drawn = np.interp(x, line[kept, 0], line[kept, 1])
+    assert np.abs(drawn - line[:, 1]).max() < 0.06
+    assert seen(line, 0.0).sum() > 4000
+
+
+def test_a_short_svg_has_the_same_picture() -> None:
+    straight = b'<path d="M 0 0 \nL 1 0 \nL 2 0 \nL 2 5.1234 \nz \nM 7 7 \nL 8 9 \n"/>'
+    svg = b'<svg><!-- x -->%s<path d="M 0 0 Q 1.23456 2 3 4 z"/></svg>' % straight
+    assert short_svg(svg) == b'<svg><path d="M0 0l2 0 0 5.12zM7 7l1 2"/><path d="M 0 0 Q 1.23 2 3 4 z"/></svg>'
+    assert data_uri(b'<a b="#c">') == "data:image/svg+xml,%3Ca b='%23c'%3E"

@@ -7,13 +7,23 @@
   const MIDDLE = 400, FLOOR = 160, EDGE = 10, NEAR = 60; // px: the origin, the floor, the walls, the shortest spring
   const COLORS = { left: "#0072b2", object: "#333333", right: "#d55e00" };
   const ARROW = 110; // px of the largest force
-  let table = null, run = null, frame = 0, clock = 0, last = null, playing = false, shapes = {}, largest = {};
+  const SLOW = 0.04; // of the speed, in a contact
+  const calm = window.matchMedia("(prefers-reduced-motion: reduce)"), STILL = 1; // s between two pictures if so
+  const LEFT_EDGE = 70, WIDTH = 715, TOP = 12, BOTTOM = 112; // px of the plot of V_c
+  let table = null, run = null, frame = 0, clock = 0, shown = 0, last = null, playing = false, shapes = {}, largest = {};
 
   function decode(each) {
-    const bytes = Uint8Array.from(atob(each.data), (c) => c.charCodeAt(0));
-    return new Float32Array(bytes.buffer);
+    const bytes = Uint8Array.from(atob(each.data), (c) => c.charCodeAt(0)), numbers = new Int16Array(bytes.buffer);
+    const found = {};
+    each.columns.forEach((name, place) => {
+      const scale = each.scales[place], low = each.lows[place], column = numbers.subarray(place * each.rows, (place + 1) * each.rows);
+      found[name] = Float64Array.from(column, low === null ? (n) => scale * n : (n) => Math.exp(low + scale * n));
+    });
+    let ticks = 0; // times are steps
+    found.t = Float64Array.from(numbers.subarray(0, each.rows), (step) => (ticks += step) * each.scales[0]);
+    return found;
   }
-  const value = (row, name) => table[row * run.columns.length + run.columns.indexOf(name)];
+  const value = (row, name) => table[name][row];
 
   function add(parent, tag, attributes) {
     const node = document.createElementNS(SVG, tag);
@@ -21,10 +31,10 @@
     return parent.appendChild(node);
   }
 
-  function arrow(parent, color, label) {
+  function arrow(parent, name, label) {
     const group = add(parent, "g", {});
-    const line = add(group, "path", { stroke: color, "stroke-width": 4, fill: "none" });
-    const text = add(group, "text", { fill: color, "text-anchor": "middle" });
+    const line = add(group, "path", { class: `arrow ${name}` });
+    const text = add(group, "text", { class: name, "text-anchor": "middle" });
     text.textContent = label;
     return { group, line, text };
   }
@@ -45,27 +55,27 @@
     const wide = Math.max(largestRow("x_l"), largestRow("x_r"), largestRow("x_o"));
     const sizes = run.masses.map((mass) => Math.min(36 * Math.cbrt(mass), 110));
     shapes = { scale: (MIDDLE - EDGE - NEAR - sizes[1] / 2 - Math.max(sizes[0], sizes[2])) / wide };
-    add(stage, "path", { d: `M${EDGE} 40V${FLOOR}M${800 - EDGE} 40V${FLOOR}`, stroke: "#777", "stroke-width": 3 });
-    add(stage, "path", { d: `M0 ${FLOOR}H800`, stroke: "#999" });
-    add(stage, "path", { d: `M${MIDDLE} ${FLOOR}v8`, stroke: "#999" });
-    add(stage, "text", { x: MIDDLE, y: FLOOR + 24, "text-anchor": "middle", fill: "#666" }).textContent = "0";
+    add(stage, "path", { d: `M${EDGE} 40V${FLOOR}M${800 - EDGE} 40V${FLOOR}`, class: "wall" });
+    add(stage, "path", { d: `M0 ${FLOOR}H800`, class: "mark" });
+    add(stage, "path", { d: `M${MIDDLE} ${FLOOR}v8`, class: "mark" });
+    add(stage, "text", { x: MIDDLE, y: FLOOR + 24, "text-anchor": "middle" }).textContent = "0";
     for (const mark of [-0.5, 0.5]) {
       const at = MIDDLE + mark * shapes.scale;
-      add(stage, "path", { d: `M${at} ${FLOOR}v8`, stroke: "#999" });
-      add(stage, "text", { x: at, y: FLOOR + 24, "text-anchor": "middle", fill: "#666" }).textContent = `${mark} m`;
+      add(stage, "path", { d: `M${at} ${FLOOR}v8`, class: "mark" });
+      add(stage, "text", { x: at, y: FLOOR + 24, "text-anchor": "middle" }).textContent = `${mark} m`.replace("-", "\u2212");
     }
     ["left", "object", "right"].forEach((name, place) => {
       const size = sizes[place];
-      shapes[name] = { size, body: add(stage, "rect", { id: `mass-${name}`, width: size, height: size, y: FLOOR - size, rx: 3, fill: COLORS[name], "fill-opacity": 0.55, stroke: COLORS[name] }) };
+      shapes[name] = { size, body: add(stage, "rect", { id: `mass-${name}`, width: size, height: size, y: FLOOR - size, rx: 3, class: `body ${name}` }) };
       if (name !== "object") {
-        shapes[name].spring = add(stage, "path", { fill: "none", stroke: COLORS[name], "stroke-width": 1.5 });
-        shapes[name].damper = add(stage, "path", { fill: "none", stroke: COLORS[name], "stroke-width": 1.5 });
-        shapes[name].input = arrow(stage, COLORS[name], name === "left" ? "f_l" : "f_r");
-        shapes[name].push = arrow(stage, "#a8310b", name === "left" ? "fw_l" : "fw_r");
-        shapes[name].flash = add(stage, "circle", { r: 9, cy: FLOOR - 14, fill: "none", stroke: "#a8310b", "stroke-width": 3 });
+        shapes[name].spring = add(stage, "path", { class: `line ${name}` });
+        shapes[name].damper = add(stage, "path", { class: `line ${name}` });
+        shapes[name].input = arrow(stage, name, name === "left" ? "f_l" : "f_r");
+        shapes[name].push = arrow(stage, "force", name === "left" ? "fw_l" : "fw_r");
+        shapes[name].flash = add(stage, "circle", { r: 9, cy: FLOOR - 14, class: "line force", "stroke-width": 3 });
       }
     });
-    shapes.note = add(stage, "text", { x: 8, y: 238, fill: "#555" });
+    shapes.note = add(stage, "text", { x: 8, y: 238 });
     shapes.note.textContent = `longest arrows: input ${largest.f.toPrecision(3)} N, impact ${largest.fw.toPrecision(3)} N`;
     buildEnergy();
   }
@@ -73,22 +83,33 @@
   function buildEnergy() {
     const plot = get("energy"), end = value(run.rows - 1, "t");
     plot.replaceChildren();
-    shapes.time = (t) => 50 + 740 * t / end;
+    shapes.time = (t) => LEFT_EDGE + WIDTH * t / end;
     run.contacts.forEach((spans, side) => spans.forEach(([a, b]) => add(plot, "rect", {
-      x: shapes.time(a), width: Math.max(shapes.time(b) - shapes.time(a), 0.6), y: side ? 116 : 108, height: 7, fill: side ? COLORS.right : COLORS.left,
+      x: shapes.time(a), width: Math.max(shapes.time(b) - shapes.time(a), 0.6), y: side ? 126 : 118, height: 7, fill: side ? COLORS.right : COLORS.left,
     })));
-    let low = Infinity, high = 0;
-    for (let r = 0; r < run.rows; r++) { const v = value(r, "V_c"); if (v > 0) { low = Math.min(low, v); high = Math.max(high, v); } }
-    low = Math.max(low, high * 1e-9);
-    if (low > 0.5 * high) low = 0.5 * high;
-    const y = (v) => 100 - 90 * Math.log(Math.max(v, low) / low) / Math.log(high / low);
+    const positive = Array.from(table.V_c).filter((v) => v > 0), high = Math.max(...positive);
+    let top = Math.ceil(Math.log10(high)), foot = Math.max(Math.floor(Math.log10(Math.min(...positive))), top - 9);
+    if (foot === top) { foot -= 1; top += 1; }
+    const y = (v) => BOTTOM - (BOTTOM - TOP) * (Math.max(Math.log10(v), foot) - foot) / (top - foot);
+    const each = Math.ceil((top - foot) / 3); // labels that fit
+    for (let power = foot; power <= top; power += 1) {
+      const at = y(10 ** power);
+      add(plot, "path", { d: `M${LEFT_EDGE} ${at}h${WIDTH}`, class: "grid" });
+      if ((top - power) % each === 0) {
+        const label = add(plot, "text", { x: LEFT_EDGE - 6, y: at + 5, "text-anchor": "end" });
+        label.textContent = "10";
+        add(label, "tspan", { dy: "-0.4em", "font-size": "75%" }).textContent = String(power).replace("-", "\u2212");
+      }
+    }
+    for (let t = 0; t <= end; t += 5) {
+      add(plot, "path", { d: `M${shapes.time(t)} ${TOP}V${BOTTOM}`, class: "grid" });
+      add(plot, "text", { x: shapes.time(t), y: 160, "text-anchor": t === 0 ? "start" : t === end ? "end" : "middle" }).textContent = t === end ? `${t} s` : `${t}`;
+    }
     let d = "";
     for (let r = 0; r < run.rows; r++) d += `${r ? "L" : "M"}${shapes.time(value(r, "t")).toFixed(1)} ${y(value(r, "V_c")).toFixed(1)}`;
-    add(plot, "path", { d, fill: "none", stroke: "#000", "stroke-width": 1.5 });
-    add(plot, "text", { x: 4, y: 20 }).textContent = "V_c";
-    add(plot, "text", { x: 50, y: 144 }).textContent = "0";
-    add(plot, "text", { x: 790, y: 144, "text-anchor": "end" }).textContent = `${end.toFixed(0)} s`;
-    shapes.cursor = add(plot, "path", { stroke: "#a8310b", "stroke-width": 2 });
+    add(plot, "path", { d, fill: "none", stroke: "currentColor", "stroke-width": 1.5 });
+    add(plot, "text", { x: 2, y: 62 }).textContent = "V_c, J";
+    shapes.cursor = add(plot, "path", { class: "force", "stroke-width": 2 });
   }
 
   function spring(from, to, y) {
@@ -122,12 +143,13 @@
       shape.flash.style.display = push > 0 ? "" : "none";
       shape.flash.setAttribute("cx", face);
     }
-    shapes.cursor.setAttribute("d", `M${shapes.time(t)} 5V126`);
+    shapes.cursor.setAttribute("d", `M${shapes.time(t)} ${TOP - 7}V134`);
     get("slider").value = frame;
-    const mm = (v) => `${(1e3 * v).toFixed(2)}`;
-    get("readout").textContent = `t ${t.toFixed(4)} s  x_l ${mm(x.left)}  x_o ${mm(x.object)}  x_r ${mm(x.right)} mm  ` +
-      `fw ${value(frame, "fw_l").toFixed(2)}, ${value(frame, "fw_r").toFixed(2)} N  f ${value(frame, "f_l").toFixed(2)}, ${value(frame, "f_r").toFixed(2)} N  ` +
-      `V_c ${value(frame, "V_c").toPrecision(3)} J`;
+    const show = (id, text) => { get(id).textContent = text.replace("-", "\u2212"); };
+    show("now-t", t.toFixed(4));
+    show("now-V_c", value(frame, "V_c").toExponential(2));
+    for (const name of ["x_l", "x_o", "x_r"]) show(`now-${name}`, (1e3 * value(frame, name)).toFixed(1));
+    for (const name of ["f_l", "f_r", "fw_l", "fw_r"]) show(`now-${name}`, value(frame, name).toFixed(2));
   }
 
   function seek(row) {
@@ -149,10 +171,11 @@
     const passed = last === null ? 0 : Math.min((now - last) / 1000, 0.1);
     last = now;
     const touching = value(frame, "fw_l") > 0 || value(frame, "fw_r") > 0;
-    clock += passed * Number(get("speed").value) * (get("slow").checked && touching ? 0.04 : 1);
+    clock += passed * Number(get("speed").value) * (get("slow").checked && touching ? SLOW : 1);
     while (frame < run.rows - 1 && value(frame + 1, "t") <= clock) frame += 1;
-    draw();
-    if (frame === run.rows - 1) return stop();
+    const done = frame === run.rows - 1;
+    if (!calm.matches || done || now - shown >= 1000 * STILL) { draw(); shown = now; }
+    if (done) return stop();
     requestAnimationFrame(tick);
   }
 
@@ -175,19 +198,27 @@
   get("case").addEventListener("change", (event) => { stop(); choose(Number(event.target.value)); });
   get("energy").addEventListener("click", (event) => {
     const box = get("energy").getBoundingClientRect(), end = value(run.rows - 1, "t");
-    const t = ((event.clientX - box.left) / box.width * 800 - 50) / 740 * end;
+    const t = ((event.clientX - box.left) / box.width * 800 - LEFT_EDGE) / WIDTH * end;
     let row = 0;
     while (row < run.rows - 1 && value(row + 1, "t") <= t) row += 1;
     stop();
     seek(row);
   });
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || /^(INPUT|SELECT|BUTTON|SUMMARY|A)$/.test(event.target.tagName)) return;
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("input, select, button, summary, a, [tabindex]")) return;
     const pressed = { " ": "play", ArrowLeft: "back", ArrowRight: "forth" }[event.key];
     if (!pressed) return;
     event.preventDefault();
     get(pressed).click();
   });
-  window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((each) => { each.open = true; }));
+  document.querySelectorAll("input[name=view]").forEach((each) => each.addEventListener("change", () => {
+    document.body.dataset.view = each.value;
+  }));
+  const fit = () => document.querySelectorAll(".wide").forEach((each) => { // what scrolls can be reached by keys
+    if (each.scrollWidth > each.clientWidth) each.tabIndex = 0; else each.removeAttribute("tabindex");
+  });
+  fit();
+  window.addEventListener("resize", fit);
+  document.addEventListener("toggle", fit, true);
   choose(0);
 })();
