@@ -109,7 +109,8 @@ def write_markdown(report: Report, path: Path) -> None:
         If it cannot be written.
     """
     environment = jinja2.Environment(autoescape=False, undefined=jinja2.StrictUndefined)
-    environment.filters |= {"cell": _cell, "row": _row, "rule": _rule}
+    told = _told(report.claims)
+    environment.filters |= {"cell": _cell, "row": _row, "rule": _rule, "told": told.__getitem__}
     directory = path.parent / FIGURES
     with writing(directory):
         directory.mkdir(parents=True, exist_ok=True)
@@ -117,7 +118,7 @@ def write_markdown(report: Report, path: Path) -> None:
             (directory / f"{key}.png").write_bytes(image.png)
         (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
     text = environment.from_string(template("paper.md")).render(
-        report=report, beside=FIGURE, printed=PRINTED, signs=SIGNS, told=_told(report.claims))
+        report=report, beside=FIGURE, printed=PRINTED, signs=SIGNS, told=told)
     pages.put(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
 
 

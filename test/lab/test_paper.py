@@ -240,7 +240,7 @@ def test_frames_are_states_of_the_run() -> None:
     assert table[:, 1:4].tobytes() == np.ascontiguousarray(run.state[:, 0::2]).tobytes()
     touching = (run.energy.mode != 0).astype(int)
     assert np.count_nonzero(touching) > 30 * len(run.times(Transition.TOUCH, LEFT))
-    assert np.diff(table[:, 0]).max() <= 1.0 / 60.0 + 1e-12
+    assert np.diff(table[:, 0]).max() <= 1.0 / 60.0 + 1.0 / TICKS
     assert (table[:, COLUMNS.index("fw_r")] > 0.0).any()
 
 
@@ -288,7 +288,7 @@ def test_a_path_loses_no_point_that_is_seen() -> None:
     kept = seen(line, 0.04)
     assert kept.sum() < 400
     drawn = np.interp(x, line[kept, 0], line[kept, 1])
-    assert np.abs(drawn - line[:, 1]).max() < 0.06
+    assert np.abs(drawn - line[:, 1]).max() <= 0.04 * np.sqrt(5.0)  # across the line, whose slope is up to 2
     assert seen(line, 0.0).sum() > 4000
 
 

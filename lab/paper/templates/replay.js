@@ -108,7 +108,7 @@
     let d = "";
     for (let r = 0; r < run.rows; r++) d += `${r ? "L" : "M"}${shapes.time(value(r, "t")).toFixed(1)} ${y(value(r, "V_c")).toFixed(1)}`;
     add(plot, "path", { d, fill: "none", stroke: "currentColor", "stroke-width": 1.5 });
-    add(plot, "text", { x: 2, y: 62 }).textContent = "V_c, J";
+    add(plot, "text", { x: LEFT_EDGE + WIDTH - 6, y: TOP + 16, "text-anchor": "end" }).textContent = "V_c, J";
     shapes.cursor = add(plot, "path", { class: "force", "stroke-width": 2 });
   }
 
@@ -147,7 +147,7 @@
     get("slider").value = frame;
     const show = (id, text) => { get(id).textContent = text.replace("-", "\u2212"); };
     show("now-t", t.toFixed(4));
-    show("now-V_c", value(frame, "V_c").toExponential(2));
+    show("now-V_c", value(frame, "V_c").toPrecision(3));
     for (const name of ["x_l", "x_o", "x_r"]) show(`now-${name}`, (1e3 * value(frame, name)).toFixed(1));
     for (const name of ["f_l", "f_r", "fw_l", "fw_r"]) show(`now-${name}`, value(frame, name).toFixed(2));
   }
@@ -213,9 +213,11 @@
   });
   document.querySelectorAll("input[name=view]").forEach((each) => each.addEventListener("change", () => {
     document.body.dataset.view = each.value;
+    fit();
   }));
-  const fit = () => document.querySelectorAll(".wide").forEach((each) => { // what scrolls can be reached by keys
-    if (each.scrollWidth > each.clientWidth) each.tabIndex = 0; else each.removeAttribute("tabindex");
+  const fit = () => document.querySelectorAll(".wide, figure, .said").forEach((each) => { // what scrolls is reached by keys
+    const scrolls = each.scrollWidth > each.clientWidth || each.scrollHeight > each.clientHeight;
+    if (scrolls) each.tabIndex = 0; else each.removeAttribute("tabindex");
   });
   fit();
   window.addEventListener("resize", fit);
