@@ -84,6 +84,7 @@ def write_html(report: Report, path: Path) -> None:
         If it cannot be written.
     """
     environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False)
+    environment.filters["told"] = (told := _told(report.claims)).__getitem__
     page = environment.from_string(template("page.html"))
     runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
     text = page.render(
@@ -96,6 +97,7 @@ def write_html(report: Report, path: Path) -> None:
         beside=FIGURE,
         printed=PRINTED,
         signs=SIGNS,
+        told=told,
     )
     pages.put(path, text)
 

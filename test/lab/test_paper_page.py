@@ -19,7 +19,7 @@ from lab.__main__ import main
 pytestmark = pytest.mark.slow  # the whole study, with few random starts
 
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-A4, WIDE = 680, 1031  # px, the width of a sheet of paper less its margins, upright and across
+A4, WIDE = 695, 1031  # px, the width of a sheet of paper less its margins, upright and across
 LARGEST = 4_000_000  # bytes of the page
 MOST_WORDS = 8_000  # of the version for the documentation
 PAGES = 15  # of a print
