@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from lab.paper.claims import Check, Claim, Kind, Verdict
 from lab.paper.results import Beyond
 
-FIGURE = "tail"  # that stands beside it
+FIGURE = (  # that stands beside it, and its caption
+    "tail", "V_c of No. 1 beside its law, t^(-5/2), and its touches beside t^(3/4)",
+)
 NUMBERED = ("O", "C")  # keys of the claims that the paper numbers
 
 
@@ -16,13 +18,13 @@ def answer(claims: Sequence[Claim], found: Beyond) -> list[str]:
     numbered = [claim for claim in claims if claim.key.startswith(NUMBERED)]
     numbers = {verdict: sum(claim.verdict is verdict for claim in numbered) for verdict in Verdict}
     counts = ", ".join(f"{count} {_plural(verdict, count)}" for verdict, count in reversed(numbers.items()))
-    failing = "; ".join(f"{claim.key}: {claim.statement}" for claim in numbered if claim.verdict is Verdict.FAILS)
+    failing = "; ".join(f"{claim.key}: {claim.statement.rstrip('.')}" for claim in numbered if claim.verdict is Verdict.FAILS)
     lossless, standard = found.damped[0], next(row for row in found.damped if row.C == 0.7)
     grown = [row for row in found.edge if row.visible < float("inf")]
     coarse = max(row.error for row in found.stepped if row.step == max(row.step for row in found.stepped))
     return [
         f"The paper numbers {len(numbered)} claims, twelve observations and three conclusions: {counts}.",
-        f"Not so: {failing}" if failing else "None of them fails.",
+        f"Not so: {failing}." if failing else "None of them fails.",
         "The proof has a gap: V as printed jumps up where a pair separates faster than 1/p"
         f" ({len(found.gap.jumps)} times in two scenes of ours). {_jumps(claims)} V_c, which keeps the term, never"
         " rises, and closes the proof.",
