@@ -18,7 +18,8 @@ def answer(claims: Sequence[Claim], found: Beyond) -> list[str]:
     numbered = [claim for claim in claims if claim.key.startswith(NUMBERED)]
     numbers = {verdict: sum(claim.verdict is verdict for claim in numbered) for verdict in Verdict}
     counts = ", ".join(f"{count} {_plural(verdict, count)}" for verdict, count in reversed(numbers.items()))
-    failing = "; ".join(f"{claim.key}: {claim.statement.rstrip('.')}" for claim in numbered if claim.verdict is Verdict.FAILS)
+    missed = [claim for claim in numbered if claim.verdict is Verdict.FAILS]
+    failing = "; ".join(f"{claim.key}: {claim.statement.rstrip('.')}" for claim in missed)
     lossless, standard = found.damped[0], next(row for row in found.damped if row.C == 0.7)
     grown = [row for row in found.edge if row.visible < float("inf")]
     coarse = max(row.error for row in found.stepped if row.step == max(row.step for row in found.stepped))

@@ -74,7 +74,7 @@ def run(docs: Path | None, *, alone: bool) -> int:
     print(f"{right} of {len(rows)} cases are right")
     if docs is not None:
         names = ["this package", *(other.name for other in others)]
-        page_figures.hard_cases(_counts(rows, len(others)), names, docs / "hard.png")
+        page_figures.hard_cases(counts(rows, len(others)), names, docs / "hard.png")
         pages.write(docs, "hard", rows=rows, right=right, others=others, compared=_compared(others, rows),
                     families=_families(rows), seconds=SECONDS, far=FAR)
     return 0 if right == len(rows) else 1
@@ -90,7 +90,7 @@ def _other(case: Case, other: Other) -> Verdict:
         return Verdict(None, f"{type(error).__name__}: {error}")
 
 
-def _counts(rows: Sequence[Row], others: int) -> dict[str, list[Counter[str] | None]]:
+def counts(rows: Sequence[Row], others: int) -> dict[str, list[Counter[str] | None]]:
     """By family: of this package and of each other method how many cases are kept, broken, or without a result."""
     found: dict[str, list[Counter[str] | None]] = {}
     for name, group in groupby(rows, key=lambda row: row.case.family.name):

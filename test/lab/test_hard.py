@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
 from grasp_ros.exact.integrator import Status
-from lab.cases.case import Case, Product, evaluate
+from lab.cases.case import Case, Product, Verdict, evaluate
 from lab.cases.registry import cases
+from lab.studies import hard
 
 REFERENCE = [pytest.mark.slow]  # 25 digits
 PARAMETERS = [
@@ -54,3 +56,14 @@ def test_oracles_notice_a_coarse_solver() -> None:
 def test_an_error_that_is_not_a_number_is_no_success() -> None:
     case = replace(cases()[0], error=lambda _: float("nan"))
     assert not evaluate(case, Product()).right(case)
+
+
+def test_the_picture_counts_what_is_kept_broken_and_without_a_result() -> None:
+    """A method that is not asked in a case is not counted there, nor is a family in which it is asked nothing."""
+    bounded = next(case for case in cases() if case.bound > 0.0 and case.limit is Status.DONE)
+    ended = next(case for case in cases() if case.limit is not Status.DONE and case.family != bounded.family)
+    kept, broken, none = Verdict(0.0, "done"), Verdict(2.0 * bounded.bound, "done"), Verdict(None, "refused")
+    rows = [hard.Row(bounded, kept, [broken, none]), hard.Row(bounded, broken, []), hard.Row(ended, none, [])]
+    found = hard.counts(rows, 2)
+    assert found[bounded.family.name] == [Counter(kept=1, broken=1), Counter(broken=1), Counter({"no result": 1})]
+    assert found[ended.family.name] == [Counter({"no result": 1}), None, None]
