@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.maps.plan import Plan
+from grasp_ros.scene.parameter import UNITS, ending_of
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, LogNorm, Normalize, colormaps
 from grasp_ros.simulation.plots import save
@@ -65,11 +66,11 @@ def _norm(shown: Any) -> Normalize:
 
 
 def _scale(axes: Axes, plan: Plan, x: int, y: int | None) -> None:
-    axes.set_xlabel(plan.axes[x].name)
+    axes.set_xlabel(label_of(plan.axes[x].name))
     if plan.axes[x].log:
         axes.set_xscale("log")
     if y is not None:
-        axes.set_ylabel(plan.axes[y].name)
+        axes.set_ylabel(label_of(plan.axes[y].name))
         if plan.axes[y].log:
             axes.set_yscale("log")
 
@@ -88,9 +89,17 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
     shown = np.flatnonzero(finite)[:SCATTERED]
     for axes, name in zip(others, strongest, strict=True):
         axes.plot(data[name].values[shown], values[shown], ".", markersize=DOT, alpha=0.3, color="#333333")
-        axes.set_xlabel(name, fontsize="small")
+        axes.set_xlabel(label_of(name), fontsize="small")
         axes.set_ylabel(label, fontsize="small")
     save(figure, path)
+
+
+def label_of(name: str) -> str:
+    """Keys joined by + as the label of an axis: without the endings that are their unit, and the unit."""
+    keys = name.split("+")
+    ending = ending_of(keys[0])
+    text = " = ".join(key.removesuffix(ending) for key in keys)
+    return f"{text}, {UNITS[ending]}" if ending else text
 
 
 def correlations(data: Any, plan: Plan, values: np.ndarray) -> list[tuple[str, float]]:

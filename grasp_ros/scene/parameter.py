@@ -14,6 +14,11 @@ UNITS = {  # endings of keys; the longest that fits counts
 }
 
 
+def ending_of(key: str) -> str:
+    """The ending of a key that says its unit; empty if none does."""
+    return max((ending for ending in UNITS if key.endswith(ending)), key=len, default="")
+
+
 def _short(number: float) -> str:
     """A bound in few digits, but all that it has."""
     text = f"{number:g}"
@@ -37,7 +42,7 @@ class Parameter(NamedTuple):
     @property
     def unit(self) -> str:
         """The unit of the key's ending."""
-        return UNITS[max((ending for ending in UNITS if self.key.endswith(ending)), key=len)]
+        return UNITS[ending_of(self.key)]
 
     @property
     def allowed(self) -> str:

@@ -16,6 +16,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
+from grasp_ros.maps import figures
 from grasp_ros.maps import run as runs
 from grasp_ros.maps.plan import Axis, Plan, read_axis, relative
 from grasp_ros.maps.run import run
@@ -210,3 +211,10 @@ def test_ends_of_an_axis_are_exact() -> None:
     axis = read_axis("--x", "a.b=0.1:0.3:7:log")
     assert axis.values[[0, -1]].tolist() == [0.1, 0.3]
     np.testing.assert_allclose(axis.values, np.geomspace(0.1, 0.3, 7))
+
+
+def test_the_label_of_an_axis_ends_with_its_unit() -> None:
+    both = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
+    assert figures.label_of(both) == "left_feedback.position_gain = right_feedback.position_gain, N/m"
+    assert figures.label_of("object.velocity_m_per_s") == "object.velocity, m/s"
+    assert figures.label_of("left_contact.hertz_N_per_m1_5") == "left_contact.hertz, N/m^1.5"
