@@ -22,15 +22,18 @@ def wide(standard: float) -> tuple[float, ...]:
     return tuple(round(standard * factor, 12) for factor in WIDE)
 
 
-def _unequal(letter: str, value: float, case: int, why: str) -> Comparison:
-    """A left arm that differs in one number, against the pair of which both have the one value, and the other."""
+def _unequal(letter: str, value: float, case: int, why: str, read_as: str = "") -> Comparison:
+    """A left arm that differs in one number, against the pair of which both have the one value, and the other.
+
+    With `read_as` it is another reading of the sentence.
+    """
     left = f"{letter}_l"
     numbers = ((left, value),)
     changed = Variant(case) if case != STANDARD else Variant(STANDARD, numbers, f"No. 1 with {left} = {value:g} alone")
     tenfold_pair = letter in BOTH and value == 10.0 * BASE[letter]
     both = Variant(BOTH[letter]) if tenfold_pair else Variant(STANDARD, ((letter, value),))
     return Comparison(
-        f"With {left} = {value:g} alone the arms settle later than either equal pair.",
+        f"{read_as}With {left} = {value:g} alone the arms settle later than either equal pair.",
         "settling",
         changed,
         True,
@@ -39,9 +42,11 @@ def _unequal(letter: str, value: float, case: int, why: str) -> Comparison:
         tuple(round(factor * BASE[letter], 12) for factor in (0.1, 0.3, 3.0, 10.0, 30.0)),
         ("settling_1", "settling_5", "rest"),
         others=(FIRST, both),
+        reading=bool(read_as),
     )
 
 
+CONTACTS = "Read as: unequal contacts, too. "
 BASE = {"m": 1.0, "k": 10.0, "c": 0.2, "Kv": 0.5, "Kp": 5.0, "p": 0.1, "H": 1e4}
 BOTH = {"m": 5, "k": 7, "c": 8, "Kv": 10, "Kp": 9, "p": 4}  # the cases in which both arms have ten times that
 
@@ -65,9 +70,9 @@ def unequal_pairs() -> tuple[Comparison, ...]:
         _unequal("Kv", 5.0, STANDARD, between + "one arm with more feedback takes energy for both."),
         _unequal("Kp", 50.0, STANDARD, "To the motion Kp_l is a stiffness, as k_l is: arms of"
             " different periods meet the object at different times and keep it moving."),
-        _unequal("p", 1.0, STANDARD, between + "one contact that loses more takes energy for both."),
+        _unequal("p", 1.0, STANDARD, between + "one contact that loses more takes energy for both.", CONTACTS),
         _unequal("H", 1e5, STANDARD, "A harder contact is a shorter one, but what an impact takes, 1 - e = 2 p v / 3"
-            " to first order, does not depend on H."),
+            " to first order, does not depend on H.", CONTACTS),
         _same_mass(),
     )
 
@@ -76,7 +81,7 @@ def _same_mass() -> Comparison:
     """Unequal masses against equal ones with the same sum."""
     changed, light = Variant(6), Variant(STANDARD, (("m_l", 1.8), ("m_r", 0.2)), "masses 1.8 and 0.2 kg")
     return Comparison(
-        "With the sum of the masses kept, unequal arms settle later than equal ones.",
+        "Read as: with the sum of the masses kept. Unequal arms settle later than equal ones.",
         "settling",
         changed,
         True,
@@ -84,6 +89,7 @@ def _same_mass() -> Comparison:
         words=("settling_1", "settling_5", "rest"),
         others=(Variant(STANDARD, (("m", 5.5),), "both arms with 5.5 kg"),),
         pairs=((light, FIRST),),
+        reading=True,
     )
 
 
