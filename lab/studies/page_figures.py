@@ -76,7 +76,7 @@ def hard_cases(rows: Mapping[str, Sequence[Counter[str] | None]], solvers: Seque
         axes.spines[:].set_visible(False)
         axes.tick_params(left=False)
     panels[0, 0].set_yticks(range(len(rows)), list(rows))
-    panels[0, 0].invert_yaxis()
+    panels[0, 0].set_ylim(len(rows) - 0.5, -0.5)
     handles = [Patch(facecolor=color, hatch=hatch, edgecolor="white", label=name)
                for name, (color, hatch, _) in OUTCOMES.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False,

@@ -183,6 +183,10 @@ def test_keys_play_and_step(page: Any) -> None:
     assert page.inner_text("#play") == "pause"
     page.keyboard.press(" ")
     assert page.inner_text("#play") == "play"
+    page.focus("#play")
+    before = int(page.input_value("#slider"))
+    page.keyboard.press("ArrowRight")
+    assert int(page.input_value("#slider")) == before + 1
 
 
 def test_less_motion_is_a_picture_a_second(page: Any) -> None:

@@ -205,7 +205,8 @@
     seek(row);
   });
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("input, select, button, summary, a, [tabindex]")) return;
+    const own = event.key === " " ? "input, select, button, summary, a, [tabindex]" : "input, select, [tabindex]"; // keys of theirs
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest(own)) return;
     const pressed = { " ": "play", ArrowLeft: "back", ArrowRight: "forth" }[event.key];
     if (!pressed) return;
     event.preventDefault();
