@@ -84,7 +84,6 @@ BREAKS = [
     Break("C1", 1, TRUE, NOT_TRUE, 1, {"p": 30.0}),
     Break("C1", 2, TRUE, NOT_TRUE, 1, {"p": 30.0}),
     Break("C2", 0, TRUE, NOT_TRUE, 3, {"p": 0.0}),
-    Break("O8", 7, (LIMITED,), NOT_TRUE, 4, {"m": 10.0}),
     Break("C3", 0, (LIMITED,), NOT_TRUE, 6, {"m_l": 1.0}),
     Break("C3", 3, (LIMITED,), NOT_TRUE, 8, {"m": 10.0}),
     Break("T3", 0, NOT_TRUE, NOT_FALSE, 1, SLACK),
