@@ -64,6 +64,19 @@ def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort:
     return _in_order(records, contenders)
 
 
+def unfinished(records: Iterable[Record], contenders: Sequence[Contender], effort: Effort = QUICK) -> list[str]:
+    """Names of solvers with settings that nobody came to, because the time was over."""
+    groups = by_method(records)
+
+    def left(contender: Contender) -> bool:
+        group = groups.get(contender.name, [])
+        given_up = group and (group[-1].status == NOT_INSTALLED
+                              or (group[-1].least or group[-1].first) > effort.patience)
+        return not given_up and len(group) < len(contender.ladder[:: effort.stride])
+
+    return [contender.name for contender in contenders if left(contender)]
+
+
 def _in_order(records: list[Record], contenders: Sequence[Contender]) -> list[Record]:
     """By solver, each from loose to tight."""
     names = [contender.name for contender in contenders]

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest
+from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest, unfinished
 from grasp_ros.accuracy.contender import own_contenders
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
@@ -58,11 +58,13 @@ def _accuracy(options: argparse.Namespace) -> int:
         records = compare(scene, contenders, truth, seconds=options.seconds, progress=told)
     advice = advise(records, options.error, options.budget) if wished else None
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
-    text = [*_table(truth, records), *(f"not here: {reason}" for reason in others.values()),
+    late = unfinished(records, contenders)
+    more = [f"after {options.seconds:g} s not all settings were measured, --seconds allows more: {', '.join(late)}"]
+    text = [*_table(truth, records), *(more if late else []), *(f"not here: {reason}" for reason in others.values()),
             *([] if advice is None else _advice(again, _wish(options), truth, advice))]
     show(options, "\n".join(text), {
         "scene": scene.name, "uncertainty": truth.uncertainty, "touches": truth.touches, "not_here": others,
-        "records": [record._asdict() for record in records],
+        "unfinished": late, "records": [record._asdict() for record in records],
         "take": None if advice is None or advice.choice is None else advice.choice._asdict()})
     if options.output is not None:
         from grasp_ros.accuracy.figure import error_against_time

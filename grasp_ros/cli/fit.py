@@ -26,6 +26,8 @@ from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
 from grasp_ros.physics.errors import Refused, printable
 
+UNLIKELY = 1e-4  # probability of residuals
+
 
 def add_to(commands: Any) -> None:
     """Add the subcommand."""
@@ -39,6 +41,8 @@ def add_to(commands: Any) -> None:
     add_settings(sub)
     sub.add_argument("--against", action="append", default=[], metavar="KEY=VALUE",
                      help="test whether the data reject this value of a number that is free; repeatable")
+    sub.add_argument("--by-sensors", action="store_true",
+                     help="of a bag: what the sensors of its scene have measured, in place of the exact states")
     add_output(sub, "FIGURE", "draw measured against fitted, .png, .svg or .pdf; - is the standard output")
     add_force(sub)
     add_json(sub)
@@ -52,12 +56,12 @@ def _fit(options: argparse.Namespace) -> int:
     if options.scene is not None:
         scene = load_scene(options.scene, options.settings)
     elif options.settings:
-        own = measured(options.source, None).scene
+        own = measured(options.source, None, options.by_sensors).scene
         scene = scenes.parse(own.to_yaml(), own.name, own.name, options.settings)
         warn(scene)
     against = dict(map(_value, options.against))
     prepare()
-    found = fit(options.source, options.free, scene, against=against)
+    found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
     show(options, printable("\n".join(_lines(found))), _data(found))
     if options.output is not None:
         from grasp_ros.identification.figure import measured_and_fitted
@@ -94,6 +98,8 @@ def _lines(found: Fit) -> Iterator[str]:
     for contact in found.contacts:
         begin = "begin" if contact.side == "none" else f"{contact.side} touch, {contact.begin:.4f} s"
         yield f"  {begin:<24}{contact.samples:>6}{contact.rms:>8.3f}{_cell(contact.white, 10, 3)}"
+    if any(contact.white < UNLIKELY for contact in found.contacts):
+        yield "the residuals are not noise: the scene lacks something that acted, and the intervals are too narrow"
     for key, test in found.against.items():
         verdict = "rejected" if test.rejected else "not rejected"
         yield f"{key} = {test.value:g}: {verdict}, F = {test.F:.4g}, probability {test.probability:.2g}"

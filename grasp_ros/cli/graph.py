@@ -291,7 +291,9 @@ def _verify(options: argparse.Namespace) -> int:
     prepare()
     found, answers = verify(recording), answers_of(recording)
     laws = [(f"{side} controller", str(law)) for side, law in answers.items()]
-    rows = [("bag", str(recording.path)), ("run", recording.running.words), *laws, ("verified", found.words)]
+    rows = [("bag", str(recording.path)), ("run", recording.running.words),
+            ("recorded", f"{recording.t[-1]:g} s of {recording.scene.duration:g} s; end: {recording.lost['end']}"),
+            *laws, ("verified", found.words)]
     show(options, report.table(rows), {"bag": str(recording.path), "lockstep": recording.running.lockstep,
                                        **verified(found, answers)})
     return 0 if found.holds else 1

@@ -56,7 +56,7 @@ def _map(options: argparse.Namespace) -> int:
     except ModuleNotFoundError as error:
         if str(error.name).split(".")[0] not in PACKAGES:
             raise
-        raise Refused(f"`grasp map` needs {error.name}; pip install 'grasp_ros[map]'") from None
+        raise Refused(f"`grasp map` needs {error.name}; pip install '.[map]' in the checkout") from None
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from grasp_ros.scene import Scene
 
 
 def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
-        against: Mapping[str, float] = MappingProxyType({})) -> Fit:
+        against: Mapping[str, float] = MappingProxyType({}), by_sensors: bool = False) -> Fit:
     """Estimate numbers of a scene from a measured motion, with confidence intervals.
 
     Positive numbers are estimated by their logarithm. The noise of each channel is estimated as well, and weights it.
@@ -35,6 +35,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         What is known, and the start of what is free. Default: the scene of the data; a .csv file has none.
     against : mapping of str to float
         Free numbers whose value is tested: whether the data reject it.
+    by_sensors : bool
+        Of a bag: what the sensors of its scene have measured, with their noise, in place of the exact states.
 
     Raises
     ------
@@ -42,7 +44,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         If scipy is not installed, the data or the keys are not allowed, or there are too few samples.
     """
     least_squares()
-    free, found = [free] if isinstance(free, str) else list(free), measured(data, scene)
+    free, found = [free] if isinstance(free, str) else list(free), measured(data, scene, by_sensors)
     numbers = numbers_of(found.scene, free, found)
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)

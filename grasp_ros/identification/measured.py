@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.verify import answers_of
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
@@ -48,14 +50,22 @@ class Measured(NamedTuple):
         return [place for place in range(6) if not np.isnan(self.state[:, place]).any()]
 
 
-def measured(source: Source, scene: Scene | None) -> Measured:
+def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> Measured:
     """A motion from what holds it; a scene replaces that of the source, and a table must have one.
+
+    By sensors: what those of the scene have measured, in place of the exact states of a bag.
 
     Raises
     ------
     Refused
         If the source cannot be read, holds too little, or holds what is no number.
     """
+    if not isinstance(source, (Recording, Trajectory)) and Path(source).is_dir():
+        source = bag.read(Path(source))
+    if by_sensors:
+        if not isinstance(source, Recording):
+            raise Refused("measured by sensors: allowed: of a bag")
+        source = replace(source, state=source.measured)
     if isinstance(source, Recording):
         found = _of_recording(source)
     elif isinstance(source, Trajectory):
@@ -66,9 +76,7 @@ def measured(source: Source, scene: Scene | None) -> Measured:
         return _checked(_of_table(Path(source), scene))
     else:
         path = Path(source)
-        with reading(path):
-            directory = path.is_dir()
-        found = _of_recording(bag.read(path)) if directory else _of_trajectory(load(path), str(path))
+        found = _of_trajectory(load(path), str(path))
     return _checked(found if scene is None else found._replace(scene=scene))
 
 
@@ -76,8 +84,10 @@ def _of_recording(recording: Recording) -> Measured:
     name, tick = str(recording.path), recording.tick
     if recording.starts.tolist() != [0] or (np.diff(tick) != 1).any():
         raise Refused(f"{name}: allowed: a bag of one run from its begin, with all of its ticks")
+    others = [side for side, answers in answers_of(recording).items() if answers.foreign]
     foreign = "numbers were set while it ran" if recording.changes else (
-        "" if recording.running.lockstep else "commands came by the wall clock")
+        "commands came by the wall clock" if not recording.running.lockstep else (
+            f"another law acted on the {' and the '.join(others)} arm" if others else ""))
     return Measured(name, recording.scene, recording.t, recording.state, recording.inputs[:-1], True, foreign)
 
 

@@ -93,7 +93,7 @@ def least_squares() -> Callable[..., Any]:
     try:
         from scipy.optimize import least_squares as found
     except ModuleNotFoundError as error:
-        raise Refused(f"a fit needs {error.name}; pip install 'grasp_ros[fit]'") from None
+        raise Refused(f"a fit needs {error.name}; pip install '.[fit]' in the checkout") from None
     return found  # type: ignore[no-any-return]
 
 

@@ -46,7 +46,7 @@ def connect(workers: int, scheduler: str) -> Iterator[Any]:
     try:
         from distributed import Client, LocalCluster
     except ModuleNotFoundError as error:
-        raise Refused(f"--workers, --scheduler: need {error.name}; pip install 'grasp_ros[cluster]'") from None
+        raise Refused(f"--workers, --scheduler: need {error.name}; pip install '.[cluster]' in the checkout") from None
     if scheduler:
         try:
             client = Client(scheduler, timeout=TIMEOUT_S)

@@ -97,7 +97,7 @@ def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | 
     try:
         from scipy.optimize import differential_evolution
     except ModuleNotFoundError:
-        raise Refused("`grasp design` needs scipy; pip install 'grasp_ros[design]'") from None
+        raise Refused("`grasp design` needs scipy; pip install '.[design]' in the checkout") from None
     runs = 0
 
     def function(parts: Array) -> Array:

@@ -26,6 +26,7 @@ from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
+from grasp_ros.scene.scene import check_scene
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
@@ -133,6 +134,7 @@ def ensemble(
     Refused
         If a key or an outcome is not known, or a setting is outside its range.
     """
+    check_scene(scene)
     setup = checked((setup or Setup())._replace(outcomes=tuple([outcomes] if isinstance(outcomes, str) else outcomes)))
     columns, variants = check(scene, setup), Variants(scene, changes)
     found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}

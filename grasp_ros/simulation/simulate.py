@@ -20,6 +20,7 @@ from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.scene.scene import check_scene
 from grasp_ros.simulation.closed_loop import Changes, Progress, check_changes, foreign_controllers
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.solve import How, solve
@@ -85,6 +86,7 @@ def simulate(
         cannot do what is asked, see `methods.registry.check`, or a controller cannot be called or answers what is no
         finite number. What a controller raises passes through, with a note of the tick.
     """
+    check_scene(scene)
     sampled = bool(sampled or scene.sampled or controllers)
     max_events, max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
     check_changes(scene, sampled, changes, controllers)

@@ -79,7 +79,7 @@ def dataset_of(motion: Trajectory) -> Any:
     try:
         import xarray
     except ModuleNotFoundError as error:
-        raise Refused(f"dataset() needs {error.name}; pip install 'grasp_ros[data]'") from None
+        raise Refused(f"dataset() needs {error.name}; pip install '.[data]' in the checkout") from None
     name, unit, text = TIME
     values = values_of(motion)
     return xarray.Dataset(
@@ -113,7 +113,7 @@ def frame_of(columns: Mapping[str, np.ndarray]) -> Any:
     try:
         import pandas
     except ModuleNotFoundError as error:
-        raise Refused(f"dataframe() needs {error.name}; pip install 'grasp_ros[data]'") from None
+        raise Refused(f"dataframe() needs {error.name}; pip install '.[data]' in the checkout") from None
     return pandas.DataFrame(dict(columns))
 
 

@@ -14,7 +14,7 @@ from documents import case_of
 from measurements import record
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest
+from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest, unfinished
 from grasp_ros.accuracy.contender import Answer, Contender, own_contenders
 from grasp_ros.accuracy.measure import NOT_INSTALLED, attempt
 from grasp_ros.accuracy.truth import Truth, finest
@@ -133,3 +133,11 @@ def test_the_command_answers_with_a_command_and_a_picture(command: Any, tmp_path
     assert command(*words, "--error", "0").returncode == 2
     assert command(*words, "--error", "1", "--budget", "1").returncode == 2
     assert command(*words[:-1], "inf").returncode == 2
+
+
+def test_solvers_that_were_not_through_are_named() -> None:
+    patient, quick = QUICK._replace(patience=2.0), Contender("f", "quick", "step", (2.0, 1.0), None)  # type: ignore[arg-type]
+    late, slow = quick._replace(name="late"), quick._replace(name="slow")
+    records = [record("quick", 1e-3, 1.0), record("quick", 1e-6, 1.0), record("slow", 1e-3, 9.0)]
+    assert unfinished(records, [quick, late, slow], patient) == ["late"]
+    assert unfinished(records[1:], [quick, late, slow], patient) == ["quick", "late"]

@@ -131,11 +131,12 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     message = json.loads(ask("echo joint_states 1"))
     assert message["name"] == ["left"]
     refused = ["set plant steps 0", "step", "pause now", "echo nothing", "nonsense", "step x", "get nobody steps",
-               f"set left_controller {gain} -100"]
+               f"set left_controller {gain} -100", "set left_controller left_feedback.position_gain 9"]
     _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
     for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
                   "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number",
-                  "no nobody answers in ROS domain", "allowed: a sum >= 0"):
+                  "no nobody answers in ROS domain", "allowed: a sum >= 0",
+                  "left_feedback.position_gain: left_controller has no such parameter; did you mean " + gain):
         assert words in err
     assert shell.returncode == 1
 

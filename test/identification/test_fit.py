@@ -200,5 +200,5 @@ def test_the_law_of_another_controller_has_no_numbers() -> None:
 
 def test_scipy_is_needed_and_named(held: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "scipy.optimize", None)
-    with pytest.raises(Refused, match=r"needs scipy.*; pip install 'grasp_ros\[fit\]'"):
+    with pytest.raises(Refused, match=r"needs scipy.*; pip install '\.\[fit\]'"):
         fit(held, [P_LEFT])

@@ -103,7 +103,7 @@ def test_the_version_for_the_documentation_shows_every_figure(made: Path) -> Non
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright; pip install 'grasp_ros[test]'")
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
     program = next(filter(None, map(shutil.which, NAMES)), None)
     if program is None:
         pytest.skip(f"needs a Chromium on the path: one of {', '.join(NAMES)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +12,10 @@ from documents import case_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, simulate
+from grasp_ros.simulation.ensemble import ensemble
 
 
 def test_continuous_is_the_integrator() -> None:
@@ -132,3 +135,9 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     np.savez(tmp_path / "strange.npz", a=1)
     with pytest.raises(ValueError, match=r"strange\.npz"):
         load(tmp_path / "strange.npz")
+
+
+def test_the_name_of_a_scene_is_no_scene() -> None:
+    for door in (simulate, partial(ensemble, changes={})):
+        with pytest.raises(Refused, match=r"scene: str is not allowed; allowed: a Scene, see load\('case_01'\)"):
+            door("case_01")  # type: ignore[operator]

@@ -77,7 +77,10 @@ def start() -> int:
     """Start the node that the first word names; `child` before it marks a child of `grasp run`."""
     is_child = sys.argv[1:2] == ["child"]
     del sys.argv[1 : 1 + is_child]
-    name = sys.argv.pop(1) if len(sys.argv) > 1 else ""
+    name = sys.argv.pop(1) if len(sys.argv) > 1 else "--help"
+    if name in ("-h", "--help"):
+        print(f"usage: python -m grasp_ros.graph NODE [--help] [--ros-args ...]; NODE is one of {', '.join(NODES)}")
+        return 0
     if name not in PARAMETERS and not (is_child and name == "together"):
         print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
         return 2

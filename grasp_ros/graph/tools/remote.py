@@ -25,6 +25,7 @@ from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
+from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 5.0  # without an answer, or without progress
@@ -104,14 +105,23 @@ class Remote(GraspNode):
         if not names:
             listed = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request())
             names = tuple(sorted(listed.result.names))
+        self._check(node, names)
         found = self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=list(names))).values
         values = [_plain(parameter_value_to_python(value)) for value in found]
         return "\n".join(f"{name}: {json.dumps(value)}" for name, value in zip(names, values, strict=False))
 
     def put(self, node: str, name: str, value: str) -> str:
         """Set a parameter of a node."""
+        self._check(node, [name])
         self._set(node, Parameter(name, value=strict_yaml.load(value)))
         return self.get(node, name)
+
+    def _check(self, node: str, names: Sequence[str]) -> None:
+        """Refuse names that a node does not have."""
+        known = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names
+        for name in names:
+            if name not in known:
+                raise Refused(f"{name}: {node} has no such parameter; {allowed(name, sorted(known))}")
 
     def _set(self, node: str, parameter: Parameter) -> None:
         request = SetParameters.Request(parameters=[parameter.to_parameter_msg()])
