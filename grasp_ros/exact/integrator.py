@@ -186,8 +186,14 @@ class Integrator:
         return to_events(self.event_table)
 
     def set_input(self, forces: Array) -> None:
-        """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces."""
-        self.plant.given[:, Of.FORCE] = self.plant.own + forces
+        """Set the forces (3,) in N, by body, that act until the next call: held commands and external forces.
+
+        Raises
+        ------
+        Refused
+            If they are not three finite numbers.
+        """
+        self.plant.given[:, Of.FORCE] = self.plant.own + given.forces("forces", forces)
 
     def advance(self, duration: float, grid: Array | None = None, start: float = 0.0) -> Array:
         """Integrate for `duration` seconds.

@@ -93,6 +93,20 @@ def times(name: str, values: Any) -> NDArray[np.float64]:
     return column(name, array.reshape(1) if array.ndim == 0 else array)
 
 
+def forces(name: str, values: Any) -> NDArray[np.float64]:
+    """Forces (3,) in N, by body; always a new array.
+
+    Raises
+    ------
+    Refused
+        If they are not three finite numbers.
+    """
+    array = column(name, values)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise Refused(f"{name}: {values!r} is not allowed; allowed: three finite numbers, N by body")
+    return array
+
+
 def _array(name: str, values: Any) -> NDArray[Any]:
     """What numpy makes of it."""
     try:

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from grasp_ros.exact.driver.user_controller import Foreign
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place
+from grasp_ros.physics import given
 from grasp_ros.physics.control import ControlLaw, normals_over
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.sight import Sight
@@ -120,10 +122,18 @@ class SampledPlant:
         -------
         array (n, 6)
             States at the offsets; only the rows reached, and the tick stays, if `status` is not DONE afterwards.
+
+        Raises
+        ------
+        Refused
+            If the commands are not three finite numbers, or the offsets do not ascend within the period.
         """
-        times = NO_TIMES if offsets is None else np.array(offsets, dtype=float)
+        commands = given.forces("commands", commands)
+        times = NO_TIMES if offsets is None else given.times("offsets", offsets)
+        if len(times) and not (times[0] >= 0.0 and times[-1] <= self._period and (np.diff(times) >= 0.0).all()):
+            raise Refused(f"offsets: allowed: ascending from 0 to {self._period:g} s, the control period")
         waits, loop = len(self._waiting), self._one
-        self.effort = self._waiting[self.tick % waits].copy() if waits else np.array(commands, dtype=float)
+        self.effort = self._waiting[self.tick % waits].copy() if waits else commands
         loop.begins[0], loop.bounds[1], loop.answers[0] = self.time, len(times), commands
         loop.place[:] = new_place(self.tick)
         if self._system.external:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from grasp_ros.exact.driver import control as compiled
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics import control
 from grasp_ros.physics.control import NO_NOISE
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.physics.model import Array, feedback
 from grasp_ros.physics.system import System
@@ -245,3 +247,17 @@ def test_changes_act_from_their_tick_on() -> None:
 def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bool, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         simulate(scenes.load("case_01", ["time.duration_s=1"]), sampled=sampled, changes=changes)
+
+
+@pytest.mark.parametrize("forces", [1.0, [1.0, 2.0], [1.0, np.nan, 0.0], "abc", np.zeros((3, 1)), None])
+def test_forces_are_three_finite_numbers(forces: Any) -> None:
+    scene = scenes.load("case_01")
+    plant, integrator = SampledPlant(scene.system, scene.period_ns), Integrator(scene.system, continuous=False)
+    for door in (plant.step, integrator.set_input):
+        with pytest.raises(Refused, match=r"^(commands|forces): "):
+            door(forces)
+    for offsets in ([-1e-4], [2e-3], [1e-3, 5e-4]):
+        with pytest.raises(Refused, match="offsets: "):
+            plant.step(np.zeros(3), offsets)  # type: ignore[arg-type]
+    assert plant.tick == 0
+    assert plant.step((1, 2, np.float32(3)), [0.0, 1e-3]).shape == (2, 6)  # type: ignore[arg-type]
