@@ -32,7 +32,7 @@ def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
             kind, body = Transition(int(event[Entry.KIND])), Body(int(event[Entry.BODY]))
             yield f"  {kind.name.lower()} {body.name.lower()} at {event[Entry.TIME]:.6g} s", f"{rate:.12g} s"
     if found.corner is not None:
-        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on: a stopped object could as well stay"
+        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on"
 
 
 def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:

@@ -27,6 +27,7 @@ STRIDE, STEPS = 8.0, 13  # from a tenth of the number down to some 1e-12 of it
 DECIDABLE = 1e-3  # of the derivative: a difference that is less certain decides nothing
 FACTOR = 8.0  # by which a difference may be less certain than its neighbours show
 SMALLEST = 1e-9  # of the derivative, likewise
+BEND = 0.1  # of the derivative: where one-sided differences disagree by more, steps are too long
 MOST_WORK = 20_000  # of a run
 AGREES, FLAGGED, REFUSED, UNDECIDED, LONG, WRONG = VERDICTS = (
     "agrees", "flagged", "refused", "not decidable", "too long", "wrong")
@@ -78,19 +79,22 @@ def judge(scene: Scene, key: str, size: float) -> Verdict:
         return Verdict(REFUSED, text=str(refusal))
     if found.corner is not None:
         return Verdict(FLAGGED)
-    value, doubt = _plateau(scene, key, size)
-    scale, away = np.maximum(np.abs(value), np.abs(rates)), np.abs(rates - value)
-    allowed = FACTOR * (doubt + spread) + SMALLEST * scale
-    text, there = f"{rates} beside {value}, allowed {allowed}", np.isfinite(found.state[-1])
+    there = np.isfinite(found.state[-1])
     if not np.isfinite(rates[there]).all():
-        return Verdict(WRONG, np.inf, text)
+        return Verdict(WRONG, np.inf, f"{rates}")
+    near = _plateau(scene, key, size)
+    scale, away = np.maximum(np.abs(near.value), np.abs(rates)), np.abs(rates - near.value)
+    allowed = FACTOR * (near.doubt + spread) + SMALLEST * scale
+    text = f"{rates} beside {near.value}, allowed {allowed}"
     there &= scale > 0.0
     if not there.any():
         return Verdict(AGREES)
     error = float(np.max(away[there] / allowed[there]))
-    if error > 1.0:
+    seen = (near.bend <= BEND * scale) & (np.abs(rates) * near.smallest <= np.abs(found.state[-1]))
+    if error > 1.0 and seen[there & (away > allowed)].any():
         return Verdict(WRONG, error, text)
-    return Verdict(AGREES if (allowed <= DECIDABLE * scale)[there].any() else UNDECIDED, error, text)
+    decided = there & seen & (allowed <= DECIDABLE * scale)
+    return Verdict(AGREES if error <= 1.0 and decided.any() else UNDECIDED, error, text)
 
 
 def _spread(scene: Scene, key: str, rates: Array) -> Array:
@@ -103,21 +107,36 @@ def _spread(scene: Scene, key: str, rates: Array) -> Array:
     return np.asarray(np.max(np.abs(np.array(found) - rates), axis=0))
 
 
-def _plateau(scene: Scene, key: str, size: float) -> tuple[Array, Array]:
-    """Differences (6,), each at the step where its neighbours agree best, and how uncertain they are."""
+class _Plateau(NamedTuple):
+    """Differences (6,), each at the step where its neighbours agree best."""
+
+    value: Array
+    doubt: Array  # how uncertain they are
+    bend: Array  # by how much the two one-sided differences disagree there
+    smallest: float  # step
+
+
+def _plateau(scene: Scene, key: str, size: float) -> _Plateau:
     section, _, name = key.partition(".")
-    rows, roundings = [], []
+    middle = scene.values[section][name]
+    here = _end(scene)
+    rows, roundings, bends = [], [], []
     for step in size * 0.1 * STRIDE ** -np.arange(STEPS, dtype=float):
-        low, high = scene.values[section][name] - step, scene.values[section][name] + step
+        low, high = middle - step, middle + step
         with suppress(SceneError):
-            ends = [simulate(scene.changed({key: float(at)}), grid=np.array([scene.duration]), accuracy=FINEST)
-                    for at in (low, high)]
-            if all(end.status is Status.DONE for end in ends):
-                rows.append((ends[1].state[-1] - ends[0].state[-1]) / (high - low))
-                roundings.append(np.spacing(np.abs(ends[0].state[-1])) / (high - low))
+            below, above = (_end(scene.changed({key: float(at)})) for at in (low, high))
+            rows.append((above - below) / (high - low))
+            bends.append(np.abs((above - here) / (high - middle) - (here - below) / (middle - low)))
+            roundings.append(np.tile(np.spacing([np.nanmax(np.abs(here[kind::2])) for kind in (0, 1)]), 3) / step)
     if len(rows) < 3:
-        return np.full(6, np.nan), np.full(6, np.inf)
+        return _Plateau(*np.full((3, 6), np.inf), 0.0)
     changes = np.abs(np.diff(rows, axis=0))
     doubt = np.nan_to_num(np.maximum(changes[:-1], changes[1:]) + roundings[1:-1], nan=np.inf)
-    best = np.argmin(doubt, axis=0)
-    return np.array(rows)[1:-1][best, range(6)], doubt[best, range(6)]
+    best = np.argmin(doubt, axis=0), range(6)
+    return _Plateau(np.array(rows)[1:-1][best], doubt[best], np.array(bends)[1:-1][best], float(step))
+
+
+def _end(scene: Scene) -> Array:
+    """The last state (6,) of a run; NaN: it does not get there."""
+    run = simulate(scene, grid=np.array([scene.duration]), accuracy=FINEST)
+    return np.asarray(run.state[-1] if run.status is Status.DONE else np.full(6, np.nan))
