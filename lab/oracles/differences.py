@@ -129,7 +129,7 @@ def _plateau(scene: Scene, key: str, size: float) -> _Plateau:
             bends.append(np.abs((above - here) / (high - middle) - (here - below) / (middle - low)))
             roundings.append(np.tile(np.spacing([np.nanmax(np.abs(here[kind::2])) for kind in (0, 1)]), 3) / step)
     if len(rows) < 3:
-        return _Plateau(*np.full((3, 6), np.inf), 0.0)
+        return _Plateau(np.full(6, np.nan), np.full(6, np.inf), np.full(6, np.inf), 0.0)
     changes = np.abs(np.diff(rows, axis=0))
     doubt = np.nan_to_num(np.maximum(changes[:-1], changes[1:]) + roundings[1:-1], nan=np.inf)
     best = np.argmin(doubt, axis=0), range(6)
