@@ -173,6 +173,8 @@ def _torchdiffeq() -> Iterator[Row]:
     import torch
     from torchdiffeq import odeint, odeint_event
 
+    torch.set_num_threads(1)  # of two numbers: a second thread would only wait
+
     def solve(tolerance: float) -> tuple[float, Array]:
         q = torch.tensor(NUMBERS, dtype=torch.float64, requires_grad=True)
 
