@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from grasp_ros.cli.arguments import (
 )
 from grasp_ros.cli.output import STDOUT, image_format, note, write_figure
 from grasp_ros.methods.registry import EXACT, METHODS
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
@@ -37,6 +39,8 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--sampled", action="store_true", help="scenes: hold each command over a control period")
     sub.add_argument("--method", choices=METHODS, default=EXACT, help="scenes: way to integrate; see `grasp methods`")
     sub.add_argument("--step", type=float, metavar="S", help="scenes: step or tolerance of the method")
+    sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
+                     help="one scene: below it derivatives of the positions by its number section.key; repeatable")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
@@ -53,6 +57,8 @@ def _plot(options: argparse.Namespace) -> int:
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
     check_output(output, options.force, options.sources)
+    if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
+        raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
     if not options.animate:
         image_format(output)
     motions, captions = [], []
@@ -73,7 +79,8 @@ def _plot(options: argparse.Namespace) -> int:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")
         return 0
-    figure = plots.compose(motions, captions, width_mm=options.width, span=span)
+    more = _sensitivity(motions[0], options) if options.sensitivity else ()
+    figure = plots.compose(motions, captions, width_mm=options.width, span=span, more=more)
     write_figure(figure, output)
     return 0
 
@@ -96,8 +103,10 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> tuple[plots
     with reading(path):
         directory = path.is_dir()
     recorded = directory or path.suffix == ".npz"
-    if recorded and (options.settings or options.sampled or options.method != EXACT or options.step is not None):
-        raise Refused(f"{source}: --set, --sampled, --method, --step are not allowed; allowed for scenes")
+    if recorded and (options.settings or options.sampled or options.method != EXACT or options.step is not None
+                     or options.sensitivity):
+        raise Refused(f"{source}: --set, --sampled, --method, --step, --sensitivity are not allowed; allowed for"
+                      " scenes")
     if directory:
         recording = bag.read(path)
         warn(recording.scene)
@@ -118,6 +127,16 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
         first, last = min(max(span[0], 0.0), scene.duration), min(span[1], scene.duration)
         grid = np.linspace(first, last, GRID_POINTS)
     return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step)
+
+
+def _sensitivity(motion: plots.Motion, options: argparse.Namespace) -> Sequence[plots.Panel]:
+    """Derivatives of a scene's motion at the times that are drawn."""
+    from grasp_ros.cli.sensitivity import panels
+    from grasp_ros.sensitivity.sensitivities import sensitivities
+
+    accuracy = ACCURACY if options.step is None else options.step
+    return panels(sensitivities(motion.scene, options.sensitivity, motion.t, sampled=options.sampled,
+                                accuracy=accuracy))
 
 
 def _beside(source: str, ending: str) -> Path:

@@ -1,16 +1,23 @@
-"""`grasp simulate --sensitivity`: derivatives of a run, printed."""
+"""Derivatives of a run: printed by `grasp simulate --sensitivity`, drawn by `grasp plot --sensitivity`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from typing import Any
+
+import numpy as np
 
 from grasp_ros.cli.report import Row
 from grasp_ros.physics.layout import Body, Entry, Transition
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.sensitivity.sensitivities import Sensitivity
+from grasp_ros.simulation import plots
+from grasp_ros.simulation.canvas import Axes
 
 LAST = 4  # events that are shown
+COLORS = {Body.LEFT: plots.LEFT_COLOR, Body.OBJECT: plots.OBJECT_COLOR, Body.RIGHT: plots.RIGHT_COLOR}
+WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 
 def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
@@ -25,7 +32,7 @@ def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
             kind, body = Transition(int(event[Entry.KIND])), Body(int(event[Entry.BODY]))
             yield f"  {kind.name.lower()} {body.name.lower()} at {event[Entry.TIME]:.6g} s", f"{rate:.12g} s"
     if found.corner is not None:
-        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on: a stopped object could as well stay"
+        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on"
 
 
 def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
@@ -34,3 +41,22 @@ def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
         key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": found.V_c_rates[-1, place]}
         for place, key in enumerate(found.keys)
     }
+
+
+def panels(found: Sensitivity) -> list[plots.Panel]:
+    """A panel for each number: derivatives of the positions by it, over time."""
+    return [(partial(_draw, found, place), "derivative, m") for place in range(len(found.keys))]
+
+
+def _draw(found: Sensitivity, place: int, axes: Axes, _: plots.Motion) -> None:
+    rates = found.state_rates[:, ::2, place]
+    sizes = np.abs(rates[rates != 0.0])
+    if len(sizes) and sizes.max() > WIDE * np.median(sizes):
+        axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(np.median(sizes))))
+        axes.locator_params(axis="y", numticks=7)
+    for body in found.scene.system.present:
+        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"$dx_{NAMES[body][0]}$", color=COLORS[Body(body)],
+                  linewidth=1.0)
+    if found.corner is not None:
+        axes.axvline(found.corner, color="black", linewidth=0.8, linestyle=":", label="one-sided from here")
+    axes.set_title(f"by {found.keys[place]}", loc="left", fontsize="small", parse_math=False)

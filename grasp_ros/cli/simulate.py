@@ -44,7 +44,8 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--controller", dest="controllers", action="append", default=[], metavar="SIDE=MODULE:OBJECT",
                      help="a callable of tick, time, x, v and what it asks for by name, in place of the feedback")
     sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
-                     help="print derivatives by a number of the scene, section.key, through all impacts; repeatable")
+                     help="print derivatives by a number of the scene, section.key, through all impacts; repeatable;"
+                          " `grasp plot --sensitivity` draws them")
     result = sub.add_argument_group("result")
     add_output(result, "FILE", "write states, forces, V and, as .npz, events and counters; .csv, or - for the standard"
                                " output, writes a table")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.contact.series import put
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.records import Array
@@ -76,7 +76,7 @@ def base_series(motion: Motion, table: Table, n: int) -> None:
             force[k], lost[k] = hertzian * (second[i + 2] + loss * third[i]), hertzian * third[i]
 
 
-@kernel
+@inlined
 def close(table: Table, several: int, k: int) -> None:
     """Write coefficient k of u and u' of both pairs."""
     n, wide = several, table.wide
@@ -88,7 +88,7 @@ def close(table: Table, several: int, k: int) -> None:
                 apart[j] = first[j] - second[j]
 
 
-@kernel
+@inlined
 def impact(motion: Motion, law: Array, table: Table, side: Body, k: int) -> None:
     """Write coefficient k of the impact force of a pair, times dt/ds, to the total."""
     wide, rows = table.wide, table.rows
@@ -102,7 +102,7 @@ def impact(motion: Motion, law: Array, table: Table, side: Body, k: int) -> None
         table.total[first + j] += law[side, Law.HERTZIAN, j] * per_hertz + law[side, Law.DISSIPATION, j] * lost
 
 
-@kernel
+@inlined
 def advance_body(motion: Motion, acting: Array, table: Table, body: Body, k: int) -> None:
     """Write coefficient k + 1 of a body; the total has the products of the six numbers, and both impacts."""
     n, v, rates, row = acting.shape[2], velocity_lane(body), acting[body], motion.bodies[body]

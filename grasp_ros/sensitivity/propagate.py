@@ -17,6 +17,7 @@ from grasp_ros.exact.compilation.jit import allocating, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.records import Array
+from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.contact import (
     exact_length,
@@ -80,6 +81,33 @@ def pass_friction(motion: Motion, moved: Array, outputs: Outputs) -> None:
         outputs.numbers[Number.CORNER] = min(outputs.numbers[Number.CORNER], outputs.numbers[Number.TIME])
     else:
         scale_object(moved, factor)
+
+
+@kernel
+def acceleration(motion: Motion, body: Body) -> float:
+    """Acceleration of a body at the begin of a segment, m/s^2; of an arm that is not pushed."""
+    row, v = motion.bodies[body], velocity_lane(body)
+    push = row[Of.FORCE] - row[Of.STIFFNESS] * motion.before[v - 1] - row[Of.DAMPING] * motion.before[v]
+    if body == OBJECT:
+        push += impact_now(motion, LEFT) - impact_now(motion, RIGHT)
+    return push / row[Of.MASS]
+
+
+@kernel
+def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
+    """Note a run that begins with a pair at u' = -1/p which nothing moves off: a change to one side has a force."""
+    for side in (LEFT, RIGHT):
+        loss, d = motion.pairs[side, Law.DISSIPATION], approach(motion.before, side)
+        rounding = SURFACE * EPS * (1.0 + loss * (abs(motion.before[velocity_lane(side)]) + abs(motion.before[V.O])))
+        if motion.before[U.L + side] <= 0.0 or abs(damping_factor(loss, d)) > rounding:
+            continue
+        if acceleration(motion, side) != acceleration(motion, OBJECT):
+            continue
+        sign, arm = 1.0 if side == LEFT else -1.0, velocity_lane(side)
+        for j in range(rates.x.shape[1]):
+            faster = sign * (rates.x[arm, j] - rates.x[V.O, j])
+            if rates.law[side, Law.DISSIPATION, j] * d + loss * faster != 0.0:
+                outputs.numbers[Number.CORNER] = 0.0
 
 
 @kernel
@@ -243,6 +271,8 @@ def propagate(address: int, kind: int, span: float, s: float, degree: int) -> in
     if not math.isfinite(span):
         return 0
     if not ends:
+        if t.outputs.counts[Count.SLIDE] == UNSEEN:
+            check_glide(t.motion, t.rates, t.outputs)
         pass_friction(t.motion, t.rates.x, t.outputs)
     arrive(t, span * (1.0 - GAP) if ends else clock[2], begin)
     if ends:

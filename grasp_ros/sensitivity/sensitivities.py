@@ -46,7 +46,7 @@ class Sensitivity:
         the event.
     corner : float or None
         Time in s from which on one-sided derivatives differ, because an object under dry friction turns where it could
-        as well stay; None: nowhere.
+        as well stay, or because a pair begins at u' = -1/p and nothing moves it off; None: nowhere.
     """
 
     scene: Scene

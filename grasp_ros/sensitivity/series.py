@@ -24,20 +24,43 @@ def padded(columns: int) -> int:
 
 @kernel
 def combine(f: Array, stride: int, column: int, factors: Array, k: int, total: Lanes) -> Lanes:
-    """Add coefficient k of the products of eight columns with one series to a total."""
+    """Add coefficient k of the products of eight columns with one series to a total.
+
+    Even and odd terms have sums of their own: one alone would wait for each addition before the next.
+    """
     s0, s1, s2, s3, s4, s5, s6, s7 = total
-    end, wide, first = np.uint64(k), np.uint64(stride), np.uint64(column)
-    for j in range(np.uint64(0), np.uint64(k + 1)):
-        i, factor = wide * j + first, factors[end - j]
-        s0 = fma(f[i], factor, s0)
-        s1 = fma(f[i + np.uint64(1)], factor, s1)
-        s2 = fma(f[i + np.uint64(2)], factor, s2)
-        s3 = fma(f[i + np.uint64(3)], factor, s3)
-        s4 = fma(f[i + np.uint64(4)], factor, s4)
-        s5 = fma(f[i + np.uint64(5)], factor, s5)
-        s6 = fma(f[i + np.uint64(6)], factor, s6)
-        s7 = fma(f[i + np.uint64(7)], factor, s7)
-    return s0, s1, s2, s3, s4, s5, s6, s7
+    r0 = r1 = r2 = r3 = r4 = r5 = r6 = r7 = 0.0
+    wide, i, last = np.uint64(stride), np.uint64(column), np.uint64(k)
+    for _ in range((k + 1) // 2):
+        even, odd, m = factors[last], factors[last - np.uint64(1)], i + wide
+        s0 = fma(f[i], even, s0)
+        s1 = fma(f[i + np.uint64(1)], even, s1)
+        s2 = fma(f[i + np.uint64(2)], even, s2)
+        s3 = fma(f[i + np.uint64(3)], even, s3)
+        s4 = fma(f[i + np.uint64(4)], even, s4)
+        s5 = fma(f[i + np.uint64(5)], even, s5)
+        s6 = fma(f[i + np.uint64(6)], even, s6)
+        s7 = fma(f[i + np.uint64(7)], even, s7)
+        r0 = fma(f[m], odd, r0)
+        r1 = fma(f[m + np.uint64(1)], odd, r1)
+        r2 = fma(f[m + np.uint64(2)], odd, r2)
+        r3 = fma(f[m + np.uint64(3)], odd, r3)
+        r4 = fma(f[m + np.uint64(4)], odd, r4)
+        r5 = fma(f[m + np.uint64(5)], odd, r5)
+        r6 = fma(f[m + np.uint64(6)], odd, r6)
+        r7 = fma(f[m + np.uint64(7)], odd, r7)
+        i, last = m + wide, last - np.uint64(2)
+    if k % 2 == 0:
+        even = factors[0]
+        s0 = fma(f[i], even, s0)
+        s1 = fma(f[i + np.uint64(1)], even, s1)
+        s2 = fma(f[i + np.uint64(2)], even, s2)
+        s3 = fma(f[i + np.uint64(3)], even, s3)
+        s4 = fma(f[i + np.uint64(4)], even, s4)
+        s5 = fma(f[i + np.uint64(5)], even, s5)
+        s6 = fma(f[i + np.uint64(6)], even, s6)
+        s7 = fma(f[i + np.uint64(7)], even, s7)
+    return s0 + r0, s1 + r1, s2 + r2, s3 + r3, s4 + r4, s5 + r5, s6 + r6, s7 + r7
 
 
 @kernel

@@ -30,6 +30,7 @@ PAPER_INPUT = (-10.0, 10.0)  # N
 WIDTH_MM = 230.0  # of a figure with one motion
 NARROWEST_MM, WIDEST_MM = 60.0, 1000.0
 MM = 25.4
+SHARES, MORE_SHARE = (3, 2, 2, 3), 2  # heights of the panels
 ONE_COLUMN_MM = 130.0  # narrower motions get smaller letters
 LETTERS, SMALL_LETTERS = 9.0, 6.5  # pt
 
@@ -60,6 +61,9 @@ class Motion(Protocol):
     @property
     def energy(self) -> Energy:
         """V, V_c, V' and the contact mode."""
+
+
+Panel = tuple[Callable[[Axes, Motion], None], str]
 
 
 def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = None) -> None:
@@ -99,7 +103,7 @@ def draw_several(
 
 def compose(
     motions: Sequence[Motion], captions: Sequence[str], *, width_mm: float | None = None,
-    span: tuple[float, float] | None = None,
+    span: tuple[float, float] | None = None, more: Sequence[Panel] = (),
 ) -> Figure:
     """A figure of motions side by side, with common axes.
 
@@ -112,6 +116,8 @@ def compose(
         Of the page; default: 230 mm, and 150 mm for each of several motions.
     span : tuple of float, optional
         First and last time in s; default: the whole motions.
+    more : sequence of (callable, str), optional
+        Panels below the usual ones: what draws a motion into axes, and the label of these.
 
     Raises
     ------
@@ -124,26 +130,27 @@ def compose(
     if width_mm is not None and not NARROWEST_MM <= width_mm <= WIDEST_MM:
         raise Refused(f"--width {width_mm!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
-    height = 0.6 * WIDTH_MM if small else 0.9 * WIDTH_MM
+    panels, shares = (*PANELS, *more), (*SHARES, *(MORE_SHARE for _ in more))
+    height = (0.6 if small else 0.9) * WIDTH_MM * sum(shares) / sum(SHARES)
     with canvas.style({"font.size": SMALL_LETTERS if small else LETTERS}):
-        figure, panels = canvas.subplots(
-            len(PANELS), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=(3, 2, 2, 3),
+        figure, grid = canvas.subplots(
+            len(panels), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=shares,
             figsize=(width / MM, height / MM), layout="constrained",
         )
         for column, (motion, caption) in enumerate(zip(motions, captions, strict=True)):
             title = _title(motion, caption, width / len(motions), small)
-            panels[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
-            for (draw_panel, label), axes in zip(PANELS, panels[:, column], strict=True):
+            grid[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
+            for (draw_panel, label), axes in zip(panels, grid[:, column], strict=True):
                 draw_panel(axes, motion)
                 shade_contacts(axes, motion)
                 axes.grid(alpha=0.3)
                 axes.set_xlim(*(span or (motion.t[0], motion.t[-1])))
                 if column == 0:
                     axes.set_ylabel(label)
-            panels[-1, column].set_xlabel("time, s")
-        for row in panels:
+            grid[-1, column].set_xlabel("time, s")
+        for row in grid:
             legend_beside(row[-1])
-        figure.align_ylabels(panels[:, 0])
+        figure.align_ylabels(grid[:, 0])
         figure.canvas.draw()  # the layout, with the letters of this context
         return figure
 
@@ -282,7 +289,7 @@ def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:
     axes.set_ylim(min(before[0], 1.05 * values.min()), max(before[1], 1.05 * values.max()))
 
 
-PANELS: tuple[tuple[Callable[[Axes, Motion], None], str], ...] = (
+PANELS: tuple[Panel, ...] = (
     (displacements, "displacement, m"), (inputs, "input, N"), (impacts, "impact force, N"),
     (energies, "twice the energy, J"),
 )

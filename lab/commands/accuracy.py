@@ -14,6 +14,7 @@ from grasp_ros.cli.arguments import (
     add_settings,
     load_scene,
     prepare,
+    whole,
 )
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -91,8 +92,11 @@ def _prediction(options: argparse.Namespace) -> int:
 
 def add_derivatives(commands: Any) -> Parser:
     """`python -m lab derivatives`."""
-    text = "derivatives through impacts beside the reference, which takes hours; resumes"
+    text = "derivatives through impacts beside the reference, which takes hours and resumes, random scenes, and peers"
     sub = add_command(commands, "derivatives", _derivatives, text)
+    sub.add_argument("--table", dest="tables", action="append", choices=("reference", "random", "peers"),
+                     help="one of the page's tables; repeatable (default reference and random)")
+    sub.add_argument("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)")
     add_docs(sub)
     add_study_directory(sub)
     return sub
@@ -103,10 +107,11 @@ def _derivatives(options: argparse.Namespace) -> int:
 
     docs = page_directory(options, "derivatives")
     prepare()
-    rows = derivatives.run(options.output)
-    print(derivatives.report(rows))
+    found = derivatives.tables(options.tables or [derivatives.REFERENCE, derivatives.RANDOM], options.output,
+                               options.draws)
+    print("\n\n".join(found.values()))
     if docs is not None:
-        print(f"written to {derivatives.write(docs, rows)}")
+        print(f"written to {derivatives.write(docs, found)}")
     return 0
 
 

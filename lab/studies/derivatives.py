@@ -1,7 +1,8 @@
-"""Derivatives through impacts beside differences of the high-precision reference: the table of docs/derivatives.md."""
+"""Derivatives through impacts beside the high-precision reference, random scenes and peers: docs/derivatives.md."""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,8 +12,9 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.sensitivities import sensitivities
+from lab.oracles.differences import VERDICTS, WRONG, judge_draw
 from lab.reference.derivative import difference
-from lab.studies import pages
+from lab.studies import pages, peer_derivatives
 from lab.studies.records import Journal, scene_key
 
 P, PLACE = "left_contact.dissipation_s_per_m", "object.position_m"
@@ -24,7 +26,8 @@ SUBJECTS = (
 PARTS = (0.25, 0.5, 1.0)  # of the horizon
 SECONDS = {"delay": 3.0}  # horizons of scenes with many ticks, which take the reference long
 ROUNDINGS = 4  # runs whose initial places are off by one
-MARK, PAGE = "<!-- table -->", "derivatives.md"
+PAGE = "derivatives.md"
+REFERENCE, RANDOM, PEERS = TABLES = "reference", "random", "peers"
 
 
 class Known(NamedTuple):
@@ -89,9 +92,32 @@ def report(rows: list[Row]) -> str:
         for row in rows))
 
 
-def write(docs: Path, rows: list[Row]) -> Path:
-    """Write docs/derivatives.md: the words of the page that is there, and the table between its marks; returns it."""
-    before, _, after = (pages.HOME / "docs" / PAGE).read_text(encoding="utf-8").split(MARK)
-    page = docs / PAGE
-    pages.put(page, f"{before}{MARK}\n\n{report(rows)}\n\n{MARK}{after}")
+def random_scenes(draws: int) -> str:
+    """What became of random scenes, as a table of Markdown; scenes whose derivatives are wrong are printed."""
+    counts: Counter[str] = Counter()
+    for number in range(draws):
+        drawn, verdict = judge_draw(number)
+        counts[verdict.word] += 1
+        if verdict.word == WRONG:
+            print(f"{verdict.text}\n{drawn}")
+    return pages.table(("drawn", *VERDICTS), [[str(draws), *(str(counts[word]) for word in VERDICTS)]])
+
+
+def tables(names: list[str], directory: Path, draws: int) -> dict[str, str]:
+    """The named tables of the page, measured now."""
+    measures = {
+        REFERENCE: lambda: report(run(directory)), RANDOM: lambda: random_scenes(draws),
+        PEERS: lambda: peer_derivatives.report(peer_derivatives.run()),
+    }
+    return {name: measures[name]() for name in names}
+
+
+def write(docs: Path, found: dict[str, str]) -> Path:
+    """Write docs/derivatives.md: the page that is there, with these tables between their marks; returns it."""
+    text, page = (pages.HOME / "docs" / PAGE).read_text(encoding="utf-8"), docs / PAGE
+    for name, table in found.items():
+        mark = f"<!-- {name} -->"
+        before, _, after = text.split(mark)
+        text = f"{before}{mark}\n\n{table}\n\n{mark}{after}"
+    pages.put(page, text)
     return page

@@ -33,12 +33,25 @@ def test_sampled_and_files(command: Any, tmp_path: Path) -> None:
     assert (tmp_path / "a.png").exists()
 
 
+def test_derivatives_are_drawn_below_the_motion(command: Any, tmp_path: Path) -> None:
+    keys = ("--sensitivity", "left_contact.dissipation_s_per_m", "--sensitivity", "object.position_m")
+    words = "plot", "case_01", "--set", "time.duration_s=2", "-o"
+    for name, more in (("plain", ()), ("both", keys)):
+        result = command(*words, f"{name}.svg", *more)
+        assert result.returncode == 0, result.stderr
+    plain, both = ((tmp_path / f"{name}.svg").read_text("utf-8") for name in ("plain", "both"))
+    labels = ["by left_contact.dissipation_s_per_m", "by object.position_m", "derivative, m"]
+    assert [(label in both, label in plain) for label in labels] == [(True, False)] * len(labels)
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [
         (("--from", "3", "--to", "2"), "--from 3.0, --to 2.0 is not allowed; allowed: --from below --to"),
         (("--from", "99"), "--from 99.0 is not allowed; allowed: 0 to below 20 s"),
         (("--to", "21"), "--to 21.0 is not allowed; allowed: up to 20 s"),
+        (("case_03", "--sensitivity", "object.mass_kg"), "--sensitivity: allowed: one scene, --method exact"),
+        (("--sensitivity", "object.colour"), "object.colour: not in this scene"),
         (("--width", "5"), "--width 5.0 is not allowed; allowed: 60 to 1000 mm"),
     ],
 )

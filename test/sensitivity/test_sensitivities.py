@@ -176,6 +176,19 @@ def test_an_object_that_could_as_well_stay_is_flagged() -> None:
     assert sensitivities(scene, ["object_friction.coulomb_N"]).corner is None
 
 
+@pytest.mark.parametrize(("stiffness", "corner"), [(0.0, 0.0), (1.0, None)])
+def test_a_pair_that_glides_where_its_force_ends_is_flagged(stiffness: float, corner: float | None) -> None:
+    """At u' = -1/p for good: a smaller p gives a force, a larger one none."""
+    scene = compose("glide", {
+        "time": {"duration_s": 0.01, "control_period_s": 0.001},
+        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
+        "left_arm": {"mass_kg": 1.0, "position_m": 0.5, "velocity_m_per_s": -4.0, "stiffness_N_per_m": stiffness},
+        "left_contact": {"hertz_N_per_m1_5": 100.0, "dissipation_s_per_m": 0.25},
+    })
+    assert sensitivities(scene, [P]).corner == corner
+    assert sensitivities(scene, ["left_arm.position_m"]).corner is None
+
+
 def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
     arm = scenes.load("arm_alone")
     left = arm.values["left_arm"]
