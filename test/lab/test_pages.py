@@ -60,7 +60,7 @@ def test_every_template_has_a_page_and_sources() -> None:
     assert {path.stem for path in pages.TEMPLATES.iterdir()} == {*MEASURED, "domain"}
 
 
-@pytest.mark.parametrize("name", [*sorted(MEASURED.keys() - {"maps"}), "domain", pytest.param("maps", marks=LATE)])
+@pytest.mark.parametrize("name", [*sorted(MEASURED), "domain"])
 def test_a_page_says_what_its_template_says(name: str) -> None:
     text, place = " ".join(page(name).split()), 0
     for part in words(name):
