@@ -13,7 +13,7 @@ TITLE = "The paper, reproduced and judged"
 SUBTITLE = (
     "T. Fukuda, Y. Shoji, M. Inaba: Stable Position/Force Control of Robotic Manipulator with Consideration of"
     " Collision Phenomena. IFAC 11th World Congress, Tallinn 1990. Its statements are restated in our words, with page"
-    " and number; T1 on stand in its running text."
+    " and number; T1 to T12 are statements of its running text."
 )
 SWEEPS = (
     "Ratio of the measure to that of No. 1 (O1: of No. 2), median over random starts with its 95 % interval. Grey:"

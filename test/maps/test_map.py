@@ -18,7 +18,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
 from grasp_ros.maps import figures
 from grasp_ros.maps import run as runs
-from grasp_ros.maps.plan import Axis, Plan, read_axis, relative
+from grasp_ros.maps.plan import POINTS, Axis, Plan, read_axis, relative
 from grasp_ros.maps.run import run
 from grasp_ros.maps.store import MARKS, Store, columns_of, open_group, read
 from grasp_ros.physics.errors import Refused
@@ -200,6 +200,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", "object.weight=1:2"], "object.weight: not a number of this scene"),
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
+        (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "a sample has no grid; allowed: low:high, and ::log behind it"),
         (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
         (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),
     ):
@@ -211,6 +212,7 @@ def test_ends_of_an_axis_are_exact() -> None:
     axis = read_axis("--x", "a.b=0.1:0.3:7:log")
     assert axis.values[[0, -1]].tolist() == [0.1, 0.3]
     np.testing.assert_allclose(axis.values, np.geomspace(0.1, 0.3, 7))
+    assert read_axis("--vary", "a.b=0.1:0.3::log") == axis._replace(points=POINTS)
 
 
 def test_the_label_of_an_axis_ends_with_its_unit() -> None:
