@@ -185,6 +185,8 @@ def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, watch: Watch, l
     loop.begins[0] = 0.0
     rows.touches[i, 0], rows.touches[i, 1] = left, right
     rows.seen[i, Seen.SETTLED] = seen[Seen.SETTLED] if seen[Seen.SETTLED] != UNDECIDED else math.inf
+    for body in range(3):
+        rows.seen[i, Seen.OUTSIDE + body] = seen[Seen.OUTSIDE + body]
     watch.context[Context.WANTED], watch.context[Context.LOSSES] = wanted, losses
     return int(outcome)
 

@@ -199,7 +199,8 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
         watcher.finish()
         row.seen[:] = watcher.seen
         if row.status is Status.DONE and wanted & Wanted.SETTLING:
-            row.seen[Seen.SETTLED] = settle(integrator, watcher, scene.duration, setup.horizons).max()
+            row.seen[Seen.OUTSIDE : Seen.OUTSIDE + 3] = settle(integrator, watcher, scene.duration, setup.horizons)
+            row.seen[Seen.SETTLED] = row.seen[Seen.OUTSIDE : Seen.OUTSIDE + 3].max()
     return row
 
 

@@ -8,6 +8,7 @@ from documents import scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
@@ -82,13 +83,16 @@ def test_what_held_commands_take_is_their_work() -> None:
     assert float(lost.total) == pytest.approx(stored[0] - stored[-1], rel=1e-4)
 
 
-@pytest.mark.parametrize("name", ["case_01", "case_03", "case_07", "noise", "saturation"])
+@pytest.mark.parametrize("name", ["case_01", "case_03", "case_05", "case_07", "noise", "saturation"])
 def test_they_are_those_of_an_observed_run(name: str) -> None:
     scene = scenes.load(name)
     run = simulate(scene, grid=np.linspace(0.0, scene.duration, 20001))
-    observed = ensemble(scene, {}, ["settling_time", "energy"], setup=Setup(horizons=60)).columns
+    observed = ensemble(scene, {}, ["settling_time", "settling_times", "energy"], setup=Setup(horizons=60)).columns
     lost, part = Losses(*(total[-1] for total in running_losses(run)[1])), 1e-4 if run.sampled else 1e-9
-    np.testing.assert_array_equal(settling_times(run, horizons=60).max(), observed["settling_time"][0])
+    settled = settling_times(run, horizons=60)
+    np.testing.assert_array_equal(settled.max(), observed["settling_time"][0])
+    for body, name in NAMES.items():
+        np.testing.assert_array_equal(settled[COLUMN[body] // 2], observed[f"settling_time_{name}"][0])
     for cause in ("dampers", "friction", "impacts", *(() if run.sampled else ("feedback",))):
         assert float(getattr(lost, cause)) == pytest.approx(observed[f"lost_{cause}"][0], rel=part, abs=part)
 
