@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -62,12 +61,10 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     """
     if not isinstance(source, (Recording, Trajectory)) and Path(source).is_dir():
         source = bag.read(Path(source))
-    if by_sensors:
-        if not isinstance(source, Recording):
-            raise Refused("measured by sensors: allowed: of a bag")
-        source = replace(source, state=source.measured)
+    if by_sensors and not isinstance(source, Recording):
+        raise Refused("measured by sensors: allowed: of a bag")
     if isinstance(source, Recording):
-        found = _of_recording(source)
+        found = _of_recording(source, by_sensors)
     elif isinstance(source, Trajectory):
         found = _of_trajectory(source, "run")
     elif Path(source).suffix == ".csv":
@@ -80,7 +77,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     return _checked(found if scene is None else found._replace(scene=scene))
 
 
-def _of_recording(recording: Recording) -> Measured:
+def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
     name, tick = str(recording.path), recording.tick
     if recording.starts.tolist() != [0] or (np.diff(tick) != 1).any():
         raise Refused(f"{name}: allowed: a bag of one run from its begin, with all of its ticks")
@@ -88,7 +85,8 @@ def _of_recording(recording: Recording) -> Measured:
     foreign = "numbers were set while it ran" if recording.changes else (
         "commands came by the wall clock" if not recording.running.lockstep else (
             f"another law acted on the {' and the '.join(others)} arm" if others else ""))
-    return Measured(name, recording.scene, recording.t, recording.state, recording.inputs[:-1], True, foreign)
+    state = recording.measured if by_sensors else recording.state
+    return Measured(name, recording.scene, recording.t, state, recording.inputs[:-1], True, foreign)
 
 
 def _of_trajectory(run: Trajectory, name: str) -> Measured:

@@ -208,18 +208,6 @@ class Scene(Frozen):
         return {"title": self.title, "readings": list(self.readings), **watch, **values}
 
 
-def check_scene(scene: object) -> None:
-    """Refuse what is no scene.
-
-    Raises
-    ------
-    Refused
-    """
-    if not isinstance(scene, Scene):
-        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
-        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
-
-
 def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:
     """Read a scene of the package by its name, or a file by its path.
 

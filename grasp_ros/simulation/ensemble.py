@@ -26,10 +26,10 @@ from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
-from grasp_ros.scene.scene import check_scene
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
+from grasp_ros.simulation.simulate import check_scene
 from grasp_ros.simulation.tables import frame_of, write_rows
 from grasp_ros.simulation.variants import Variants, parameter_of
 

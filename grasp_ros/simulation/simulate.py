@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from operator import length_hint
 from types import MappingProxyType
@@ -20,7 +21,6 @@ from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.scene import check_scene
 from grasp_ros.simulation.closed_loop import Changes, Progress, check_changes, foreign_controllers
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.solve import How, solve
@@ -28,6 +28,18 @@ from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
 GRID_POINTS = 2001
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene.
+
+    Raises
+    ------
+    Refused
+    """
+    if not isinstance(scene, Scene):
+        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
+        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
 
 
 def simulate(

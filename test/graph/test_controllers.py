@@ -43,7 +43,7 @@ class Limited:
 def test_a_controller_that_we_did_not_write_is_recorded_and_verified(launch: Any, tmp_path: Path) -> None:
     """The one that the page prints on the left, and on the right one with a frame_id that reads like a number."""
     source = titled(PAGE, "my_controller.py")
-    assert len(source.splitlines()) == 15
+    assert len(source.splitlines()) == 19
     other = source.replace("left", "right").replace("my_controller", "another").replace(
         "    commands.publish", '    command.header.frame_id = "7" if i else "world"\n    commands.publish')
     run = launch(
