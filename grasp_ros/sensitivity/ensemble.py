@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,11 +12,11 @@ from numpy.typing import ArrayLike
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import directions
 from grasp_ros.sensitivity.sensitivities import Sensitivity, sensitivities
+from grasp_ros.simulation.ensemble import chunks, in_threads
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.tables import frame_of
 from grasp_ros.simulation.variants import Variants
@@ -103,12 +101,11 @@ def ensemble_sensitivities(
     shapes = (n, 6), (n, 6, k), (n,), (n, k), (n,)
     state, rates, level, level_rates, corner = (np.full(shape, np.nan) for shape in shapes)
     stops: dict[int, str] = {}
-    with ThreadPoolExecutor(os.cpu_count() if threads is None else whole("threads", threads, 1)) as pool:
-        for i, found in enumerate(pool.map(row, range(n))):
-            if isinstance(found, str):
-                stops[i] = found
-                continue
-            state[i], rates[i] = found.state[-1], found.state_rates[-1]
-            level[i], level_rates[i] = found.V_c[-1], found.V_c_rates[-1]
-            corner[i] = np.inf if found.corner is None else found.corner
+    for (i, _), found in in_threads(lambda span, _: row(span[0]), chunks(n, 1), threads):
+        if isinstance(found, str):
+            stops[i] = found
+            continue
+        state[i], rates[i] = found.state[-1], found.state_rates[-1]
+        level[i], level_rates[i] = found.V_c[-1], found.V_c_rates[-1]
+        corner[i] = np.inf if found.corner is None else found.corner
     return SensitivityTable(scene, tuple(keys), variants.changes, state, rates, level, level_rates, corner, stops)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from grasp_ros.exact.compilation.fma import fma
-from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.contact.series import put
 from grasp_ros.exact.records import Array, Lanes
 
@@ -22,45 +22,35 @@ def padded(columns: int) -> int:
     return WIDTH * ((columns + WIDTH - 1) // WIDTH)
 
 
+@inlined
+def add_products(f: Array, i: np.uint64, factor: float, total: Lanes) -> Lanes:
+    """Add the products of eight entries, from i on, with one factor to a total."""
+    return (
+        fma(f[i], factor, total[0]), fma(f[i + np.uint64(1)], factor, total[1]),
+        fma(f[i + np.uint64(2)], factor, total[2]), fma(f[i + np.uint64(3)], factor, total[3]),
+        fma(f[i + np.uint64(4)], factor, total[4]), fma(f[i + np.uint64(5)], factor, total[5]),
+        fma(f[i + np.uint64(6)], factor, total[6]), fma(f[i + np.uint64(7)], factor, total[7]),
+    )
+
+
 @kernel
 def combine(f: Array, stride: int, column: int, factors: Array, k: int, total: Lanes) -> Lanes:
     """Add coefficient k of the products of eight columns with one series to a total.
 
     Even and odd terms have sums of their own: one alone would wait for each addition before the next.
     """
-    s0, s1, s2, s3, s4, s5, s6, s7 = total
-    r0 = r1 = r2 = r3 = r4 = r5 = r6 = r7 = 0.0
+    even, odd = total, NOTHING
     wide, i, last = np.uint64(stride), np.uint64(column), np.uint64(k)
     for _ in range((k + 1) // 2):
-        even, odd, m = factors[last], factors[last - np.uint64(1)], i + wide
-        s0 = fma(f[i], even, s0)
-        s1 = fma(f[i + np.uint64(1)], even, s1)
-        s2 = fma(f[i + np.uint64(2)], even, s2)
-        s3 = fma(f[i + np.uint64(3)], even, s3)
-        s4 = fma(f[i + np.uint64(4)], even, s4)
-        s5 = fma(f[i + np.uint64(5)], even, s5)
-        s6 = fma(f[i + np.uint64(6)], even, s6)
-        s7 = fma(f[i + np.uint64(7)], even, s7)
-        r0 = fma(f[m], odd, r0)
-        r1 = fma(f[m + np.uint64(1)], odd, r1)
-        r2 = fma(f[m + np.uint64(2)], odd, r2)
-        r3 = fma(f[m + np.uint64(3)], odd, r3)
-        r4 = fma(f[m + np.uint64(4)], odd, r4)
-        r5 = fma(f[m + np.uint64(5)], odd, r5)
-        r6 = fma(f[m + np.uint64(6)], odd, r6)
-        r7 = fma(f[m + np.uint64(7)], odd, r7)
-        i, last = m + wide, last - np.uint64(2)
+        even = add_products(f, i, factors[last], even)
+        odd = add_products(f, i + wide, factors[last - np.uint64(1)], odd)
+        i, last = i + wide + wide, last - np.uint64(2)
     if k % 2 == 0:
-        even = factors[0]
-        s0 = fma(f[i], even, s0)
-        s1 = fma(f[i + np.uint64(1)], even, s1)
-        s2 = fma(f[i + np.uint64(2)], even, s2)
-        s3 = fma(f[i + np.uint64(3)], even, s3)
-        s4 = fma(f[i + np.uint64(4)], even, s4)
-        s5 = fma(f[i + np.uint64(5)], even, s5)
-        s6 = fma(f[i + np.uint64(6)], even, s6)
-        s7 = fma(f[i + np.uint64(7)], even, s7)
-    return s0 + r0, s1 + r1, s2 + r2, s3 + r3, s4 + r4, s5 + r5, s6 + r6, s7 + r7
+        even = add_products(f, i, factors[0], even)
+    return (
+        even[0] + odd[0], even[1] + odd[1], even[2] + odd[2], even[3] + odd[3], even[4] + odd[4], even[5] + odd[5],
+        even[6] + odd[6], even[7] + odd[7],
+    )
 
 
 @kernel

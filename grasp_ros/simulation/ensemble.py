@@ -16,7 +16,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +35,7 @@ from grasp_ros.simulation.variants import Variants, parameter_of
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -170,14 +171,14 @@ def chunks(rows: int, size: int) -> list[tuple[int, int]]:
     return [(first, min(first + size, rows)) for first in range(0, rows, size)]
 
 
-def in_threads(work: Callable[[Span, NDArray[np.int64]], Chunk], spans: Iterable[Span], threads: int | None = None
-               ) -> Generator[tuple[Span, Chunk], None, None]:
+def in_threads(work: Callable[[Span, NDArray[np.int64]], T], spans: Iterable[Span], threads: int | None = None
+               ) -> Generator[tuple[Span, T], None, None]:
     """Do chunks in threads, and hand each over when it is done; no more are begun than threads can soon take up.
 
     The work is handed what it is to look at now and then: not 0 asks it to stop, after a Ctrl-C say.
     """
     workers = whole("threads", threads, 1) if threads is not None else os.cpu_count() or 1
-    waiting: dict[Future[Chunk], Span] = {}
+    waiting: dict[Future[T], Span] = {}
     following, stop = iter(spans), np.zeros(1, dtype=np.int64)
     with ThreadPoolExecutor(workers) as pool:
         try:
