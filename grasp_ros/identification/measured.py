@@ -59,8 +59,11 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     Refused
         If the source cannot be read, holds too little, or holds what is no number.
     """
-    if not isinstance(source, (Recording, Trajectory)) and Path(source).is_dir():
-        source = bag.read(Path(source))
+    if not isinstance(source, (Recording, Trajectory)):
+        path = Path(source)
+        with reading(path):
+            directory = path.is_dir()
+        source = bag.read(path) if directory else path
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")
     if isinstance(source, Recording):

@@ -62,6 +62,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate nowhere", "nowhere: no such scene; allowed: a path that ends in .yaml, or one of case_01"),
         ("simulate nowhere.yaml", "nowhere.yaml: no such file"),
         (f"simulate {LONG}.yaml", "cannot be read: File name too long"),
+        (f"fit {LONG} --free object.mass_kg", "cannot be read: File name too long"),
         ("simulate circle.yaml", "circle.yaml: no such file"),
         ("simulate bytes.yaml", "bytes.yaml: 'utf-8' codec can't decode byte 0xff"),
         ("simulate deep.yaml", "deep.yaml: line 1: nested too deeply"),

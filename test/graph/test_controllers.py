@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import SECOND_DOMAIN
 from flipped import with_a_flipped_bit
+from graphs import recordings_of
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import Trigger
@@ -107,17 +107,7 @@ def test_a_law_with_limits_and_memory_gives_the_same_bits_in_four_processes_in_o
     one = Graph(case, tmp_path / "one", ACCURACY, laws=laws_of_both, one_process=True)
     launch(sys.executable, "-c", FOREIGN, cwd=tmp_path, stderr=subprocess.DEVNULL)
     monkeypatch.chdir(tmp_path)
-    try:
-        four.start()
-        monkeypatch.setenv("ROS_DOMAIN_ID", SECOND_DOMAIN)
-        one.start()
-        four.wait([])
-        one.wait([])
-    finally:
-        four.stop()
-        one.stop()
-    for graph in (four, one):
-        recording = bag.read(graph.bag)
+    for recording in recordings_of(four, one, monkeypatch):
         assert recording.state.tobytes() == simulated.state.tobytes()
         assert recording.command.tobytes() == simulated.command.tobytes()
         assert verify(recording).words == "501 states follow from the recorded inputs, bit for bit"

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from conftest import SECOND_DOMAIN
+from graphs import recordings_of
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.recording import Recording
@@ -87,17 +86,7 @@ def test_laws_that_see_more_give_the_same_bits_everywhere(tmp_path: Path, monkey
     laws = {"left_controller": "seeing_laws:Late", "right_controller": "seeing_laws:Slow"}
     four = Graph(case, tmp_path / "four", ACCURACY, laws=laws)
     one = Graph(case, tmp_path / "one", ACCURACY, laws=laws, one_process=True)
-    try:
-        four.start()
-        monkeypatch.setenv("ROS_DOMAIN_ID", SECOND_DOMAIN)
-        one.start()
-        four.wait([])
-        one.wait([])
-    finally:
-        four.stop()
-        one.stop()
-    for graph in (four, one):
-        recording = bag.read(graph.bag)
+    for recording in recordings_of(four, one, monkeypatch):
         assert recording.state.tobytes() == simulated.state.tobytes()
         assert recording.command.tobytes() == simulated.command.tobytes()
         assert verify(recording).words == "701 states follow from the recorded inputs, bit for bit"

@@ -102,26 +102,27 @@ class Remote(GraspNode):
 
     def get(self, node: str, *names: str) -> str:
         """Parameters of a node; all of them without names."""
-        if not names:
-            listed = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request())
-            names = tuple(sorted(listed.result.names))
-        self._check(node, names)
+        known = self._names(node, names)
+        return self._values(node, names or known)
+
+    def _values(self, node: str, names: Sequence[str]) -> str:
         found = self._ask(GetParameters, f"{node}/get_parameters", GetParameters.Request(names=list(names))).values
         values = [_plain(parameter_value_to_python(value)) for value in found]
         return "\n".join(f"{name}: {json.dumps(value)}" for name, value in zip(names, values, strict=False))
 
     def put(self, node: str, name: str, value: str) -> str:
         """Set a parameter of a node."""
-        self._check(node, [name])
+        self._names(node, [name])
         self._set(node, Parameter(name, value=strict_yaml.load(value)))
-        return self.get(node, name)
+        return self._values(node, [name])
 
-    def _check(self, node: str, names: Sequence[str]) -> None:
-        """Refuse names that a node does not have."""
-        known = self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names
-        for name in names:
+    def _names(self, node: str, wanted: Sequence[str]) -> list[str]:
+        """All parameters of a node; refuses what is wanted and not among them."""
+        known = sorted(self._ask(ListParameters, f"{node}/list_parameters", ListParameters.Request()).result.names)
+        for name in wanted:
             if name not in known:
-                raise Refused(f"{name}: {node} has no such parameter; {allowed(name, sorted(known))}")
+                raise Refused(f"{name}: {node} has no such parameter; {allowed(name, known)}")
+        return known
 
     def _set(self, node: str, parameter: Parameter) -> None:
         request = SetParameters.Request(parameters=[parameter.to_parameter_msg()])
