@@ -57,7 +57,7 @@ def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort:
         record = attempt(contender, scene, setting, truth, effort)
         records.append(record)
         spent[contender] = spent.get(contender, 0.0) + time.monotonic() - started
-        if record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience:
+        if _given_up(record, effort):
             del climbing[contender]
         if progress is not None:
             progress(min(time.monotonic() - begin, seconds))
@@ -70,11 +70,15 @@ def unfinished(records: Iterable[Record], contenders: Sequence[Contender], effor
 
     def left(contender: Contender) -> bool:
         group = groups.get(contender.name, [])
-        given_up = group and (group[-1].status == NOT_INSTALLED
-                              or (group[-1].least or group[-1].first) > effort.patience)
-        return not given_up and len(group) < len(contender.ladder[:: effort.stride])
+        more = len(group) < len(contender.ladder[:: effort.stride])
+        return more and not (group and _given_up(group[-1], effort))
 
     return [contender.name for contender in contenders if left(contender)]
+
+
+def _given_up(record: Record, effort: Effort) -> bool:
+    """Whether a solver climbs no further."""
+    return record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience
 
 
 def _in_order(records: list[Record], contenders: Sequence[Contender]) -> list[Record]:
@@ -94,13 +98,13 @@ def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
 def fastest(records: Iterable[Record], error: float) -> Record | None:
     """The sound record that reaches an error in the least time."""
     reached = [record for record in records if record.sound and record.error is not None and record.error <= error]
-    return min(reached, key=lambda record: record.time, default=None)
+    return min(reached, key=_time, default=None)
 
 
 def within(records: Iterable[Record], budget: float) -> Record | None:
     """The sound record with the least error of those that take no longer than a budget in s."""
     affordable = [record for record in records if record.sound and record.time <= budget]
-    return min(affordable, key=lambda record: (record.error or 0.0, record.time), default=None)
+    return min(affordable, key=_error_then_time, default=None)
 
 
 def advise(records: Iterable[Record], error: float | None = None, budget: float | None = None) -> Advice:
@@ -127,17 +131,24 @@ def advise(records: Iterable[Record], error: float | None = None, budget: float 
         raise Refused("no method has a result on this scene")
     sound = [record for group in groups.values() for record in group]
     if error is not None:
-        found = (fastest(group, error) for group in groups.values())
-        best = sorted((record for record in found if record), key=lambda r: r.time)
-        return Advice(*_split(best), min(sound, key=lambda r: r.error or 0.0))
-    found = (within(group, budget or 0.0) for group in groups.values())
-    best = sorted((record for record in found if record), key=lambda r: (r.error or 0.0, r.time))
-    return Advice(*_split(best), min(sound, key=lambda r: r.time))
+        found, closest = [fastest(group, error) for group in groups.values()], min(sound, key=_error)
+        best = sorted(filter(None, found), key=_time)
+    else:
+        found, closest = [within(group, budget or 0.0) for group in groups.values()], min(sound, key=_time)
+        best = sorted(filter(None, found), key=_error_then_time)
+    return Advice(best[0] if best else None, best[1 : 1 + OTHERS], closest)
 
 
-def _split(best: Sequence[Record]) -> tuple[Record | None, list[Record]]:
-    """The choice and what comes after it."""
-    return (best[0] if best else None), list(best[1 : 1 + OTHERS])
+def _time(record: Record) -> float:
+    return record.time
+
+
+def _error(record: Record) -> float:
+    return record.error or 0.0
+
+
+def _error_then_time(record: Record) -> tuple[float, float]:
+    return _error(record), record.time
 
 
 def check_wish(error: float | None, budget: float | None) -> None:

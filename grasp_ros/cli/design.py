@@ -60,7 +60,7 @@ def _design(options: argparse.Namespace) -> int:
 
     scene = load_scene(options.scene, options.settings)
     setup = Setup(accuracy=options.accuracy, sampled=options.sampled)
-    problem = Problem(scene, [read_axis("--free", text) for text in options.free], options.minimise,
+    problem = Problem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
                       [read_bound(text) for text in options.bounds], setup)
     for path in (options.output, options.figure):
         if path is not None:
@@ -91,7 +91,7 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     """A column for each free number and outcome, a row for each choice; of one choice a line for each of them."""
     units = problem.units
     if len(found) == 1:
-        ends = {key: axis for axis in problem.axes for key in axis.keys if _at_an_end(axis, found[0].numbers[key])}
+        ends = {key for axis in problem.axes for key in axis.keys if _at_an_end(axis, found[0].numbers[key])}
         rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in found[0].numbers.items()),
                 *((name, f"{value:.10g} {units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]

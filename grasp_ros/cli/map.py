@@ -66,10 +66,7 @@ def _run(options: argparse.Namespace) -> int:
 
     scene = load_scene(options.scene, options.settings)
     given = [("--y", options.y), ("--x", options.x), *(("--vary", text) for text in options.vary)]
-    axes = tuple(read_axis(option, text) for option, text in given if text is not None)
-    for option, text in given:
-        if options.sample and text is not None and text.split(":")[2:3] not in ([], [""]):
-            raise Refused(f"{option} {text}: a sample has no grid; allowed: low:high, and ::log behind it")
+    axes = tuple(read_axis(option, text, grid=not options.sample) for option, text in given if text is not None)
     if options.vary and not options.sample:
         raise Refused("--vary: allowed: with --sample N; a map has --x and --y")
     outcomes = tuple(options.outcome) or Setup().outcomes

@@ -51,8 +51,8 @@ class Axis(NamedTuple):
         return self.at(np.arange(self.points) / (self.points - 1))
 
 
-def read_axis(option: str, text: str) -> Axis:
-    """An axis from "section.key[+section.key]=low:high[:n[:log]]".
+def read_axis(option: str, text: str, grid: bool = True) -> Axis:
+    """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid.
 
     Raises
     ------
@@ -67,6 +67,8 @@ def read_axis(option: str, text: str) -> Axis:
     if match is None:
         raise Refused(f"{option} {text}: not understood; {allowed}")
     name, low, high, points, log = match.groups()
+    if points and not grid:
+        raise Refused(f"{option} {text}: there is no grid of {points} values; allowed: low:high, and ::log behind it")
     try:
         axis = Axis(name, float(low), float(high), int(points or POINTS), log == LOG)
     except ValueError:
