@@ -164,8 +164,10 @@ def test_a_live_picture_is_one_state_and_no_writer_waits_for_it(
         level = re.findall(r"V_c +(\S+) J", picture)[0]
         assert {round(float(word), 4) for word in (*left, level)} == {round(0.1 * time_s, 4)}
     for topic in ("joint_states", "lyapunov", "left/effort_command", "contact/right"):
-        [reader] = peer.get_subscriptions_info_by_topic(topic)
-        assert reader.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+        readers = peer.get_subscriptions_info_by_topic(topic)
+        assert [one.qos_profile.reliability for one in readers if one.node_name == "watch"] == [
+            ReliabilityPolicy.BEST_EFFORT
+        ], [(one.node_namespace, one.node_name) for one in readers]
 
 
 def test_watch_without_a_plant_says_where_it_has_looked(launch: Any) -> None:
