@@ -27,10 +27,10 @@ COMMANDS: dict[str, Entry] = {
     "run": Entry("graph", _GRAPH, "run a scene in four ROS 2 processes and record a bag"),
     "watch": Entry("graph", _GRAPH, "watch a running graph, or a bag, in the terminal"),
     "ctl": Entry("graph", _GRAPH, "steer a running graph, ask it, set its numbers; or a shell that does"),
-    "inspect": Entry("graph", _GRAPH, "print what is in a bag"),
-    "verify": Entry("graph", _GRAPH, "simulate a bag again with its recorded inputs, compare every bit"),
+    "inspect": Entry("bags", _GRAPH, "print what is in a bag, or write it as a table"),
+    "verify": Entry("bags", _GRAPH, "simulate a bag again with its recorded inputs, compare every bit"),
     "replay": Entry("graph", _GRAPH, "publish a bag again, with its clock"),
-    "recover": Entry("graph", _GRAPH, "make a new bag of one that was cut off or damaged"),
+    "recover": Entry("bags", _GRAPH, "make a new bag of one that was cut off or damaged"),
 }
 
 

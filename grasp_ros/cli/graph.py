@@ -1,39 +1,26 @@
-"""`grasp run` and `inspect`: the graph, and what it has recorded."""
+"""`grasp run`, `replay`, `watch` and `ctl`: the graph, and a bag in its place."""
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import os
 import signal
 import sys
 import time
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from grasp_ros.cli.arguments import (
-    add_accuracy,
-    add_command,
-    add_json,
-    add_output,
-    add_scene,
-    load_scene,
-    prepare,
-    warn,
-)
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene, load_scene, prepare
+from grasp_ros.cli.bags import add_limits, keeps
 from grasp_ros.cli.controllers import sides_of
-from grasp_ros.cli.output import show
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check_reach, network
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
 from grasp_ros.physics.errors import Refused
-
-if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
-    from grasp_ros.graph.recording import Recording
 
 
 def add_to(commands: Any) -> None:
@@ -67,16 +54,8 @@ def add_to(commands: Any) -> None:
     )
     sub.add_argument("--no-check", action="store_true", help="do not simulate the run again to compare every bit")
     sub.add_argument("--no-figure", action="store_true", help="draw no figure")
-    _add_limits(sub)
+    add_limits(sub)
     _add_network(sub)
-    sub = add_command(commands, "recover", _recover)
-    sub.add_argument("bag", type=Path)
-    add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
-    sub = add_command(commands, "inspect", _inspect)
-    sub.add_argument("bag", type=Path)
-    add_json(sub)
-    sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
-    _add_limits(sub)
     sub = add_command(commands, "replay", _replay)
     sub.add_argument("bag", type=Path)
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
@@ -92,30 +71,6 @@ def add_to(commands: Any) -> None:
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N]; none: a shell that stays connected")
     sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
     _add_network(sub)
-    sub = add_command(commands, "verify", _verify)
-    sub.add_argument("bag", type=Path)
-    add_json(sub)
-
-
-def _add_limits(sub: argparse.ArgumentParser) -> None:
-    """What a free run has to keep."""
-    sub.add_argument("--max-age", type=float, metavar="N", help="of a free run: exit status 1 if a command was older,"
-                     " in control periods")
-    sub.add_argument("--min-factor", type=float, metavar="F", help="of a free run: exit status 1 if it was slower,"
-                     " simulated seconds in a second")
-
-
-def _keeps(recording: Recording, options: argparse.Namespace) -> bool:
-    """Whether a run kept the limits that were stated; says which it did not keep."""
-    broken = []
-    oldest = max((most for _, most in recording.ages.values()), default=math.nan)
-    if options.max_age is not None and not oldest <= options.max_age:
-        broken.append(f"--max-age {options.max_age:g}: the oldest command was {oldest:g} periods old")
-    if options.min_factor is not None and not recording.reached >= options.min_factor:
-        broken.append(f"--min-factor {options.min_factor:g}: {recording.reached:.3g} s in a second was reached")
-    for words in broken:
-        print(f"grasp: {words}", file=sys.stderr)
-    return not broken
 
 
 def _add_network(sub: argparse.ArgumentParser) -> None:
@@ -206,7 +161,7 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     from grasp_ros.graph.summary import summary
 
     recording = bag.read(graph.bag)
-    rows, whole = report.describe_recording(recording, summary(recording)), _keeps(recording, options)
+    rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
     spent.note("reading")
     if not stopped:
         whole = whole and not recording.alarms and not any(recording.missing.values())
@@ -223,36 +178,6 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
         spent.note("figure")
     print(report.table([*rows, ("wall time", spent.words)]))
     return 0 if whole else 1
-
-
-def _recover(options: argparse.Namespace) -> int:
-    from grasp_ros.graph.recover import recover
-
-    new = options.output or options.bag.parent / f"{options.bag.stem}_recovered"
-    found = recover(options.bag, new)
-    for offset, size, why in found.left_out:
-        print(f"left out: {size} bytes from byte {offset} on: {why}")
-    print(f"{found.ticks} ticks written to {new}")
-    return 0
-
-
-def _inspect(options: argparse.Namespace) -> int:
-    from grasp_ros.cli import report
-    from grasp_ros.graph import bag
-    from grasp_ros.graph.comparison import compare_recording
-    from grasp_ros.graph.summary import summary, verified
-
-    recording = bag.read(options.bag)
-    warn(recording.scene)
-    found = summary(recording)
-    rows, equal = report.describe_recording(recording, found), True
-    if options.replay:
-        prepare()
-        comparison = compare_recording(recording)
-        rows, equal = rows + comparison.rows, comparison.equal
-        found["replay"] = {"equal": equal, **verified(comparison.verification, comparison.answers)}
-    show(options, report.table(rows), found)
-    return 0 if equal and _keeps(recording, options) else 1
 
 
 def _replay(options: argparse.Namespace) -> int:
@@ -279,21 +204,3 @@ def _watch(options: argparse.Namespace) -> int:
 def _ctl(options: argparse.Namespace) -> int:
     _reach(options)
     become("remote", {"words": json.dumps(json.dumps(options.words))}, options.namespace)
-
-
-def _verify(options: argparse.Namespace) -> int:
-    from grasp_ros.cli import report
-    from grasp_ros.graph import bag
-    from grasp_ros.graph.summary import verified
-    from grasp_ros.graph.verify import answers_of, verify
-
-    recording = bag.read(options.bag)
-    prepare()
-    found, answers = verify(recording), answers_of(recording)
-    laws = [(f"{side} controller", str(law)) for side, law in answers.items()]
-    rows = [("bag", str(recording.path)), ("run", recording.running.words),
-            ("recorded", f"{recording.t[-1]:g} s of {recording.scene.duration:g} s; end: {recording.lost['end']}"),
-            *laws, ("verified", found.words)]
-    show(options, report.table(rows), {"bag": str(recording.path), "lockstep": recording.running.lockstep,
-                                       **verified(found, answers)})
-    return 0 if found.holds else 1

@@ -27,6 +27,7 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
+from grasp_ros.simulation.tables import Motion
 
 Span = tuple[float, float] | None
 
@@ -41,6 +42,8 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--step", type=float, metavar="S", help="scenes: step or tolerance of the method")
     sub.add_argument("--sensitivity", action="append", default=[], metavar="KEY",
                      help="one scene: below it derivatives of the positions by its number section.key; repeatable")
+    sub.add_argument("--panel", dest="panels", action="append", choices=plots.PANELS, metavar="P",
+                     help=f"what is drawn, in this order; repeatable: {', '.join(plots.PANELS)} (default: all)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
@@ -79,8 +82,10 @@ def _plot(options: argparse.Namespace) -> int:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")
         return 0
-    more = _sensitivity(motions[0], options) if options.sensitivity else ()
-    figure = plots.compose(motions, captions, width_mm=options.width, span=span, more=more)
+    panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
+    if options.sensitivity:
+        panels += _sensitivity(motions[0], options)
+    figure = plots.compose(motions, captions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
 
@@ -95,7 +100,7 @@ def _span(options: argparse.Namespace) -> Span:
     return first, last
 
 
-def _motion(source: str, options: argparse.Namespace, span: Span) -> tuple[plots.Motion, bool]:
+def _motion(source: str, options: argparse.Namespace, span: Span) -> tuple[Motion, bool]:
     """A motion, and whether its commands were held."""
     from grasp_ros.graph import bag
 
@@ -129,7 +134,7 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
     return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step)
 
 
-def _sensitivity(motion: plots.Motion, options: argparse.Namespace) -> Sequence[plots.Panel]:
+def _sensitivity(motion: Motion, options: argparse.Namespace) -> Sequence[plots.Panel]:
     """Derivatives of a scene's motion at the times that are drawn."""
     from grasp_ros.cli.sensitivity import panels
     from grasp_ros.sensitivity.sensitivities import sensitivities

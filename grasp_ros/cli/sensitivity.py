@@ -14,6 +14,7 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.sensitivity.sensitivities import Sensitivity
 from grasp_ros.simulation import plots
 from grasp_ros.simulation.canvas import Axes
+from grasp_ros.simulation.tables import Motion
 
 LAST = 4  # events that are shown
 COLORS = {Body.LEFT: plots.LEFT_COLOR, Body.OBJECT: plots.OBJECT_COLOR, Body.RIGHT: plots.RIGHT_COLOR}
@@ -45,10 +46,10 @@ def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
 
 def panels(found: Sensitivity) -> list[plots.Panel]:
     """A panel for each number: derivatives of the positions by it, over time."""
-    return [(partial(_draw, found, place), "derivative, m") for place in range(len(found.keys))]
+    return [plots.Panel(partial(_draw, found, place), "derivative, m", 2) for place in range(len(found.keys))]
 
 
-def _draw(found: Sensitivity, place: int, axes: Axes, _: plots.Motion) -> None:
+def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
     rates = found.state_rates[:, ::2, place]
     sizes = np.abs(rates[rates != 0.0])
     if len(sizes) and sizes.max() > WIDE * np.median(sizes):

@@ -29,7 +29,6 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import GRID_POINTS, Trajectory, simulate
-from grasp_ros.simulation.tables import write_csv
 
 TABLE = (".csv",)  # endings of files that are tables; any other is a .npz file
 
@@ -113,7 +112,7 @@ def _write(trajectory: Trajectory, path: Path) -> None:
     """As a table, or with all that belongs to it."""
     with destination(path) as file:
         if path == STDOUT or path.suffix in TABLE:
-            write_csv(trajectory, file)
+            trajectory.to_csv(file)
         else:
             trajectory.save(file)
 

@@ -7,23 +7,28 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.running import Running
+from grasp_ros.physics.control import Law
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.effects.force import SECTIONS
-from grasp_ros.scene.topics import EXTERNAL_FORCES, LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CONTACTS, EXTERNAL_FORCES, LYAPUNOV_NAMES
+from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.simulation.tables import Tabular
 
 
 @dataclass(frozen=True)
-class Recording(Frozen):
+class Recording(Tabular, Frozen):
     """What is in a bag.
 
     Attributes
@@ -131,6 +136,38 @@ class Recording(Frozen):
         return measured
 
     @property
+    def impacts(self) -> Array:
+        """Impact forces (n, 2) in N; 0 where there is no contact, NaN where missing."""
+        none = np.zeros(len(self.tick))
+        return np.stack([self.outputs.get(CONTACTS[side].name, none) for side in SIDES], axis=1)
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """Which bag it is, and how the plant ran."""
+        return {"bag": str(self.path), "run": self.running.words, "end": self.lost["end"]}
+
+    def simulated(self) -> Trajectory:
+        """The motion without ROS, under the forces that the bag has: with events, contacts, sections, any time between.
+
+        Its states are those of the bag, bit for bit, if `verify` holds. Commands are here the forces that acted.
+
+        Raises
+        ------
+        Refused
+            If a tick is missing, or the plant was reset.
+        """
+        if self.tick.tolist() != list(range(len(self.tick))) or len(self.starts) != 1:
+            raise Refused(f"{self.path}: allowed: a bag with every tick from the begin, and without a reset")
+        if len(self.tick) < 2 or not np.isfinite(self.effort[1:]).all():
+            raise Refused(f"{self.path}: allowed: two ticks or more, and the forces that acted at each")
+        numbers = {"time.duration_s": float(self.t[-1])}
+        if self.scene.system.delay:
+            numbers["loop.delay_ticks"] = 0  # the forces have been delayed
+        acted = {side: _acted(self.effort[:, body]) for side, body in SIDES.items() if body in self.scene.system.laws}
+        return simulate(self.scene.changed(numbers), sampled=True, controllers=acted,
+                        accuracy=self.running.accuracy)
+
+    @property
     def size(self) -> int:
         """Bytes of the bag on the disk."""
         files = self.path.iterdir() if self.path.is_dir() else [self.path]
@@ -145,12 +182,12 @@ class Recording(Frozen):
     @property
     def reached(self) -> float:
         """Simulated seconds in a second that a free run has reached, without pauses; NaN if it has not said it."""
-        return float(self.timing["reached"][-1]) if self.timing else math.nan
+        return float(self.timing["reached"][-1]) if "reached" in self.timing else math.nan
 
     @property
     def overruns(self) -> int:
         """Periods of a free run that were computed later than a whole period."""
-        return int(self.timing["overruns"][-1]) if self.timing else 0
+        return int(self.timing["overruns"][-1]) if "overruns" in self.timing else 0
 
     @property
     def ages(self) -> dict[str, tuple[float, float]]:
@@ -194,3 +231,13 @@ class Recording(Frozen):
         held = () if self.running.lockstep else self.scene.controllers.values()
         every_tick = [topic.name for topic in self.scene.topics if topic not in held]
         return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard}
+
+
+def _acted(effort: Array) -> Law:
+    """A law that answers each tick with the force that acted from it on, which the next tick names."""
+    forces: list[float] = [*effort[1:].tolist(), 0.0]
+
+    def recorded(tick: int, t: float, x: float, v: float) -> float:
+        return forces[tick]
+
+    return recorded

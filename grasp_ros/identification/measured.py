@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from grasp_ros.simulation.trajectory_file import load
 CHANNELS = tuple(HEADS[column.name] for column in COLUMNS[:6])  # names of the states, in their order
 INPUTS = tuple(HEADS[f"input_{NAMES[body]}"] for body in sorted(BODIES))  # by body
 FEWEST = 10  # samples
-Source = str | os.PathLike[str] | Recording | Trajectory
+Source: TypeAlias = str | os.PathLike[str] | Recording | Trajectory
 
 
 class Measured(NamedTuple):

@@ -18,7 +18,8 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.files import replaced
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
-from grasp_ros.simulation.plots import LEFT_COLOR, MM, OBJECT_COLOR, RIGHT_COLOR, Motion
+from grasp_ros.simulation.plots import LEFT_COLOR, MM, OBJECT_COLOR, RIGHT_COLOR
+from grasp_ros.simulation.tables import Motion
 
 COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_COLOR}
 FRONTS: dict[int, float] = {LEFT: 1.5, OBJECT: 0.5, RIGHT: -0.5}  # lengths from the begin of a body to its position

@@ -6,19 +6,20 @@ import os
 import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.energy import PLANT_ALONE, Energy, pairs_of
+from grasp_ros.physics.energy import PLANT_ALONE, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, Mode, impact_force
-from grasp_ros.scene import PAPER, Scene
+from grasp_ros.scene import PAPER
 from grasp_ros.scene.files import replacing
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.quantities import contact_intervals
+from grasp_ros.simulation.tables import Motion
 from grasp_ros.simulation.trajectory import Trajectory
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
@@ -30,40 +31,17 @@ PAPER_INPUT = (-10.0, 10.0)  # N
 WIDTH_MM = 230.0  # of a figure with one motion
 NARROWEST_MM, WIDEST_MM = 60.0, 1000.0
 MM = 25.4
-SHARES, MORE_SHARE = (3, 2, 2, 3), 2  # heights of the panels
+SHARE, LEAST_SHARE = 10, 4  # of all panels together, and of the lowest figure
 ONE_COLUMN_MM = 130.0  # narrower motions get smaller letters
 LETTERS, SMALL_LETTERS = 9.0, 6.5  # pt
 
 
-class Motion(Protocol):
-    """What can be drawn: a trajectory or a recording."""
+class Panel(NamedTuple):
+    """One row of a figure."""
 
-    @property
-    def scene(self) -> Scene:
-        """The scene."""
-
-    @property
-    def t(self) -> Array:
-        """Times (n,) in s."""
-
-    @property
-    def state(self) -> Array:
-        """States (n, 6) in m and m/s."""
-
-    @property
-    def command(self) -> Array:
-        """Input forces (n, 2) in N."""
-
-    @property
-    def energy_of(self) -> str:
-        """Whose energy that is."""
-
-    @property
-    def energy(self) -> Energy:
-        """V, V_c, V' and the contact mode."""
-
-
-Panel = tuple[Callable[[Axes, Motion], None], str]
+    draw: Callable[[Axes, Motion], None]
+    label: str  # of the axis
+    share: int  # of the height
 
 
 def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = None) -> None:
@@ -103,7 +81,7 @@ def draw_several(
 
 def compose(
     motions: Sequence[Motion], captions: Sequence[str], *, width_mm: float | None = None,
-    span: tuple[float, float] | None = None, more: Sequence[Panel] = (),
+    span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
     """A figure of motions side by side, with common axes.
 
@@ -116,8 +94,8 @@ def compose(
         Of the page; default: 230 mm, and 150 mm for each of several motions.
     span : tuple of float, optional
         First and last time in s; default: the whole motions.
-    more : sequence of (callable, str), optional
-        Panels below the usual ones: what draws a motion into axes, and the label of these.
+    panels : sequence of Panel, optional
+        From top to bottom; default: all of PANELS.
 
     Raises
     ------
@@ -130,8 +108,9 @@ def compose(
     if width_mm is not None and not NARROWEST_MM <= width_mm <= WIDEST_MM:
         raise Refused(f"--width {width_mm!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
-    panels, shares = (*PANELS, *more), (*SHARES, *(MORE_SHARE for _ in more))
-    height = (0.6 if small else 0.9) * WIDTH_MM * sum(shares) / sum(SHARES)
+    panels = [*PANELS.values()] if panels is None else panels
+    shares = [panel.share for panel in panels]
+    height = (0.6 if small else 0.9) * WIDTH_MM * max(sum(shares), LEAST_SHARE) / SHARE
     with canvas.style({"font.size": SMALL_LETTERS if small else LETTERS}):
         figure, grid = canvas.subplots(
             len(panels), len(motions), sharex="col", sharey="row", squeeze=False, height_ratios=shares,
@@ -140,13 +119,13 @@ def compose(
         for column, (motion, caption) in enumerate(zip(motions, captions, strict=True)):
             title = _title(motion, caption, width / len(motions), small)
             grid[0, column].set_title(title, fontsize="medium", parse_math=False)  # a $ of a title is a $
-            for (draw_panel, label), axes in zip(panels, grid[:, column], strict=True):
-                draw_panel(axes, motion)
+            for panel, axes in zip(panels, grid[:, column], strict=True):
+                panel.draw(axes, motion)
                 shade_contacts(axes, motion)
                 axes.grid(alpha=0.3)
                 axes.set_xlim(*(span or (motion.t[0], motion.t[-1])))
                 if column == 0:
-                    axes.set_ylabel(label)
+                    axes.set_ylabel(panel.label)
             grid[-1, column].set_xlabel("time, s")
         for row in grid:
             legend_beside(row[-1])
@@ -289,7 +268,7 @@ def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:
     axes.set_ylim(min(before[0], 1.05 * values.min()), max(before[1], 1.05 * values.max()))
 
 
-PANELS: tuple[Panel, ...] = (
-    (displacements, "displacement, m"), (inputs, "input, N"), (impacts, "impact force, N"),
-    (energies, "twice the energy, J"),
-)
+PANELS = {
+    "displacement": Panel(displacements, "displacement, m", 3), "input": Panel(inputs, "input, N", 2),
+    "impact": Panel(impacts, "impact force, N", 2), "energy": Panel(energies, "twice the energy, J", 3),
+}

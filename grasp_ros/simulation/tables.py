@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,13 +13,54 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.files import opened
 from grasp_ros.scene.parameter import UNITS as KEYS
 
-if TYPE_CHECKING:  # it imports this file
-    from grasp_ros.simulation.trajectory import Trajectory
+if TYPE_CHECKING:
+    from grasp_ros.scene import Scene
 
 TIME = ("t", "s", "time")
 _ENDINGS = {unit: ending for ending, unit in reversed(KEYS.items())} | {"J": "_J", "W": "_W", "1": ""}
+
+
+class Motion(Protocol):
+    """What is a table: a trajectory or a recording."""
+
+    @property
+    def scene(self) -> Scene:
+        """The scene."""
+
+    @property
+    def t(self) -> Array:
+        """Times (n,) in s."""
+
+    @property
+    def state(self) -> Array:
+        """States (n, 6) in m and m/s."""
+
+    @property
+    def command(self) -> Array:
+        """Commands (n, 2) in N."""
+
+    @property
+    def inputs(self) -> Array:
+        """Forces (n, 3) in N that act on the bodies from then on."""
+
+    @property
+    def impacts(self) -> Array:
+        """Impact forces (n, 2) in N."""
+
+    @property
+    def energy(self) -> Energy:
+        """V, V_c, V' and the contact mode."""
+
+    @property
+    def energy_of(self) -> str:
+        """Whose energy that is."""
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """Where the motion comes from, by name."""
 
 
 class Column(NamedTuple):
@@ -27,14 +69,14 @@ class Column(NamedTuple):
     name: str
     unit: str
     text: str
-    read: Callable[[Trajectory, Energy], Array]
+    read: Callable[[Motion, Energy], Array]
 
 
-def _place(name: str, place: int) -> Callable[[Trajectory, Energy], Array]:
+def _place(name: str, place: int) -> Callable[[Motion, Energy], Array]:
     return lambda motion, _: np.asarray(getattr(motion, name))[:, place]
 
 
-def _level(name: str) -> Callable[[Trajectory, Energy], Array]:
+def _level(name: str) -> Callable[[Motion, Energy], Array]:
     return lambda _, level: np.asarray(getattr(level, name))
 
 
@@ -60,46 +102,67 @@ HEADS = {  # of a text file, by the names of the columns
 }
 
 
-def values_of(motion: Trajectory) -> dict[str, Array]:
+class Tabular:
+    """Base of motions that can be taken as tables."""
+
+    def dataset(self: Motion) -> Any:
+        """An `xarray.Dataset` over `t`: states, forces, energies, with names and units as attributes.
+
+        Raises
+        ------
+        Refused
+            If xarray is not installed.
+        """
+        try:
+            import xarray
+        except ModuleNotFoundError as error:
+            raise Refused(f"dataset() needs {error.name}; pip install '.[data]' in the checkout") from None
+        name, unit, text = TIME
+        values = _values_of(self)
+        return xarray.Dataset(
+            {column.name: (name, values[column.name], {"units": column.unit, "long_name": column.text})
+             for column in COLUMNS},
+            {name: (name, self.t, {"units": unit, "long_name": text})}, _attributes_of(self),
+        )
+
+    def dataframe(self: Motion) -> Any:
+        """The same as a `pandas.DataFrame`; units by column in its `attrs["units"]`.
+
+        Raises
+        ------
+        Refused
+            If pandas is not installed.
+        """
+        frame = frame_of({TIME[0]: self.t, **_values_of(self)}).set_index(TIME[0])
+        units = {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}
+        frame.attrs = {**_attributes_of(self), "units": units}
+        return frame
+
+    def to_csv(self: Motion, path: str | os.PathLike[str] | BinaryIO) -> None:
+        """The same as a text file, by its path or open: a row for each time; units in the names of the columns.
+
+        Numbers have all their digits.
+
+        Raises
+        ------
+        Refused
+            If the file cannot be written.
+        """
+        with opened(path) as file:
+            write_rows(file, [*HEADS.values()], [self.t, *_values_of(self).values()])
+
+
+def _values_of(motion: Motion) -> dict[str, Array]:
     """Values (n,) of each column."""
     level = motion.energy
     return {column.name: column.read(motion, level) for column in COLUMNS}
 
 
-def attributes_of(motion: Trajectory) -> dict[str, Any]:
+def _attributes_of(motion: Motion) -> dict[str, Any]:
     """What the table is of."""
-    return {
-        "title": motion.scene.title, "scene": motion.scene.name, "scene_yaml": motion.scene.to_yaml(),
-        "method": motion.method, "setting": motion.setting, "status": motion.status.name, "energy_of": motion.energy_of,
-    }
-
-
-def dataset_of(motion: Trajectory) -> Any:
-    """See `trajectory.Trajectory.dataset`."""
-    try:
-        import xarray
-    except ModuleNotFoundError as error:
-        raise Refused(f"dataset() needs {error.name}; pip install '.[data]' in the checkout") from None
-    name, unit, text = TIME
-    values = values_of(motion)
-    return xarray.Dataset(
-        {column.name: (name, values[column.name], {"units": column.unit, "long_name": column.text})
-         for column in COLUMNS},
-        {name: (name, motion.t, {"units": unit, "long_name": text})}, attributes_of(motion),
-    )
-
-
-def dataframe_of(motion: Trajectory) -> Any:
-    """See `trajectory.Trajectory.dataframe`."""
-    frame = frame_of({TIME[0]: motion.t, **values_of(motion)}).set_index(TIME[0])
-    units = {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}
-    frame.attrs = {**attributes_of(motion), "units": units}
-    return frame
-
-
-def write_csv(motion: Trajectory, file: BinaryIO) -> None:
-    """See `trajectory.Trajectory.to_csv`; numbers have all their digits."""
-    write_rows(file, [*HEADS.values()], [motion.t, *values_of(motion).values()])
+    scene = motion.scene
+    return {"title": scene.title, "scene": scene.name, "scene_yaml": scene.to_yaml(), "energy_of": motion.energy_of,
+            **motion.origin}
 
 
 def frame_of(columns: Mapping[str, np.ndarray]) -> Any:

@@ -28,12 +28,12 @@ from grasp_ros.simulation.contacts import contact_table, side_of
 from grasp_ros.simulation.html import html_of_run
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
-from grasp_ros.simulation.tables import dataframe_of, dataset_of, write_csv
+from grasp_ros.simulation.tables import Tabular
 from grasp_ros.simulation.ticks import Loop, tick_of
 
 
 @dataclass(frozen=True)
-class Trajectory(Frozen):
+class Trajectory(Tabular, Frozen):
     """A simulated or recorded motion.
 
     Attributes
@@ -129,6 +129,11 @@ class Trajectory(Frozen):
         return PLANT_ALONE if self.controllers else PLANT_AND_FEEDBACK
 
     @property
+    def origin(self) -> dict[str, Any]:
+        """How the motion was integrated, and what became of it."""
+        return {"method": self.method, "setting": self.setting, "status": self.status.name}
+
+    @property
     def parts(self) -> Parts:
         """V by parts at the output times: V_l, V_o, V_r of (29), and the contacts."""
         return parts(self.scene.system, self.state, feedback=not self.controllers)
@@ -211,37 +216,6 @@ class Trajectory(Frozen):
             If the function or the direction is none, or the run cannot be repeated, see `at`.
         """
         return crossings(as_function(function, level), direction, breaks_of(self), self.at)
-
-    def dataset(self) -> Any:
-        """An `xarray.Dataset` over `t`: states, forces, energies, with names and units as attributes.
-
-        Raises
-        ------
-        Refused
-            If xarray is not installed.
-        """
-        return dataset_of(self)
-
-    def dataframe(self) -> Any:
-        """The same as a `pandas.DataFrame`; units by column in its `attrs["units"]`.
-
-        Raises
-        ------
-        Refused
-            If pandas is not installed.
-        """
-        return dataframe_of(self)
-
-    def to_csv(self, path: str | os.PathLike[str] | BinaryIO) -> None:
-        """The same as a text file, by its path or open: a row for each output time; units in the names of the columns.
-
-        Raises
-        ------
-        Refused
-            If the file cannot be written.
-        """
-        with opened(path) as file:
-            write_csv(self, file)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

@@ -101,7 +101,7 @@ def large(each: Pictured) -> Drawing:
         halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
         wide, narrow = halves
         left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
-        for axes, (draw, label) in zip(left, plots.PANELS, strict=False):
+        for axes, (draw, label, _) in zip(left, plots.PANELS.values(), strict=False):
             if each.beside is not None:
                 _behind(axes, draw, each.beside)
             draw(axes, each.run)

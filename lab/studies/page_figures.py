@@ -11,7 +11,8 @@ from matplotlib.patches import Patch
 
 from grasp_ros.physics.model import penetration
 from grasp_ros.simulation import canvas
-from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, Motion, save
+from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, save
+from grasp_ros.simulation.tables import Motion
 
 KEPT, BROKEN, NONE = "kept", "broken", "no result"
 OUTCOMES = {KEPT: (LEFT_COLOR, "", "white"), BROKEN: ("#f2a65a", "////", "black"), NONE: ("#d8d8d8", "", "black")}

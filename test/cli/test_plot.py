@@ -44,6 +44,14 @@ def test_derivatives_are_drawn_below_the_motion(command: Any, tmp_path: Path) ->
     assert [(label in both, label in plain) for label in labels] == [(True, False)] * len(labels)
 
 
+def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
+    words = "plot", "case_01", "--set", "time.duration_s=2", "--panel", "impact", "-o", "one.svg"
+    assert command(*words).returncode == 0
+    drawn = (tmp_path / "one.svg").read_text("utf-8")
+    assert ("impact force, N" in drawn, "displacement, m" in drawn) == (True, False)
+    assert "allowed: displacement, input, impact, energy" in command("plot", "case_01", "--panel", "force").stderr
+
+
 @pytest.mark.parametrize(
     ("words", "text"),
     [

@@ -12,6 +12,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
@@ -77,3 +78,31 @@ def test_a_recording_gives_what_the_laws_were_given(recorded: tuple[Path, Trajec
     assert (recording.measured[:, 4:] == recording.state[:, 4:]).all()
     assert np.isnan(recording.measured[:, 2:4]).all()
     assert np.std(recording.measured[:, 0] - recording.state[:, 0]) == pytest.approx(1e-3, rel=0.1)
+
+
+def test_a_bag_is_a_table_and_a_motion_with_contacts(recorded: tuple[Path, Trajectory], tmp_path: Path) -> None:
+    """The same columns as those of the run; contacts come from the motion that the recorded forces make."""
+    path, run = recorded
+    recording = bag.read(path)
+    ours, theirs = recording.dataframe(), run.dataframe()
+    assert ours.attrs["units"] == theirs.attrs["units"]
+    for name in theirs:
+        assert ours[name].to_numpy().tobytes() == theirs[name].to_numpy().tobytes(), name
+    assert recording.dataset()["x_object"].attrs["units"] == "m"
+    again = recording.simulated()
+    assert again.state.tobytes() == recording.state.tobytes()
+    assert again.inputs[:-1].tobytes() == recording.inputs[:-1].tobytes()
+    assert len(again.contacts("left")) == 1
+    assert again.contacts("left").tobytes() == run.contacts("left").tobytes()
+    gap = {name: np.delete(getattr(recording, name), 100, axis=0) for name in ("tick", "state", "effort", "command")}
+    with pytest.raises(Refused, match="allowed: a bag with every tick"):
+        replace(recording, **gap).simulated()
+
+
+def test_inspect_writes_the_table(recorded: tuple[Path, Trajectory], tmp_path: Path, command: Any) -> None:
+    path, run = recorded
+    assert command("inspect", str(path), "-o", "bag.csv").returncode == 0
+    run.to_csv(tmp_path / "run.csv")
+    assert (tmp_path / "bag.csv").read_text() == (tmp_path / "run.csv").read_text()
+    again = command("inspect", str(path), "-o", "bag.csv")
+    assert (again.returncode, "--force" in again.stderr) == (2, True)

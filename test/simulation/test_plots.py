@@ -39,6 +39,15 @@ def test_axes_letters_and_legends_do_not_collide(names: tuple[str, ...], width: 
         assert box.x1 <= figure.bbox.x1 + 1.0
 
 
+def test_some_panels_make_a_lower_figure_in_their_order() -> None:
+    run = simulate(scenes.load("case_01"))
+    whole, two = (compose([run], [""], panels=panels) for panels in
+                  (None, [plots.PANELS["energy"], plots.PANELS["displacement"]]))
+    assert [axes.get_ylabel() for axes in two.axes] == ["twice the energy, J", "displacement, m"]
+    assert len(whole.axes) == 4
+    assert two.bbox.height < 0.7 * whole.bbox.height
+
+
 def test_contacts_of_a_recording_are_those_of_the_events() -> None:
     run = simulate(scenes.load("case_03"), grid=np.linspace(0.0, 20.0, 20001))
 

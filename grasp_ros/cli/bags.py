@@ -1,0 +1,106 @@
+"""`grasp inspect`, `verify` and `recover`: what a graph has recorded."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from grasp_ros.cli.arguments import add_command, add_force, add_json, add_output, check_output, prepare, warn
+from grasp_ros.cli.output import destination, show
+
+if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
+    from grasp_ros.graph.recording import Recording
+
+
+def add_to(commands: Any) -> None:
+    """Add the subcommands."""
+    sub = add_command(commands, "recover", _recover)
+    sub.add_argument("bag", type=Path)
+    add_output(sub, "DIRECTORY", "new directory for the bag (default: BAG_recovered)")
+    sub = add_command(commands, "inspect", _inspect)
+    sub.add_argument("bag", type=Path)
+    add_json(sub)
+    add_output(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
+    add_force(sub)
+    sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
+    add_limits(sub)
+    sub = add_command(commands, "verify", _verify)
+    sub.add_argument("bag", type=Path)
+    add_json(sub)
+
+
+def add_limits(sub: argparse.ArgumentParser) -> None:
+    """What a free run has to keep."""
+    sub.add_argument("--max-age", type=float, metavar="N", help="of a free run: exit status 1 if a command was older,"
+                     " in control periods")
+    sub.add_argument("--min-factor", type=float, metavar="F", help="of a free run: exit status 1 if it was slower,"
+                     " simulated seconds in a second")
+
+
+def keeps(recording: Recording, options: argparse.Namespace) -> bool:
+    """Whether a run kept the limits that were stated; says which it did not keep."""
+    broken = []
+    oldest = max((most for _, most in recording.ages.values()), default=math.nan)
+    if options.max_age is not None and not oldest <= options.max_age:
+        broken.append(f"--max-age {options.max_age:g}: the oldest command was {oldest:g} periods old")
+    if options.min_factor is not None and not recording.reached >= options.min_factor:
+        broken.append(f"--min-factor {options.min_factor:g}: {recording.reached:.3g} s in a second was reached")
+    for words in broken:
+        print(f"grasp: {words}", file=sys.stderr)
+    return not broken
+
+
+def _recover(options: argparse.Namespace) -> int:
+    from grasp_ros.graph.recover import recover
+
+    new = options.output or options.bag.parent / f"{options.bag.stem}_recovered"
+    found = recover(options.bag, new)
+    for offset, size, why in found.left_out:
+        print(f"left out: {size} bytes from byte {offset} on: {why}")
+    print(f"{found.ticks} ticks written to {new}")
+    return 0
+
+
+def _inspect(options: argparse.Namespace) -> int:
+    from grasp_ros.cli import report
+    from grasp_ros.graph import bag
+    from grasp_ros.graph.comparison import compare_recording
+    from grasp_ros.graph.summary import summary, verified
+
+    if options.output is not None:
+        check_output(options.output, options.force, [options.bag])
+    recording = bag.read(options.bag)
+    warn(recording.scene)
+    found = summary(recording)
+    rows, equal = report.describe_recording(recording, found), True
+    if options.replay:
+        prepare()
+        comparison = compare_recording(recording)
+        rows, equal = rows + comparison.rows, comparison.equal
+        found["replay"] = {"equal": equal, **verified(comparison.verification, comparison.answers)}
+    show(options, report.table(rows), found)
+    if options.output is not None:
+        with destination(options.output) as file:
+            recording.to_csv(file)
+    return 0 if equal and keeps(recording, options) else 1
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from grasp_ros.cli import report
+    from grasp_ros.graph import bag
+    from grasp_ros.graph.summary import verified
+    from grasp_ros.graph.verify import answers_of, verify
+
+    recording = bag.read(options.bag)
+    prepare()
+    found, answers = verify(recording), answers_of(recording)
+    laws = [(f"{side} controller", str(law)) for side, law in answers.items()]
+    rows = [("bag", str(recording.path)), ("run", recording.running.words),
+            ("recorded", f"{recording.t[-1]:g} s of {recording.scene.duration:g} s; end: {recording.lost['end']}"),
+            *laws, ("verified", found.words)]
+    show(options, report.table(rows), {"bag": str(recording.path), "lockstep": recording.running.lockstep,
+                                       **verified(found, answers)})
+    return 0 if found.holds else 1
