@@ -16,7 +16,6 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import STDOUT, note
 from grasp_ros.cli.parser import Command, add_levels
-from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -146,9 +145,7 @@ def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:
 
 
 def prepare() -> None:
-    """Compile the kernels where that has not been done, and say so."""
+    """Compile the kernels where that has not been done, before anything shows how far it is."""
     from grasp_ros.exact.integrator import compile_kernels
 
-    if not kernels_on_disk():
-        note(COMPILING)
     compile_kernels()

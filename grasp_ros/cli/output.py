@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import math
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -25,6 +26,7 @@ _LEVEL = {"quiet": False}
 def set_level(options: argparse.Namespace) -> None:
     """How much a command says beside its results."""
     _LEVEL["quiet"] = bool(getattr(options, "quiet", False))
+    logging.getLogger("grasp_ros").setLevel(logging.ERROR if _LEVEL["quiet"] else logging.WARNING)
 
 
 def note(text: str) -> None:

@@ -57,15 +57,36 @@ def damaged(whole: bytes) -> list[bytes]:
     return found
 
 
-def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, caplog: pytest.LogCaptureFixture) -> None:
     whole = cached.read_bytes()
+    caplog.clear()
     assert answer(cached, whole) == (42.0, True)
-    assert not capsys.readouterr().err
+    assert not caplog.messages
     for content in damaged(whole):
         assert answer(cached, content) == (42.0, False)
-        assert capsys.readouterr().err.count("is damaged; what cannot be loaded is compiled anew\n") == 1
+        [said] = caplog.messages
+        assert said.endswith("is damaged; what cannot be loaded is compiled anew")
+        caplog.clear()
         assert answer(cached, cached.read_bytes()) == (42.0, True)  # it has been written again
-        assert not capsys.readouterr().err
+        assert not caplog.messages
+
+
+def test_whoever_waits_for_the_compiler_is_told_once_and_a_quiet_command_says_nothing(tmp_path: Path) -> None:
+    """Also in Python and where only a part has been compiled, as by the first fit."""
+    script = tmp_path / "doors.py"
+    script.write_text(
+        "import sys\nfrom argparse import Namespace\nfrom grasp_ros.cli.output import set_level\n"
+        "from grasp_ros.exact.compilation import jit\n\n@jit.door\ndef once(x: float) -> float:\n    return x\n\n"
+        "@jit.door\ndef twice(x: float) -> float:\n    return 2.0 * x\n\n"
+        "set_level(Namespace(quiet=len(sys.argv) > 1))\nprint(twice(once(1.0)))\n"
+    )
+    for words, said in (((), 1), (("-q",), 0)):
+        environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / f"cache{said}")}
+        found = subprocess.run([sys.executable, script, *words], env=environment, capture_output=True, text=True,
+                               check=True)
+        assert (found.stdout, found.stderr.count("compiling the kernels")) == ("2.0\n", said)
+        again = subprocess.run([sys.executable, script], env=environment, capture_output=True, text=True, check=True)
+        assert again.stderr == ""
 
 
 def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:

@@ -1,14 +1,14 @@
 """Where the machine code of the kernels is kept, and whether it is there: without a compiler."""
 
 import hashlib
+import logging
 import os
-import sys
 import tempfile
 import uuid
 from functools import cache
 from pathlib import Path
 
-COMPILING = "compiling the kernels; this happens once after an installation and takes up to a minute"
+LOG = logging.getLogger("grasp_ros")
 
 PACKAGE = Path(__file__).parents[2]
 COMPILED_ROOMS = "physics", "exact", "observe", "methods", "sensitivity"
@@ -82,6 +82,12 @@ def read_checked(path: Path) -> bytes:
 
 
 @cache
+def say_compiling() -> None:
+    """Say, once, why something takes long."""
+    LOG.warning("compiling the kernels; this happens once after an installation and takes up to a minute")
+
+
+@cache
 def say_damaged() -> None:
     """Say, once, that something on disk is of no use."""
-    print(f"the kernel cache in {_base()} is damaged; what cannot be loaded is compiled anew", file=sys.stderr)
+    LOG.warning("the kernel cache in %s is damaged; what cannot be loaded is compiled anew", _base())

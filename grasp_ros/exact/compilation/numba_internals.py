@@ -16,7 +16,13 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
-from grasp_ros.exact.compilation.kernel_cache import code_file, read_checked, say_damaged, write_checked
+from grasp_ros.exact.compilation.kernel_cache import (
+    code_file,
+    read_checked,
+    say_compiling,
+    say_damaged,
+    write_checked,
+)
 
 
 class Part(JITCodeLibrary):
@@ -86,6 +92,7 @@ class KernelCache(FunctionCache):
         try:
             return self._impl.rebuild(target, pickle.loads(read_checked(path)))
         except FileNotFoundError:
+            say_compiling()
             return None
         except Exception:
             say_damaged()

@@ -16,7 +16,6 @@ from typing import Any
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.compilation.kernel_cache import COMPILING, kernels_on_disk
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
 from grasp_ros.graph.health.beats import digest
 from grasp_ros.graph.health.peers import Need
@@ -100,8 +99,6 @@ class Plant(SteppedNode):
         self.beats.own.texts = [digest(text) for text in texts]
         for publisher, text in zip(self._descriptions, texts, strict=True):
             publisher.publish(messages.text(text))
-        if not kernels_on_disk():
-            self.get_logger().info(COMPILING)
         compile_kernels()  # while others get ready for this scene
         self.loop = FreeRunning(self, steering, running) if free else Lockstep(self, steering)
         if progress:
