@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
-from collections.abc import Iterator
 from typing import Any
 
 from grasp_ros import scene as scenes
@@ -25,8 +23,6 @@ from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
 from grasp_ros.physics.errors import Refused, printable
-
-UNLIKELY = 1e-4  # probability of residuals
 
 
 def add_to(commands: Any) -> None:
@@ -62,7 +58,7 @@ def _fit(options: argparse.Namespace) -> int:
     against = dict(map(_value, options.against))
     prepare()
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
-    show(options, printable("\n".join(_lines(found))), _data(found))
+    show(options, printable(str(found)), _data(found))
     if options.output is not None:
         from grasp_ros.identification.figure import measured_and_fitted
 
@@ -76,37 +72,6 @@ def _value(text: str) -> tuple[str, float]:
         return key, float(word)
     except ValueError:
         raise Refused(f"--against {text}: allowed: KEY=VALUE, with a number") from None
-
-
-def _lines(found: Fit) -> Iterator[str]:
-    """Estimates, what is not identifiable, correlations, noise, residuals, and tests."""
-    width = max(map(len, found.keys))
-    yield f"{found.source}: {len(found.t)} samples, {found.t[0]:g} to {found.t[-1]:g} s"
-    yield f"{'':<{width}}  {'estimate':>13}  95 % interval"
-    lost = {key for keys in found.not_identifiable for key in keys}
-    for key, value, low, high in zip(found.keys, found.estimates, found.low, found.high, strict=True):
-        yield f"{key:<{width}}  {value:>13.7g}  " + ("-" if key in lost else f"{low:.7g} to {high:.7g}")
-    for keys in found.not_identifiable:
-        together = " together: the data show only a combination of them" if len(keys) > 1 else ""
-        yield f"not identifiable from these data: {', '.join(keys)}{together}"
-    for row, key in enumerate(found.keys):
-        cells = "".join(_cell(cell, 6, 2) for cell in found.correlation[row, : row + 1])
-        yield f"{'correlation' if row == 0 else '':<12}{key:<{width}}{cells}"
-    noises = zip(CHANNELS, found.noise, strict=True)
-    yield "noise       " + ", ".join(f"{name} {noise:.3g}" for name, noise in noises if math.isfinite(noise))
-    yield "residuals   from  samples  rms / noise  probability if white"
-    for contact in found.contacts:
-        begin = "begin" if contact.side == "none" else f"{contact.side} touch, {contact.begin:.4f} s"
-        yield f"  {begin:<24}{contact.samples:>6}{contact.rms:>8.3f}{_cell(contact.white, 10, 3)}"
-    if any(contact.white < UNLIKELY for contact in found.contacts):
-        yield "the residuals are not noise: the scene lacks something that acted, and the intervals are too narrow"
-    for key, test in found.against.items():
-        verdict = "rejected" if test.rejected else "not rejected"
-        yield f"{key} = {test.value:g}: {verdict}, F = {test.F:.4g}, probability {test.probability:.2g}"
-
-
-def _cell(value: float, width: int, digits: int) -> str:
-    return f"{'-':>{width}}" if math.isnan(value) else f"{value:{width}.{digits}f}"
 
 
 def _data(found: Fit) -> dict[str, Any]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.identification.measured import CHANNELS
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.physics.model import Array
@@ -19,6 +20,7 @@ BLIND = 1e-9  # singular value, of the largest, below which derivatives are no m
 PART = 1e-3  # of a direction, from which on a number belongs to it
 LAGS = 10
 ROUNDING = 1e-3  # of the least noise
+UNLIKELY = 1e-4  # probability of residuals
 REJECTED = 0.01  # probability below which a test rejects
 
 
@@ -45,7 +47,7 @@ class Residuals(NamedTuple):
     white: float  # Ljung-Box test: probability of correlations as large by chance; see `whiteness`
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fit(Frozen):
     """Numbers of a scene, estimated from a measured motion.
 
@@ -99,6 +101,10 @@ class Fit(Frozen):
         """Correlation (n, n) of the estimates."""
         deviation = np.sqrt(np.diag(self.covariance))
         return np.asarray(self.covariance / np.outer(deviation, deviation))
+
+    def __repr__(self) -> str:
+        """What the fit has found, as a table."""
+        return "\n".join(_lines(self))
 
 
 class Sight(NamedTuple):
@@ -160,3 +166,34 @@ def whiteness(residuals: Array) -> float:
         found = products / np.sum(residuals**2, axis=0)
     total = m * (m + 2.0) * np.sum(found**2 / (m - lags)[:, None])
     return float(stats.chi2.sf(total, channels * len(lags)))
+
+
+def _lines(found: Fit) -> Iterator[str]:
+    """Estimates, what is not identifiable, correlations, noise, residuals, and tests."""
+    width = max(map(len, found.keys))
+    yield f"{found.source}: {len(found.t)} samples, {found.t[0]:g} to {found.t[-1]:g} s"
+    yield f"{'':<{width}}  {'estimate':>13}  95 % interval"
+    lost = {key for keys in found.not_identifiable for key in keys}
+    for key, value, low, high in zip(found.keys, found.estimates, found.low, found.high, strict=True):
+        yield f"{key:<{width}}  {value:>13.7g}  " + ("-" if key in lost else f"{low:.7g} to {high:.7g}")
+    for keys in found.not_identifiable:
+        together = " together: the data show only a combination of them" if len(keys) > 1 else ""
+        yield f"not identifiable from these data: {', '.join(keys)}{together}"
+    for row, key in enumerate(found.keys):
+        cells = "".join(_cell(cell, 6, 2) for cell in found.correlation[row, : row + 1])
+        yield f"{'correlation' if row == 0 else '':<12}{key:<{width}}{cells}"
+    noises = zip(CHANNELS, found.noise, strict=True)
+    yield "noise       " + ", ".join(f"{name} {noise:.3g}" for name, noise in noises if math.isfinite(noise))
+    yield "residuals   from  samples  rms / noise  probability if white"
+    for contact in found.contacts:
+        begin = "begin" if contact.side == "none" else f"{contact.side} touch, {contact.begin:.4f} s"
+        yield f"  {begin:<24}{contact.samples:>6}{contact.rms:>8.3f}{_cell(contact.white, 10, 3)}"
+    if any(contact.white < UNLIKELY for contact in found.contacts):
+        yield "the residuals are not noise: the scene lacks something that acted, and the intervals are too narrow"
+    for key, test in found.against.items():
+        verdict = "rejected" if test.rejected else "not rejected"
+        yield f"{key} = {test.value:g}: {verdict}, F = {test.F:.4g}, probability {test.probability:.2g}"
+
+
+def _cell(value: float, width: int, digits: int) -> str:
+    return f"{'-':>{width}}" if math.isnan(value) else f"{value:{width}.{digits}f}"

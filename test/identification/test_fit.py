@@ -96,6 +96,7 @@ def test_what_the_data_do_not_show_is_named(command: Any) -> None:
     assert data["not_identifiable"] == [[stiffness, gain]]
     assert data["numbers"][P_LEFT]["low"] < 0.1 < data["numbers"][P_LEFT]["high"]
     assert data["numbers"][gain]["high"] is None
+    assert f"{fit('run.csv', [stiffness, gain, P_LEFT], load('case_01'))}\n" == result.stdout
 
 
 @pytest.mark.parametrize("loop", [(), ("loop={}",)])
