@@ -13,10 +13,13 @@ LONGEST = 200  # characters of a line that refuses something
 
 
 def shortened(line: str, most: int = LONGEST) -> str:
-    """One line; where it is too long, without its middle."""
-    line = " ".join(line.split())
-    end = most // 3
-    return line if len(line) <= most else f"{line[: most - end - 5]} ... {line[-end:]}"
+    """One line; where it is too long, without the words in its middle."""
+    line, end = " ".join(line.split()), most // 3
+    if len(line) <= most:
+        return line
+    first, last = line[: most - end - 5], line[-end:]
+    part, rest = re.search(r" \S{,25}$", first), re.match(r"\S{,25} ", last)  # of words that are not too long
+    return f"{first[: part.start()] if part else first} ... {last[rest.end():] if rest else last}"
 
 
 class Parser(argparse.ArgumentParser):

@@ -16,17 +16,17 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.bag import BagError, Recorder
 from grasp_ros.graph.health.beats import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
 from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen, seen_of
 from grasp_ros.graph.nodes.picture import Picture
+from grasp_ros.graph.recorder import Recorder
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
-from grasp_ros.graph.rosbag2 import lyapunov_template
+from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
