@@ -230,7 +230,9 @@ class Graph:
     def _see_whether_stopped(self, name: str, process: subprocess.Popen[bytes]) -> None:
         """Nobody else is there to notice it when all nodes are in one process, or when all are stopped."""
         if process.returncode is None:
-            found = os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WCONTINUED | os.WNOHANG)
+            found = None
+            with suppress(ChildProcessError):  # of one that has ended since it was asked
+                found = os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WCONTINUED | os.WNOHANG)
             if found is not None and found.si_code == os.CLD_CONTINUED:
                 self._stopped.pop(name, None)
             elif found is not None:

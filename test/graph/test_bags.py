@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 import time
@@ -246,3 +247,11 @@ def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
     x, v = recording.state[tick, :2]
     assert recording.command[tick, 0] == -9.0 * x - 0.5 * v
     assert not recording.lyapunov[:, 5].any()
+
+
+def test_a_graph_that_ends_while_it_is_looked_at_is_no_failure(tmp_path: Path) -> None:
+    graph = Graph(scene.load("case_01"), tmp_path / "run", ACCURACY)
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)  # and nobody has asked for its status yet
+    graph._see_whether_stopped("plant", ended)
+    assert ended.wait(DEADLINE) == 0
