@@ -11,13 +11,18 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 PAGES := derivatives accuracy maps fuzz hard paper faults effects certificate domain
 fuzz_options := --draws 5000 --jobs 2
 
-.PHONY: demo test quick lint install docs study laboratory benchmark mutants lowest clean
+.PHONY: demo test thorough quick lint install docs study laboratory benchmark mutants lowest clean
 
 demo: install
 	$(BIN)/grasp run case_01
 
-# All tests, some minutes; last those that judge by wall time, alone.
+# The tests of every commit; last those that judge by wall time, alone.
 test: lint
+	$(BIN)/pytest -n 2 --dist loadfile -m "not thorough and not alone" --durations 20
+	$(BIN)/pytest -m "alone and not thorough"
+
+# All tests, before a release and after a change of what only these look at.
+thorough: lint
 	$(BIN)/pytest -n 2 --dist loadfile -m "not alone" --durations 20
 	$(BIN)/pytest -m alone
 

@@ -114,6 +114,7 @@ def test_methods_that_do_not_know_a_scene_are_named() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_the_command_answers_with_a_command_and_a_picture(command: Any, tmp_path: Path) -> None:
     words = ("accuracy", "case_01", "--set", "time.duration_s=0.5", "--seconds", "8")
     result = command(*words, "--error", "1e-6", "-o", "a.png")

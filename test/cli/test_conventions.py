@@ -126,6 +126,7 @@ def test_quiet_says_nothing_but_the_result(command: Any) -> None:
     assert "numpy " in command(*words, "-v").stderr
 
 
+@pytest.mark.slow
 def test_output_goes_to_a_pipe(command: Any) -> None:
     result = command("simulate", "case_01", *SHORT, "--grid", "3", "-o", "-")
     rows = list(csv.reader(result.stdout.splitlines()))
@@ -180,6 +181,7 @@ def test_scenes_prints_one_as_it_was_written(command: Any) -> None:
     assert scene.parse(text, "case_01", "case_01") == scene.load("case_01")
 
 
+@pytest.mark.slow
 def test_a_shell_completes_commands_options_and_scenes() -> None:
     def completed(line: str) -> set[str]:
         """As argcomplete's function for bash asks."""

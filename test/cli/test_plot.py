@@ -25,6 +25,7 @@ def test_width_is_that_of_the_page(command: Any, tmp_path: Path) -> None:
         assert picture.width == pytest.approx(90 / 25.4 * 150, abs=2)
 
 
+@pytest.mark.slow
 def test_sampled_and_files(command: Any, tmp_path: Path) -> None:
     assert command("simulate", "case_01", "--set", "time.duration_s=1", "--sampled", "-o", "a.npz").returncode == 0
     assert command("plot", "a.npz", "case_01", "--to", "1", "--sampled").returncode == 2
@@ -33,6 +34,7 @@ def test_sampled_and_files(command: Any, tmp_path: Path) -> None:
     assert (tmp_path / "a.png").exists()
 
 
+@pytest.mark.slow
 def test_derivatives_are_drawn_below_the_motion(command: Any, tmp_path: Path) -> None:
     keys = ("--sensitivity", "left_contact.dissipation_s_per_m", "--sensitivity", "object.position_m")
     words = "plot", "case_01", "--set", "time.duration_s=2", "-o"

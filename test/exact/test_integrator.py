@@ -198,6 +198,7 @@ for name in ("case_01", "case_05"):
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_uncompiled_source_gives_the_same_numbers() -> None:
     outputs = []
     for disabled in ("0", "1"):
@@ -228,6 +229,7 @@ print(*np.concatenate([*ensemble(scene, {}, ("energy", "settling_time", "touches
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_everything_runs_uncompiled() -> None:
     outputs = []
     for disabled in ("0", "1"):

@@ -57,6 +57,7 @@ def damaged(whole: bytes) -> list[bytes]:
     return found
 
 
+@pytest.mark.slow
 def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, caplog: pytest.LogCaptureFixture) -> None:
     whole = cached.read_bytes()
     caplog.clear()
@@ -95,6 +96,7 @@ def test_a_file_that_cannot_be_rebuilt_is_compiled_anew(cached: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_processes_that_write_at_once_leave_whole_files(tmp_path: Path) -> None:
     (tmp_path / "ours.py").write_text(OURS)
     environment = {

@@ -154,6 +154,7 @@ for number in range(10**9):
 
 
 @pytest.mark.slow  # real processes
+@pytest.mark.thorough
 def test_a_rogue_at_full_speed_on_every_other_topic_costs_no_tick(launch: Any, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(scene.load("case_09").to_yaml())
     rogue = launch(sys.executable, "-c", ROGUE, str(tmp_path / "other.yaml"), "4", stdin=subprocess.PIPE)

@@ -165,6 +165,7 @@ def test_a_second_source_of_commands_is_named_and_refused(
     assert "Traceback" not in errors
 
 
+@pytest.mark.thorough
 def test_controllers_that_stay_work_with_the_next_scene_or_say_why_not(launch: Any, tmp_path: Path) -> None:
     with (tmp_path / "right").open("w") as log:
         monitored = ["--ros-args", "-p", "wait_for_monitor:=true"]

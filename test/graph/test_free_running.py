@@ -31,6 +31,7 @@ pytestmark = pytest.mark.slow  # real processes
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "operate-the-graph.md"
 
 
+@pytest.mark.thorough
 def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any, tmp_path: Path) -> None:
     """The one that the page prints, beside one of ours."""
     source = titled(PAGE, "own_rate.py")
@@ -110,6 +111,7 @@ def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
     assert command("inspect", "run/bag", "--max-age", str(most), "--min-factor", "0.01").returncode == 0
 
 
+@pytest.mark.thorough
 def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
     launch: Any, node: tuple[Any, SingleThreadedExecutor]
 ) -> None:

@@ -73,6 +73,7 @@ def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
     return now
 
 
+@pytest.mark.thorough
 def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_path: Path, levels: Any) -> None:
     """Each of four nodes frozen and thawed in turn: no tick is lost, and the bag is right."""
     (tmp_path / "scene.yaml").write_text(scene.load("case_01", ["time.duration_s=3600"]).to_yaml())

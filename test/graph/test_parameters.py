@@ -79,6 +79,7 @@ def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> 
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller._law.position_gain == 9.0, "the new gain")
 
 
+@pytest.mark.thorough
 def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: Path) -> None:
     """One for each state that the plant may be ahead of it."""
     context = rclpy.Context()

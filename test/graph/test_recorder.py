@@ -112,6 +112,7 @@ def test_the_metadata_are_those_of_another_writer(tmp_path: Path, closed: Path, 
     assert yaml.safe_load(inside["rosbag2"]["serialized_metadata"]) == ours
 
 
+@pytest.mark.slow
 def test_a_bag_that_was_cut_off_at_any_byte_is_read_to_there(tmp_path: Path, closed: Path, run: Trajectory) -> None:
     whole, before = storage(closed).read_bytes(), 0
     cuts = sorted({*np.linspace(1, len(whole) - 1, 16, dtype=int).tolist(), *range(len(whole) - 40, len(whole), 3)})
@@ -130,6 +131,7 @@ def test_a_bag_that_was_cut_off_at_any_byte_is_read_to_there(tmp_path: Path, clo
     assert before == len(run.t)
 
 
+@pytest.mark.slow
 def test_every_flipped_bit_is_noticed(tmp_path: Path, closed: Path, run: Trajectory) -> None:
     whole, rng = storage(closed).read_bytes(), np.random.default_rng(0)
     text = (closed / "metadata.yaml").read_bytes()
@@ -326,6 +328,7 @@ def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
         answers.put((number, str(error)))
 
 
+@pytest.mark.slow
 def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Path, run: Trajectory) -> None:
     context = multiprocessing.get_context("fork")
     answers = context.Queue()
@@ -374,6 +377,7 @@ except bag.BagError as error:
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk_ends_the_bag_while_there_is_room(tmp_path: Path) -> None:
     """A real one, in memory, where this process may mount it."""
     script = f'mount -t tmpfs -o size=6m none "$0" && exec {sys.executable} -c "$1" "$0"'

@@ -52,6 +52,7 @@ def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
     return directory, [*plant.lengths, plant.tick + 1]
 
 
+@pytest.mark.thorough
 def test_random_steering_leaves_a_bag_that_verifies(steered: tuple[Path, list[int]]) -> None:
     """`python -m lab steering --calls 1000` makes more calls."""
     directory, lengths = steered

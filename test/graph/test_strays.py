@@ -157,6 +157,7 @@ rclpy.spin(node)
 
 @pytest.mark.slow  # real processes
 @pytest.mark.parametrize("kind", [[], ["--free-running"]], ids=["lockstep", "free-running"])
+@pytest.mark.thorough
 def test_a_command_beyond_the_actuator_is_named_and_does_not_act(launch: Any, tmp_path: Path, kind: list[str]) -> None:
     words = ["saturation", "--set", "time.duration_s=3.0", "-o", "run", "--without", "left_controller", *kind]
     run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

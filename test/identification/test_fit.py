@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 
 from grasp_ros import fit, load, read_bag, simulate
+from grasp_ros.graph.processes import Graph
 from grasp_ros.identification.result import whiteness
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
@@ -156,6 +158,27 @@ def test_a_bag(two_runs: tuple[Path, Path]) -> None:
     assert found.estimates == pytest.approx([1e4, 0.1], rel=1e-9)
     closed = fit(recording, ["left_feedback.position_gain_N_per_m", P_LEFT], starts.changed({H_LEFT: 1e4}))  # the law
     assert closed.estimates == pytest.approx([5.0, 0.1], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_a_bag_whose_sensors_are_noisy(tmp_path: Path) -> None:
+    """Of a graph in which the noise acted through the feedback, too; no sensor is on the object."""
+    noise = [f"{side}_sensor.{key}" for side, seed in (("left", 3), ("right", 4))
+             for key in (f"noise_seed={seed}", "position_noise_m=1e-4", "velocity_noise_m_per_s=1e-3")]
+    scene = load("case_01", ["time.duration_s=2", "loop={}", *noise])
+    graph = Graph(scene, tmp_path / "run", ACCURACY, one_process=True)
+    graph.start()
+    try:
+        graph.wait([])
+    finally:
+        graph.stop()
+    recording = read_bag(graph.bag)
+    starts = recording.scene.changed({key: 3.0 * value for key, value in CONTACTS.items()})
+    found = fit(recording, [*CONTACTS], starts, by_sensors=True)
+    assert found.noise[[0, 1, 4, 5]] == pytest.approx([1e-4, 1e-3, 1e-4, 1e-3], rel=0.1)
+    off = np.abs(found.estimates - [*CONTACTS.values()]) / np.sqrt(np.diag(found.covariance))
+    assert ((off > 1e-3) & (off < 4.0)).all()
+    assert all(contact.white > 1e-4 or np.isnan(contact.white) for contact in found.contacts)
 
 
 ROWS = "t_s,x_left_m,x_object_m\n" + "".join(f"{0.01 * row},{-0.3 + 0.001 * row},0\n" for row in range(20))

@@ -300,6 +300,7 @@ def test_draws_depend_on_seed_and_number_alone() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_processes_find_what_one_finds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def table(jobs: int) -> list[str]:
         fuzz.run(3, tmp_path / str(jobs), draws=120, jobs=jobs)

@@ -110,6 +110,7 @@ def test_a_study_resumes_and_survives_a_line_cut_short(tmp_path: Path) -> None:
     assert Journal(tmp_path).get(lines[-1]["key"], Record) == second[2]
 
 
+@pytest.mark.slow
 def test_a_ladder_ends_where_a_run_takes_too_long(tmp_path: Path) -> None:
     scene = scenes.load("case_01", [SHORT])
     effort = QUICK._replace(patience=0.0)

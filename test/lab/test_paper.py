@@ -118,12 +118,14 @@ def test_a_symmetric_start_is_a_knife_edge() -> None:
     assert rows[5].settling[1] > 1.5 * rows[5].settling[0]
 
 
+@pytest.mark.slow
 def test_times_beyond_what_can_be_known_are_ranges() -> None:
     assert seconds(settlings(CASES[1])) == "18.2 s"
     assert re.fullmatch(r"[34]\d\d to [67]\d\d s", seconds(settlings(CASES[3])))
     assert seconds([np.inf, np.inf]) == "never"
 
 
+@pytest.mark.slow
 def test_medians_stand_within_the_scatter_of_all_starts() -> None:
     """The first 15 of 200 starts once printed 0.373, 1.12 and 0.963 for what all give as 0.66, 1.57 and 0.75."""
     starts = random_starts(200)
@@ -274,6 +276,7 @@ def test_a_figure_is_read_and_judged() -> None:
         assert "caption" in compared(figure, other, claims).verdict
 
 
+@pytest.mark.slow
 def test_settling_is_counted_in_swings_too() -> None:
     """O6 and O10 come out the other way, if times are counted in swings of the arm."""
     for key in ("O6", "O10"):

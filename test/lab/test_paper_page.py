@@ -16,7 +16,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.simulation import simulate
 from lab.__main__ import main
 
-pytestmark = pytest.mark.slow  # the whole study, with few random starts
+pytestmark = [pytest.mark.slow, pytest.mark.thorough]  # the whole study, with few random starts
 
 NAMES = ("chromium-headless-shell", "chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 A4, WIDE = 695, 1031  # px, the width of a sheet of paper less its margins, upright and across

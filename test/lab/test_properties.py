@@ -47,6 +47,7 @@ def drawn(draw_scene: Callable[[Draw], Scene]) -> list[Scene]:
     return [inside(draw_scene, rng) for _ in range(DRAWS)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw_scene", [draw_ordinary, draw_degenerate])
 def test_every_scene_keeps_all_properties_or_ends_with_a_status(draw_scene: Callable[[Draw], Scene]) -> None:
     broken = {scene.to_yaml(): checks for scene in drawn(draw_scene) if (checks := examine(scene).broken)}
@@ -62,6 +63,7 @@ def test_regression_scenes_keep_all_properties(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rubbish", [np.nan, 1e300])
+@pytest.mark.thorough
 def test_no_kernel_reads_what_it_has_not_written(rubbish: float) -> None:
     """The workspace is shared: what another run left in it must not show."""
     for scene in [regression.load(name) for name in regression.names()] + drawn(draw_degenerate)[:30]:
@@ -114,6 +116,7 @@ def test_degenerate_scenes_cover_all_habits() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Scenes of the same kind at the coarsest accuracy."""
     rng = np.random.default_rng(0)
@@ -124,6 +127,7 @@ def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert {check.name for check in found} >= {"energy", "momentum, left", "position", "splitting"}
 
 
+@pytest.mark.slow
 @settings(FIXED, max_examples=40)
 @given(st.floats(0.0, 12.0), st.floats(-6.0, 3.0), st.just(0.0) | st.floats(1e-3, 100.0), st.floats(-3.0, 3.0))
 def test_isolated_impacts_of_any_kind(hertzian: float, speed: float, loss: float, mass: float) -> None:
@@ -135,6 +139,7 @@ def test_isolated_impacts_of_any_kind(hertzian: float, speed: float, loss: float
 @settings(FIXED, max_examples=25)
 @given(st.floats(2.0, 8.0), st.floats(-2.0, 1.3), st.floats(-1.0, 1.0), st.floats(-0.5, 0.5),
        st.just(0.0) | st.floats(1e-6, 6.0))
+@pytest.mark.thorough
 def test_agreement_with_an_independent_method(hertzian: float, p: float, mass: float, v: float, damping: float) -> None:
     scene = grasp([-0.3, v, 0.0, 0.0, 0.4, 0.0], 1.0, left=Arm(1.0, 10.0, 0.2, 20.0, damping),
                   contact=Contact(10.0**hertzian, 10.0**p), mass=10.0**mass)
@@ -157,6 +162,7 @@ def test_the_friction_of_a_heavy_object_is_one_that_a_scene_allows(seed: int, nu
     assert 1e11 < fuzz.draw(seed, number).system.coulomb <= 1e12
 
 
+@pytest.mark.slow
 def test_fuzzing_counts_failures_and_writes_their_scenes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

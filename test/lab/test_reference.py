@@ -94,6 +94,7 @@ def to_the_end(number: int) -> Reference:
 
 
 @pytest.mark.parametrize("number", CASES)
+@pytest.mark.thorough
 def test_printed_states_of_the_marginal_and_standard_cases(number: int) -> None:
     _, printed, touches = CASES[number]
     result = to_the_end(number)

@@ -137,6 +137,7 @@ def test_the_first_derivative_that_differs_decides(push: float, together: bool) 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["through_the_finger", "together", "rest_on_a_slope", "touching_chain",
                                   "a_finger_rests", "tiny_gap_pulse_1", "pressed_for_a_moment"])
+@pytest.mark.thorough
 def test_more_digits_change_nothing(name: str) -> None:
     scene = load(name)
     times = [scene.duration / 3, scene.duration]
@@ -147,6 +148,7 @@ def test_more_digits_change_nothing(name: str) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["together", "rest_on_a_slope", "touching_chain"])
 def test_a_general_integrator_agrees(name: str) -> None:
     """The equations of motion as the model writes them, without modes and events."""
@@ -169,6 +171,7 @@ def test_a_general_integrator_agrees(name: str) -> None:
     assert np.abs(general.y[:, -1] - found).max() < 1e-7 * np.abs(found).max()
 
 
+@pytest.mark.slow
 def test_collocation_agrees_with_series(monkeypatch: pytest.MonkeyPatch) -> None:
     contact = {"hertz_N_per_m1_5": 1e6, "dissipation_s_per_m": 1e4}
     pushed = {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": 0.3}

@@ -19,7 +19,8 @@ CHEAP = ("through_the_finger", "together", "free_fall", "pressed_for_a_moment")
 
 
 @pytest.mark.parametrize("name", [
-    pytest.param(name, marks=pytest.mark.slow if name in MANY_STEPS else ()) for name in ANSWERS])
+    pytest.param(name, marks=[pytest.mark.slow, pytest.mark.thorough] if name in MANY_STEPS else ())
+    for name in ANSWERS])
 def test_the_motion_is_right_within_roundings(name: str) -> None:
     found = verdict(load(name), ANSWERS[name])
     limit = MORE if name in MANY_IMPACTS else FEW

@@ -178,6 +178,7 @@ def test_a_worker_that_dies_takes_no_row_with_it(tmp_path: Path, tiny_chunks: No
     assert_same(tmp_path / "cluster.zarr", tmp_path / "alone.zarr")
 
 
+@pytest.mark.slow
 def test_the_command_prints_draws_and_completes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "map.zarr"
     words = ["map", "case_01", "--set", SHORT, "--x", f"{GAIN}=1:9:4", "--y", f"{LOSS}=0.01:1:3:log", "-o", str(path)]
@@ -192,6 +193,7 @@ def test_the_command_prints_draws_and_completes(tmp_path: Path, capsys: pytest.C
     assert "peak_impact_left" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words, answer in (
         ([], "axes: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),

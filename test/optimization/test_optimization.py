@@ -21,6 +21,7 @@ BOTH_KP = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_pe
 CRITICAL = 2.0 * math.sqrt(15.0) - 1.0  # of an arm of Table 1 alone: 2 sqrt(K m) - c
 
 
+@pytest.mark.thorough
 def test_every_start_finds_the_gain_beside_critical_damping() -> None:
     scene = gr.load("case_01")
     found = [gr.design(scene, {BOTH_KV: (0.5, 30.0)}, "settling_time", seed=seed) for seed in range(10)]
@@ -31,6 +32,7 @@ def test_every_start_finds_the_gain_beside_critical_damping() -> None:
     assert found[0].outcomes["settling_time"] <= np.nanmin(least.columns["settling_time"])
 
 
+@pytest.mark.slow
 def test_outcomes_are_those_of_a_simulation_and_bounds_are_kept() -> None:
     scene = gr.load("case_01")
     found = gr.design(scene, {BOTH_KV: (0.5, 30.0), BOTH_KP: (1.0, 100.0)}, "settling_time", {"peak_input": 10.0})
@@ -42,6 +44,7 @@ def test_outcomes_are_those_of_a_simulation_and_bounds_are_kept() -> None:
         found.runs = 1  # type: ignore[misc]
 
 
+@pytest.mark.slow
 def test_no_choice_along_two_outcomes_is_better_in_both() -> None:
     scene = gr.load("case_01", ["left_feedback.velocity_gain_Ns_per_m=7", "right_feedback.velocity_gain_Ns_per_m=7"])
     problem = Problem(scene, [Axis(BOTH_KP, 1.0, 40.0)], ["settling_time", "peak_input"])

@@ -196,6 +196,7 @@ def test_every_flipped_bit_of_numbers_is_noticed(tmp_path: Path) -> None:
     assert refused > 200
 
 
+@pytest.mark.slow
 def test_an_output_is_never_the_input_and_replaces_nothing_unasked(command: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text(scenes.load("arm_alone").to_yaml())
     (tmp_path / "link.npz").symlink_to("mine.yaml")

@@ -65,6 +65,7 @@ def test_the_wheel_holds_the_product_alone(pip_prefix: Path) -> None:
     assert not plain & {"scipy", "gmpy2", "mpmath", "heyoka", "xarray", "pytest"}
 
 
+@pytest.mark.thorough
 def test_the_wheel_runs_a_graph_a_verification_and_a_map(pip_prefix: Path, tmp_path: Path) -> None:
     """In an empty directory, away from the checkout."""
     environment = installed(pip_prefix)

@@ -15,14 +15,19 @@ from lab.site import examples
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
+LONG = {f"docs/{name}.md" for name in ("tutorials/map", "tutorials/controller", "tutorials/exercises",
+                                       "how-to/recover-a-bag", "how-to/identify-parameters")}
 PAGES = [page for page in (README, *sorted((ROOT / "docs").rglob("*.md"))) if examples.has_examples(page.read_text())]
 
 
-@pytest.mark.parametrize("page", [
-    pytest.param(page, id=page.relative_to(ROOT).as_posix(),
-                 marks=pytest.mark.slow if examples.has_commands(page.read_text()) else ())
-    for page in PAGES
-])
+def marks(page: Path) -> list[pytest.MarkDecorator]:
+    """How long the commands of a page take."""
+    slow = [pytest.mark.slow] if examples.has_commands(page.read_text()) else []
+    return [*slow, pytest.mark.thorough] if page.relative_to(ROOT).as_posix() in LONG else slow
+
+
+@pytest.mark.parametrize("page", [pytest.param(page, id=page.relative_to(ROOT).as_posix(), marks=marks(page))
+                                  for page in PAGES])
 def test_a_page_prints_what_its_examples_print(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
     pyplot.switch_backend("agg")

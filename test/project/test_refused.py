@@ -62,6 +62,7 @@ def test_every_room_refuses_with_the_same_exception(tmp_path: Path, name: str) -
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_nothing_else_is_raised_for_input() -> None:
     """A ValueError by its own name says that no input can cause it; nothing is caught that faults of ours raise."""
     raised, caught = set(), set()

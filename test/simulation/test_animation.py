@@ -15,6 +15,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.animation import RATE, animate
 
 
+@pytest.mark.slow
 def test_a_gif_has_a_picture_for_each_part_of_a_second(command: Any, tmp_path: Path) -> None:
     words = ("plot", "case_01", "--animate", "--from", "0.3", "--to", "0.6", "--speed", "0.5", "--width", "80")
     result = command(*words)

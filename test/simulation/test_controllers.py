@@ -100,6 +100,7 @@ def test_a_controller_is_called_once_for_every_tick_with_what_is_measured() -> N
     assert run.controllers == {"left": f"{__name__}:Notes"}
 
 
+@pytest.mark.slow
 def test_an_arm_without_feedback_takes_one_and_the_energy_is_that_of_the_plant(tmp_path: Path) -> None:
     sections = {key: numbers for key, numbers in scenes.load("case_01", [SHORT]).values.items()
                 if key != "left_feedback"}

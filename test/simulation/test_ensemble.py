@@ -84,6 +84,7 @@ def test_a_row_that_is_refused_or_stops_takes_nobody_with_it() -> None:
     assert np.isfinite(cut.columns["x_left_end"]).all()
 
 
+@pytest.mark.slow
 def test_arrays_are_built_and_refused_like_scenes() -> None:
     """Every key that has a place in the arrays: the same system, to the last bit, and the same rows refused."""
     scene = scenes.load("case_01", [

@@ -77,6 +77,7 @@ assert "matplotlib.pyplot" not in sys.modules
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_settings_of_others_change_no_pixel(tmp_path: Path) -> None:
     """A page of 90 mm once came out as one of 113, and a backend or a file that cannot be read ended the run."""
     wild, broken = tmp_path / "wild", tmp_path / "broken"
