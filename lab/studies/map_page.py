@@ -47,7 +47,8 @@ def _map(found: maps.Settling) -> dict[str, Any]:
         "pixels": times.size, "settled": np.isfinite(times).mean(), "within": found.within, "bound": maps.SETTLED,
         "shares": [((times <= limit).mean(), limit) for limit in SHARES_S], "jump": maps.JUMP,
         "least": np.isfinite(times[:quarter]).mean(), "most": np.isfinite(times[-quarter:]).mean(),
-        "jumps": found.jumps, "gain": gain, "loss": loss, "accuracy": maps.MAP_ACCURACY, "changed": found.changed,
+        "jumps": found.jumps, "gain": gain, "loss": loss, "finest": found.plan.setup.accuracy, "rougher": maps.ROUGHER,
+        "changed": found.changed,
         "finer": np.diff(found.plan.axes[1].values[:2])[0] / np.diff(gain.values[:2])[0], "seconds": found.seconds,
     }
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -18,9 +19,9 @@ from lab.studies import maps
 pytestmark = [pytest.mark.slow, pytest.mark.thorough]  # minutes of an integrator in Python
 
 PIXELS = 20  # of each map
-EXACT = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-13}
+TOLERANCES = (1e-11, 1e-13)
 SAMPLES = 2000  # of a second
-NEAR_S = 1e-3
+NEAR = 1e-3  # of a settling time
 
 Slope = Callable[[float, Array], Array]
 
@@ -46,42 +47,57 @@ def slope_of(values: Mapping[str, Mapping[str, float]], held: Sequence[float] | 
     return slope
 
 
-def last_outside(scene: Scene, bound: float, until: float) -> float:
+def last_outside(scene: Scene, bound: float, until: float, tolerance: float) -> float:
     """The last time in s at which a mass is farther from 0 than a bound."""
     times = np.linspace(0.0, until, int(until * SAMPLES) + 1)
-    found = solve_ivp(slope_of(scene.values), (0.0, until), scene.initial_state, t_eval=times, max_step=0.01, **EXACT)
+    found = solve_ivp(slope_of(scene.values), (0.0, until), scene.initial_state, "DOP853", times, max_step=0.01,
+                      rtol=tolerance, atol=1e-2 * tolerance)
     outside = np.flatnonzero((np.abs(found.y[::2]) > bound).any(axis=0))
     return float(times[outside[-1]]) if len(outside) else 0.0
 
 
-def far_off(plan: Plan, settled: float, pixels: int = PIXELS) -> list[tuple[float, float]]:
-    """Settling times of pixels drawn at random that DOP853 does not confirm: ours and its own, in s."""
+class Compared(NamedTuple):
+    """Settling times of pixels drawn at random beside those of DOP853."""
+
+    equal: int
+    unknown: int  # DOP853 says another time with another tolerance
+    wrong: list[tuple[float, float]]  # ours and its own, in s
+
+
+def compared(plan: Plan, settled: float, pixels: int = PIXELS) -> Compared:
     rows = np.random.default_rng(7).choice(plan.rows, pixels, replace=False)
     changes = {key: values[rows] for key, values in plan.variants(0, plan.rows).changes.items()}
-    ours = ensemble(plan.scene, changes, ("settling_time",), setup=plan.setup).columns["settling_time"]
-    found = []
-    for place in np.flatnonzero(np.isfinite(ours)):
-        scene = plan.scene.changed({key: float(values[place]) for key, values in changes.items()})
-        bound = settled * float(np.abs(scene.initial_state[::2]).max())
-        theirs = last_outside(scene, bound, float(ours[place]) + 2.0)
-        if abs(theirs - ours[place]) > NEAR_S:
-            found.append((float(ours[place]), theirs))
-    assert np.isfinite(ours).sum() > 0.5 * pixels
-    return found
+    times = ensemble(plan.scene, changes, ("settling_time",), setup=plan.setup).columns["settling_time"]
+    equal, unknown, wrong = 0, 0, []
+    for place in np.flatnonzero(np.isfinite(times)):
+        ours, scene = float(times[place]), plan.scene.changed({key: float(own[place]) for key, own in changes.items()})
+        bound, until = settled * float(np.abs(scene.initial_state[::2]).max()), ours + 2.0
+        theirs = last_outside(scene, bound, until, TOLERANCES[0])
+        finer = theirs if abs(theirs - ours) <= NEAR * ours else last_outside(scene, bound, until, TOLERANCES[1])
+        if abs(finer - ours) <= NEAR * ours:
+            equal += 1
+        elif abs(finer - theirs) > NEAR * ours:
+            unknown += 1
+        else:
+            wrong.append((ours, finer))
+    return Compared(equal, unknown, wrong)
 
 
 def test_settling_times_of_case_3() -> None:
-    """Two runs in a hundred are chaotic to the last digit: there both may be right."""
+    """Without dampers a motion forgets where it came from: what settles late is beyond what DOP853 knows."""
     scene = load("case_03", ["time.duration_s=10.0"])
-    setup = Setup(("settling_time",), maps.MAP_ACCURACY, settled=maps.SETTLED, horizons=maps.HORIZONS)
+    setup = Setup(("settling_time",), settled=maps.SETTLED, horizons=maps.HORIZONS)
     axes = Axis(maps.LOSSES, 0.02, 20.0, 40, True), Axis(maps.GAINS, -9.0, 60.0, 40)
-    assert len(far_off(Plan(scene, setup, axes), maps.SETTLED)) <= 1
+    found = compared(Plan(scene, setup, axes), maps.SETTLED)
+    assert not found.wrong
+    assert found.equal > 0.5 * PIXELS > 2 * found.unknown
 
 
 def test_settling_times_of_case_1_with_all_numbers_off() -> None:
     scene = load("case_01")
     setup = Setup(("settling_time",), maps.MAP_ACCURACY)
-    assert not far_off(Plan(scene, setup, relative(scene, maps.OFF), 1024, 1), setup.settled)
+    found = compared(Plan(scene, setup, relative(scene, maps.OFF), 1024, 1), setup.settled)
+    assert found == (PIXELS, 0, [])
 
 
 @pytest.mark.parametrize("delay", [0, 1])
