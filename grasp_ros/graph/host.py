@@ -7,6 +7,7 @@ only interface is the loopback one. A participant on this host that has no such 
 
 from __future__ import annotations
 
+import socket
 from collections.abc import Mapping
 
 from grasp_ros import CONFIG
@@ -43,6 +44,23 @@ def place(given: Mapping[str, str], namespace: str) -> str:
     """Where a process with these variables looks for others, in words."""
     reach = "this host" if given.get(RANGE) == LOCALHOST else "the network"
     return f"in ROS domain {given.get(DOMAIN) or 0}, namespace {namespace}, on {reach}"
+
+
+def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
+    """Take the place of a graph on this host, until the socket is closed, at the latest by the end of the process.
+
+    Raises
+    ------
+    Refused
+        If another one has it: its nodes would take the states and commands of these for their own.
+    """
+    held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    try:
+        held.bind(f"\0grasp_ros {int(given.get(DOMAIN) or 0)} /{namespace.strip('/')}")
+    except OSError:
+        held.close()
+        raise Refused(f"a graph runs {place(given, namespace)}; allowed: another {DOMAIN} or --namespace") from None
+    return held
 
 
 def check_reach(given: Mapping[str, str], alone: bool = False) -> None:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from grasp_ros.graph import shared_memory
+from grasp_ros.graph.host import hold
 from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -109,6 +110,7 @@ class Graph:
     # The children read the other end: when this one closes, however that comes, they end. They say there why they end.
     _lifeline: socket.socket | None = None
     _causes: list[tuple[float, str]] = field(default_factory=list)  # wall time, and what was said then
+    _place: socket.socket | None = None  # see `host.hold`
 
     @property
     def bag(self) -> Path:
@@ -123,12 +125,13 @@ class Graph:
         Raises
         ------
         Refused
-            If the directory exists or cannot be written, or the scene has no such controller.
+            If the directory exists or cannot be written, the scene has no such controller, or another graph runs here.
         """
         for name in (*self.without, *self.laws):
             if name not in self.scene.controllers:
                 allowed = ", ".join(self.scene.controllers) or "none, this scene has no controller"
                 raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
+        self._place = hold(os.environ, self.namespace)
         scene_file = self.directory / f"{self.scene.name}.yaml"
         with writing(self.directory):
             self.directory.mkdir(parents=True)
@@ -255,9 +258,9 @@ class Graph:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
-        if self._lifeline is not None:
-            self._lifeline.close()
-            self._lifeline = None
+        for held in filter(None, (self._lifeline, self._place)):
+            held.close()
+        self._lifeline = self._place = None
         statuses = {name: process.returncode for name, process in self.processes.items()}
         if any(status < 0 for status in statuses.values()):  # killed: what it has left is of no use to anybody
             shared_memory.remove_unused(shared_memory.segments() - self._segments)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.exact.compilation.jit import allocating
-from grasp_ros.exact.impact import damping_factor
+from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.equations import (
@@ -55,7 +55,7 @@ def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
         factor = damping_factor(p, d)
         if not (push_l if side == 0 else push_r) or u <= 0.0 or factor <= 0.0:
             continue
-        by_u, by_d = 1.5 * H * np.sqrt(u) * factor, p * H * u * np.sqrt(u)
+        by_u, by_d = elastic_slope(H, u) * factor, p * elastic_force(H, u)
         for column, slope in ((x, by_u), (v, by_d)):
             other = column - x + 2
             j[v, column] -= slope / m

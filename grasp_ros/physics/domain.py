@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.physics.impact_law import elastic_force, stored_energy
 from grasp_ros.physics.layout import EPS, OBJECT, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
@@ -103,7 +104,7 @@ class Systems:
     @cached_property
     def elastic(self) -> Array:
         """Elastic force of the pairs at the start, (n, 2) in N."""
-        return self._pairs[..., Law.HERTZIAN] * np.maximum(-self.gap, 0.0) ** 1.5 * self.touching
+        return np.asarray(elastic_force(self._pairs[..., Law.HERTZIAN], np.maximum(-self.gap, 0.0)) * self.touching)
 
     @cached_property
     def pressed(self) -> Array:
@@ -139,7 +140,8 @@ class Systems:
 
     def thrown(self) -> Array:
         """Speed at which a pair that starts pressed in is pushed apart, (n, 2) in m/s."""
-        return np.sqrt(0.8 * self.elastic * np.maximum(-self.gap, 0.0) / self.reduced)
+        stored = stored_energy(self._pairs[..., Law.HERTZIAN], np.maximum(-self.gap, 0.0)) * self.touching
+        return np.asarray(np.sqrt(2.0 * stored / self.reduced))
 
     def impulses(self) -> Array:
         """Largest p J / mu, (n, 2): J from the approach, a start pressed in, and constant forces over the duration.

@@ -12,6 +12,7 @@ from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.impact_law import elastic_force, stored_energy
 from grasp_ros.physics.layout import Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, System
@@ -148,6 +149,6 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
             total += 2.0 * away * own[Of.FORCE] - away * away * own[Of.STIFFNESS]
     for side in system.contacts:
         deeper, pressed = closing(side, rates)[0], np.maximum(closing(side, state)[0], 0.0)[:, None]
-        hertzian = system.pairs[side, Law.HERTZIAN]
-        total += 2.0 * hertzian * pressed**1.5 * deeper + 0.8 * pressed**2.5 * changes.pairs[side, Law.HERTZIAN]
+        total += 2.0 * elastic_force(system.pairs[side, Law.HERTZIAN], pressed) * deeper
+        total += 2.0 * stored_energy(changes.pairs[side, Law.HERTZIAN], pressed)
     return total

@@ -6,6 +6,7 @@ import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.impact_law import elastic_slope
 from grasp_ros.physics.layout import EPS, Entry, Transition
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import System
@@ -90,7 +91,7 @@ def _quantities_of(system: System, side: int) -> Quantity:
         u = np.maximum(u, 0.0)
         force, elastic = impact_force(contact, u, d), hertzian_force(contact, u)
         rounding = ROUNDINGS * np.abs(state[:, 0::2]).max(axis=1)
-        slope = 1.5 * contact.hertzian * np.sqrt(u + rounding)
+        slope = elastic_slope(contact.hertzian, u + rounding)
         noise = np.stack([slope * rounding * (1.0 + contact.dissipation * np.abs(d)),
                           slope * rounding * contact.dissipation * d * d, rounding], axis=1)
         return np.stack([force, (force - elastic) * d, u], axis=1), noise

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import signal
 import sys
 from pathlib import Path
 from typing import Any
@@ -184,5 +185,6 @@ def _faults(options: argparse.Namespace) -> int:
         return 0 if endurance.run(LONG_SCENE, options.ticks) else 1
     drills = run.chosen(options.only, options.quick)
     docs = page_directory(options, "faults")
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the graphs would inherit that it is ignored
     prepare()
     return 0 if run.run(drills, docs) else 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -16,8 +17,11 @@ from mcap.reader import make_reader
 from processes import DEADLINE
 
 from grasp_ros import scene
-from grasp_ros.graph import bag
+from grasp_ros.graph import bag, host
+from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.verify import laws_of, verify
+from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import simulate
 
 ROOT = Path(__file__).parents[2]
@@ -65,3 +69,17 @@ def test_the_package_lists_what_its_nodes_import_and_how_to_cite_it() -> None:
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text())
     assert (cited["version"], cited["license"]) == version
     assert cited["references"][0]["year"] == 1990
+
+
+@pytest.mark.slow  # real processes
+def test_a_second_graph_in_the_place_of_one_that_runs_is_refused_before_it_starts(tmp_path: Path) -> None:
+    """Its controllers would answer the states of the first, which ends when its commands have two sources."""
+    first = Graph(scene.load("case_01"), tmp_path / "first", ACCURACY)
+    first.start()
+    try:
+        with pytest.raises(Refused, match=r"a graph runs in ROS domain \d+, .*allowed: another ROS_DOMAIN_ID"):
+            Graph(scene.load("case_02"), tmp_path / "second", ACCURACY, namespace="").start()
+    finally:
+        first.stop()
+    assert not (tmp_path / "second").exists()
+    host.hold(os.environ, "/").close()  # it is free again

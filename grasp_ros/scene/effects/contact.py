@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from grasp_ros.physics.domain import RANGES
+from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
@@ -47,7 +48,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
     place = sections["object"]["position_m"]
     if depth <= ROUNDING * min(1.0, max(map(abs, system.state[0::2].tolist()))):
         return
-    stored, pressing = 0.4 * system.pairs[at, Law.HERTZIAN] * depth**2.5, _pressing(system, at, depth)
+    stored, pressing = stored_energy(system.pairs[at, Law.HERTZIAN], depth), _pressing(system, at, depth)
     if SIDES[far] in system.contacts and 0.0 < gap < depth:
         why = f"lies {far} of the {far} arm, which does not touch the object"
         yield Oddity(key, value, why, f"each arm on its side of the object at {place!r}")

@@ -118,7 +118,8 @@ def _second_run(stage: Stage) -> None:
     words = stage.run_words()
     words[words.index("-o") + 1] = str(stage.place / "second")
     stage.start("second run", words)
-    _when_there(stage, JOINT_STATES)
+    stage.wait(lambda: stage.ended("second run"), 20.0)
+    stage.happens()
 
 
 def _when_there(stage: Stage, topic: Topic) -> None:
