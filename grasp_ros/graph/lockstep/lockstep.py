@@ -19,7 +19,7 @@ from grasp_ros.graph.lockstep.admission import Limits, Recorded, Sources
 from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.node import UNKNOWN
+from grasp_ros.graph.ros.node import NEW
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
@@ -176,7 +176,7 @@ class Lockstep:
 
         def named() -> bool:
             late = time.monotonic() > deadline
-            return late or not any(UNKNOWN in name for topic in self.topics for name in self._plant.sources(topic))
+            return late or not any(name == NEW for topic in self.topics for name in self._plant.sources(topic))
 
         self._plant.when(named, self._name_sources)
 

@@ -31,6 +31,7 @@ ACKNOWLEDGE_SECONDS = 5.0
 LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
 SWEEP = 100  # messages of one topic at a time
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
+NEW = "a node whose name is not known yet"
 
 
 class Phase(Enum):
@@ -120,7 +121,7 @@ class GraspNode(ParameterNode):
     def sources(self, topic: Topic) -> list[str]:
         """Full names of the nodes that publish on a topic, as far as discovery has them."""
         return sorted(
-            f"{writer.node_namespace.rstrip('/')}/{writer.node_name}"
+            NEW if writer.node_name == UNKNOWN else f"{writer.node_namespace.rstrip('/')}/{writer.node_name}"
             for writer in self.get_publishers_info_by_topic(topic.name)
         )
 
