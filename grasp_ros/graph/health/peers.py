@@ -139,7 +139,7 @@ class PeerNode(GraspNode):
         now = time.monotonic()
         if self._watchdog.resumed > self._excused:
             self._excused = self._watchdog.resumed
-            if self.begun:
+            if self.begun and not self.finished:
                 self.get_logger().warning(f"this process was stopped for {self._watchdog.stood:.1f} s")
         if not self._first_look:
             self._first_look = now
