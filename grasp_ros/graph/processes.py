@@ -133,9 +133,13 @@ class Graph:
                 raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
         self._place = hold(os.environ, self.namespace)
         scene_file = self.directory / f"{self.scene.name}.yaml"
-        with writing(self.directory):
-            self.directory.mkdir(parents=True)
-            scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+        try:
+            with writing(self.directory):
+                self.directory.mkdir(parents=True)
+                scene_file.write_text(self.scene.to_yaml(), encoding="utf-8")
+        except Refused:
+            self.stop()
+            raise
         environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ}
         shared = {"on_silence": self.on_silence}
         if self.peer_timeout is not None:
