@@ -18,7 +18,7 @@ from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED
 
 PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
-RANGE = "section.key=low:high[:n[:log]]"
+RANGE = "KEY[+KEY]=low:high[:n[:log]]"
 
 
 def add_to(commands: Any) -> None:
@@ -27,10 +27,11 @@ def add_to(commands: Any) -> None:
     add_scene(sub)
     add_accuracy(sub)
     add_json(sub)
-    sub.add_argument("--x", metavar=RANGE, help="number along the map, n values (default 101), even or logarithmic")
+    sub.add_argument("--x", metavar=RANGE, help="number, section.key, along the map, n values (default 101), even or"
+                     " logarithmic; keys of one value are joined by +")
     sub.add_argument("--y", metavar=RANGE, help="number up the map")
-    sub.add_argument("--vary", action="append", default=[], metavar="section.key=low:high[::log]",
-                     help="one more number of a sample")
+    sub.add_argument("--vary", action="append", default=[], metavar="KEY[+KEY]=low:high[::log]",
+                     help="one more number of a sample; keys of one value are joined by +")
     sub.add_argument("--sample", type=whole(1), default=0, metavar="N", help="N rows at random instead of a grid")
     sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the sample (default 0)")
     sub.add_argument("--independent", action="store_true", help="independent numbers instead of a Sobol sequence")

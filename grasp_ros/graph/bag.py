@@ -145,9 +145,9 @@ class _Content:
             result[here] = values[there]
             return result
 
-        command = np.zeros((len(ticks), 2))
+        command, held = np.zeros((len(ticks), 2)), held_of(storage, scene)
         for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-            command[:, side] = aligned(topic)[:, 0]
+            command[:, side] = _acted(ticks, joints[:, 6 + side]) if topic in held else aligned(topic)[:, 0]
         own = storage.records[OWN_RECORD]
         return Recording(
             path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
@@ -156,6 +156,13 @@ class _Content:
             dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
             dict(+self.changes.unheard),
         )
+
+
+def _acted(ticks: np.ndarray, effort: Array) -> Array:
+    """The force that acted from each tick (n,) on, which the next one names; NaN where that is not there."""
+    acted = np.append(effort[1:], np.nan)
+    acted[np.append(np.diff(ticks) != 1, True)] = np.nan
+    return acted
 
 
 class _Columns:

@@ -7,7 +7,7 @@ PEERS = {
     "start_timeout_s": "wall time for peers to come and to answer first; 0: any (60)",
     "on_silence": "what is done when a peer is gone or silent: end or wait (wait)",
 }
-MONITORED = {"wait_for_monitor": "start only when a monitor listens; a plant never outruns it (false)"}
+MONITORED = {"wait_for_monitor": "start only with a monitor, which a plant never outruns, and its controllers (false)"}
 PRIORITY = {"real_time_priority": "SCHED_RR, 1 to 99, once it runs with the wall clock; 0: none (0)"}
 TIMEOUTS = {
     name: text for side in ("left", "right") for name, text in (
@@ -42,5 +42,6 @@ def usage(node: str) -> str:
     """What a node prints when it is asked for help."""
     rows = [f"  {name:<20} {text}" for name, text in PARAMETERS[node].items()]
     if node in NODES and node != "monitor":
-        rows += ["", "Numbers of the scene are parameters, too: -p left_arm.position_m:=-0.4"]
+        own = "left_arm.position_m" if node == "plant" else f"{node.split('_')[0]}_feedback.position_gain_N_per_m"
+        rows += ["", f"Numbers of the scene are parameters, too: -p {own}:=0.4"]
     return "\n".join([f"usage: {node} [--ros-args [-p NAME:=VALUE] ...]", "", *rows, ""])

@@ -131,6 +131,8 @@ class Graph:
             if name not in self.scene.controllers:
                 allowed = ", ".join(self.scene.controllers) or "none, this scene has no controller"
                 raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
+        for name in self.laws.keys() & {*self.without}:
+            raise Refused(f"{name}: a law of its own, and without it: allowed: one of the two")
         self._place = hold(os.environ, self.namespace)
         scene_file = self.directory / f"{self.scene.name}.yaml"
         try:

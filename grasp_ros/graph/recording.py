@@ -45,7 +45,8 @@ class Recording(Tabular, Frozen):
         NaN for a body that is not there.
     effort, command : arrays (n, 2), N
         Forces of the controllers that acted until the tick, commands answered to it, which act later if there is a
-        delay; 0 without a controller, NaN where missing.
+        delay; 0 without a controller, NaN where missing. In a free run a command answers no tick: it is the force that
+        acted from the tick on.
     outputs : dict of str to array (n,), N
         Impact and external forces by topic; NaN where missing.
     lyapunov : array (n, 9)

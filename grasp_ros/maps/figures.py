@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,9 @@ from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, LogNorm, Normalize, colormaps
 from grasp_ros.simulation.plots import save
 
-BINS, SCATTERED, DOT, MOST_COLUMNS = 60, 20_000, 2.0, 4
+BINS, FEWEST_BINS, RUNS_IN_A_BIN = 60, 10, 10
+SCATTERED, DOT, MOST_COLUMNS = 20_000, 2.0, 4
+LETTERS = 40  # in a line below a narrow axis
 COLORS = "viridis"
 MISSING = "#c8c8c8"  # what was refused, stopped, or never settles
 LOG_FROM = 1e3  # ratio of values from which on colours are those of their logarithms
@@ -83,14 +86,16 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
                                    layout="constrained")
     figure.suptitle(f"{plan.scene.title}: {plan.sample} runs", fontsize="medium")
     first, *others = columns[0]
-    first.hist(values[finite], bins=BINS, color="#0072b2")
-    first.set_xlabel(label)
+    first.hist(values[finite], bins=min(BINS, max(FEWEST_BINS, finite.sum() // RUNS_IN_A_BIN)), color="#0072b2")
+    first.set_xlabel(textwrap.fill(label, LETTERS))
     first.set_ylabel("runs")
     shown = np.flatnonzero(finite)[:SCATTERED]
     for axes, name in zip(others, strongest, strict=True):
         axes.plot(data[name].values[shown], values[shown], ".", markersize=DOT, alpha=0.3, color="#333333")
-        axes.set_xlabel(label_of(name), fontsize="small")
+        axes.set_xlabel(textwrap.fill(label_of(name), LETTERS), fontsize="small")
         axes.set_ylabel(label, fontsize="small")
+        if next(axis for axis in plan.axes if axis.name == name).log:
+            axes.set_xscale("log")
     save(figure, path)
 
 

@@ -94,6 +94,8 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 -o /dev/full", "/dev/full: cannot be written: No space left on device"),
         (f"simulate case_01 -o {LONG}", "cannot be written: File name too long"),
         ("run case_01 -o .", ".: is there; allowed: a new directory"),
+        ("run case_01 --controller left=math:sin --without left_controller -o z",
+         "left_controller: a law of its own, and without it: allowed: one of the two"),
         ("run case_01 -o file/x", "file/x: cannot be written: Not a directory"),
         ("run case_01 --accuracy 2", "accuracy: 2.0"),
         ("inspect nothing", "nothing: not a bag of this package"),

@@ -51,6 +51,7 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any,
     assert verify(recording).holds
     assert 3 < len(np.unique(recording.effort[:, 0])) < 200  # held over many periods
     assert np.isnan(recording.lyapunov[:, 0]).all()
+    assert recording.command[:-1].tobytes() == recording.effort[1:].tobytes()  # what acted: it answers no tick
     with (tmp_path / "run" / "bag" / "bag.mcap").open("rb") as file:
         rows = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages(topics=["/timing"])
         timing = [dict(zip(row.decoded_message.name, row.decoded_message.position, strict=True)) for row in rows]

@@ -84,7 +84,7 @@ def read_checked(path: Path) -> bytes:
 @cache
 def say_compiling() -> None:
     """Say, once, why something takes long."""
-    LOG.warning("compiling the kernels; this happens once after an installation and takes up to a minute")
+    LOG.warning("compiling kernels: once after an installation for each kind of work, up to a minute")
 
 
 @cache

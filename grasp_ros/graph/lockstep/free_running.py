@@ -77,19 +77,20 @@ class FreeRunning:
         plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
                                "timeouts": 0})
         self._recorded = Recorded(plant, self.advance)
-        commands = plant.scene.controllers.values()
-        self._sides = [topic.name.split("/")[0] for topic in commands]
+        self._commands = [*plant.scene.controllers.values()]
+        self._sides = [topic.name.split("/")[0] for topic in self._commands]
         self._held = {side: Held() for side in self._sides}
         self._timing = Timing(self._sides, self._period, running.real_time_factor)
         self._quality = plant.publisher(TIMING)
-        for topic, side in zip(commands, self._sides, strict=True):
+        for topic, side in zip(self._commands, self._sides, strict=True):
             plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
         self._limits = Limits(plant, plant.scene)
         self._anchor = math.nan  # wall time of tick 0
 
     def missing(self) -> list[str]:
-        """Nothing: it begins without controllers."""
-        return []
+        """Commands that nobody sends yet, where the plant waits for others; by itself it begins without controllers."""
+        plant = self._plant
+        return [topic.name for topic in self._commands if plant.monitored and not plant.count_publishers(topic.name)]
 
     def needs(self) -> Iterator[Need]:
         """The monitor alone: commands have timeouts of their own."""
