@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace) -> int:
         spent.note("compilation")
     plant = {"paused": str(options.paused).lower()}
     if options.free_running is not None:
-        plant.update(free_running="true", real_time_factor=repr(options.free_running))
+        plant.update(free_running="true", real_time_factor=repr(options.free_running), wait_for_controllers="true")
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,

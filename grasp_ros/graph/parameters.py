@@ -7,7 +7,7 @@ PEERS = {
     "start_timeout_s": "wall time for peers to come and to answer first; 0: any (60)",
     "on_silence": "what is done when a peer is gone or silent: end or wait (wait)",
 }
-MONITORED = {"wait_for_monitor": "start only with a monitor, which a plant never outruns, and its controllers (false)"}
+MONITORED = {"wait_for_monitor": "start only when a monitor listens; a plant never outruns it (false)"}
 PRIORITY = {"real_time_priority": "SCHED_RR, 1 to 99, once it runs with the wall clock; 0: none (0)"}
 TIMEOUTS = {
     name: text for side in ("left", "right") for name, text in (
@@ -15,7 +15,10 @@ TIMEOUTS = {
         (f"{side}_on_timeout", "what then acts: hold, zero or stop (zero)"),
     )
 }
-FREE = {**PRIORITY, "real_time_factor": "simulated seconds in a second (1)", **TIMEOUTS}  # exist with the wall clock
+FREE = {  # exist with the wall clock
+    **PRIORITY, "real_time_factor": "simulated seconds in a second (1)",
+    "wait_for_controllers": "start only when somebody sends the commands of each controller (false)", **TIMEOUTS,
+}
 PLANT = {
     "scene": "name of a scene of the package, or path of a .yaml file (case_01)",
     "accuracy": "relative size of the first neglected term of a contact (1e-16)", **MONITORED,

@@ -59,6 +59,8 @@ class FreeRunning:
     steering : Steering
     running : Running
         Real-time factor, timeouts and reactions.
+    waits : bool
+        Whether it begins only when somebody sends the commands of each controller.
 
     Attributes
     ----------
@@ -66,8 +68,8 @@ class FreeRunning:
         None: it waits for no controller.
     """
 
-    def __init__(self, plant: SteppedNode, steering: Steering, running: Running) -> None:
-        self._plant, self._steering, self._running = plant, steering, running
+    def __init__(self, plant: SteppedNode, steering: Steering, running: Running, waits: bool) -> None:
+        self._plant, self._steering, self._running, self._waits_first = plant, steering, running, waits
         self.topics: list[Any] = []
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
@@ -88,9 +90,9 @@ class FreeRunning:
         self._anchor = math.nan  # wall time of tick 0
 
     def missing(self) -> list[str]:
-        """Commands that nobody sends yet, where the plant waits for others; by itself it begins without controllers."""
+        """Commands that nobody sends yet, where it waits for them; else it begins without controllers."""
         plant = self._plant
-        return [topic.name for topic in self._commands if plant.monitored and not plant.count_publishers(topic.name)]
+        return [topic.name for topic in self._commands if self._waits_first and not plant.count_publishers(topic.name)]
 
     def needs(self) -> Iterator[Need]:
         """The monitor alone: commands have timeouts of their own."""

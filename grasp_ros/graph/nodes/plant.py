@@ -74,6 +74,7 @@ class Plant(SteppedNode):
         self.monitored = self.read_only("wait_for_monitor", False)
         progress = self.read_only("progress", False)
         free = self.read_only("free_running", False)
+        waits = free and self.read_only("wait_for_controllers", False)
         self._priority = Priority(self) if free else None
         steering = Steering(self)
         scene = scenes.load(name)
@@ -100,7 +101,7 @@ class Plant(SteppedNode):
         for publisher, text in zip(self._descriptions, texts, strict=True):
             publisher.publish(messages.text(text))
         compile_kernels()  # while others get ready for this scene
-        self.loop = FreeRunning(self, steering, running) if free else Lockstep(self, steering)
+        self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
         if progress:
             self.wall_timer(0.1, self._show)
         self.when(self._ready, self._start)
