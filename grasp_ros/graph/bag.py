@@ -19,7 +19,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph.columns import Alike, alike
 from grasp_ros.graph.opening import KIND, begin, held_of, open_storage, running_of, scene_of
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
-from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.recording import Recording, acted_from
 from grasp_ros.graph.rosbag2 import BagError, decode, names_of
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
@@ -147,7 +147,7 @@ class _Content:
 
         command, held = np.zeros((len(ticks), 2)), held_of(storage, scene)
         for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-            command[:, side] = _acted(ticks, joints[:, 6 + side]) if topic in held else aligned(topic)[:, 0]
+            command[:, side] = acted_from(ticks, joints[:, 6 + side]) if topic in held else aligned(topic)[:, 0]
         own = storage.records[OWN_RECORD]
         return Recording(
             path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
@@ -156,13 +156,6 @@ class _Content:
             dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
             dict(+self.changes.unheard),
         )
-
-
-def _acted(ticks: np.ndarray, effort: Array) -> Array:
-    """The force that acted from each tick (n,) on, which the next one names; NaN where that is not there."""
-    acted = np.append(effort[1:], np.nan)
-    acted[np.append(np.diff(ticks) != 1, True)] = np.nan
-    return acted
 
 
 class _Columns:

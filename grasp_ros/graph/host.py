@@ -7,6 +7,8 @@ only interface is the loopback one. A participant on this host that has no such 
 
 from __future__ import annotations
 
+import errno
+import hashlib
 import socket
 from collections.abc import Mapping
 
@@ -54,11 +56,14 @@ def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
     Refused
         If another one has it: its nodes would take the states and commands of these for their own.
     """
+    name = f"{int(given.get(DOMAIN) or 0)} /{namespace.strip('/')}"
     held = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
     try:
-        held.bind(f"\0grasp_ros {int(given.get(DOMAIN) or 0)} /{namespace.strip('/')}")
-    except OSError:
+        held.bind(f"\0grasp_ros {hashlib.sha256(name.encode()).hexdigest()}")  # a socket has 107 bytes for its name
+    except OSError as error:
         held.close()
+        if error.errno != errno.EADDRINUSE:
+            raise
         raise Refused(f"a graph runs {place(given, namespace)}; allowed: another {DOMAIN} or --namespace") from None
     return held
 

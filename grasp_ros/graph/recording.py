@@ -97,7 +97,7 @@ class Recording(Tabular, Frozen):
         bag does not hold the next tick: at its end, and before a gap. `simulation.Trajectory.inputs` is the same.
         """
         inputs = np.zeros((len(self.tick), 3))
-        inputs[:-1, [LEFT, RIGHT]] = self.effort[1:]
+        inputs[:, [LEFT, RIGHT]] = acted_from(self.tick, self.effort)
         external = {body: EXTERNAL_FORCES[name].name for name, body in SECTIONS.items()}
         if any(topic in self.outputs for topic in external.values()):
             nothing = np.zeros(len(self.tick))
@@ -157,16 +157,21 @@ class Recording(Tabular, Frozen):
         Refused
             If a tick is missing, or the plant was reset.
         """
-        if self.tick.tolist() != list(range(len(self.tick))) or len(self.starts) != 1:
+        acted = acted_from(self.tick, self.effort)
+        if not self.whole:
             raise Refused(f"{self.path}: allowed: a bag with every tick from the begin, and without a reset")
-        if len(self.tick) < 2 or not np.isfinite(self.effort[1:]).all():
+        if len(self.tick) < 2 or not np.isfinite(acted[:-1]).all():
             raise Refused(f"{self.path}: allowed: two ticks or more, and the forces that acted at each")
         numbers = {"time.duration_s": float(self.t[-1])}
         if self.scene.system.delay:
             numbers["loop.delay_ticks"] = 0  # the forces have been delayed
-        acted = {side: _acted(self.effort[:, body]) for side, body in SIDES.items() if body in self.scene.system.laws}
-        return simulate(self.scene.changed(numbers), sampled=True, controllers=acted,
-                        accuracy=self.running.accuracy)
+        laws = {side: _recorded(acted[:, body]) for side, body in SIDES.items() if body in self.scene.system.laws}
+        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, accuracy=self.running.accuracy)
+
+    @property
+    def whole(self) -> bool:
+        """Whether it has every tick from the begin of the scene on, without a reset."""
+        return self.starts.tolist() == [0] and not (np.diff(self.tick) != 1).any()
 
     @property
     def size(self) -> int:
@@ -234,9 +239,20 @@ class Recording(Tabular, Frozen):
         return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard}
 
 
-def _acted(effort: Array) -> Law:
-    """A law that answers each tick with the force that acted from it on, which the next tick names."""
-    forces: list[float] = [*effort[1:].tolist(), 0.0]
+def acted_from(ticks: np.ndarray, effort: Array) -> Array:
+    """Forces that acted from each tick (n,) on, which the next one names as its effort; NaN where that is not there.
+
+    Effort and result are arrays (n, ...) in N.
+    """
+    acted = np.full_like(effort, np.nan)
+    acted[:-1] = effort[1:]
+    acted[:-1][np.diff(ticks) != 1] = np.nan
+    return acted
+
+
+def _recorded(acted: Array) -> Law:
+    """A law that answers each tick with the force that acted from it on; nothing acts from the last one."""
+    forces: list[float] = [*acted[:-1].tolist(), 0.0]
 
     def recorded(tick: int, t: float, x: float, v: float) -> float:
         return forces[tick]

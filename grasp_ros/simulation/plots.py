@@ -10,10 +10,10 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.energy import PLANT_ALONE, pairs_of
+from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.model import Array, Contact, Mode, impact_force
+from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import PAPER
 from grasp_ros.scene.files import replacing
 from grasp_ros.simulation import canvas
@@ -175,11 +175,11 @@ def inputs(axes: Axes, motion: Motion) -> None:
 
 def impacts(axes: Axes, motion: Motion) -> None:
     """fw_l upwards and fw_r downwards: the force on the object."""
-    for side, u, d in pairs_of(motion.scene.system, motion.state):
-        force = impact_force(Contact(*motion.scene.system.pairs[side]), u, d)
-        _, letter, color = SIDES[0] if side == LEFT else SIDES[1]
+    for side, letter, color in SIDES:
+        if side not in motion.scene.system.contacts:
+            continue
         sign, text = (1.0, "") if side == LEFT else (-1.0, "-")
-        axes.plot(motion.t, sign * force, label=f"${text}fw_{letter}$", color=color, linewidth=0.9)
+        axes.plot(motion.t, sign * motion.impacts[:, side], label=f"${text}fw_{letter}$", color=color, linewidth=0.9)
 
 
 def energies(axes: Axes, motion: Motion) -> None:

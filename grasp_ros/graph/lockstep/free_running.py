@@ -69,7 +69,7 @@ class FreeRunning:
     """
 
     def __init__(self, plant: SteppedNode, steering: Steering, running: Running, waits: bool) -> None:
-        self._plant, self._steering, self._running, self._waits_first = plant, steering, running, waits
+        self._plant, self._steering, self._running, self._awaits = plant, steering, running, waits
         self.topics: list[Any] = []
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
@@ -92,7 +92,7 @@ class FreeRunning:
     def missing(self) -> list[str]:
         """Commands that nobody sends yet, where it waits for them; else it begins without controllers."""
         plant = self._plant
-        return [topic.name for topic in self._commands if self._waits_first and not plant.count_publishers(topic.name)]
+        return [topic.name for topic in self._commands if self._awaits and not plant.count_publishers(topic.name)]
 
     def needs(self) -> Iterator[Need]:
         """The monitor alone: commands have timeouts of their own."""
