@@ -26,9 +26,11 @@ _PLACES = {  # module, and the name there where it is another one; their types: 
     "LEFT": "physics.layout", "OBJECT": "physics.layout", "RIGHT": "physics.layout", "Refused": "physics.errors",
     "Scene": "scene.scene", "Status": "exact.integrator", "Trajectory": "simulation.trajectory",
     "Transition": "physics.layout", "compose": "scene.scene", "design": "optimization.search",
-    "draw": "simulation.plots", "ensemble": "simulation.ensemble", "fit": "identification.fit", "load": "scene.scene",
+    "draw": "simulation.plots", "ensemble": "simulation.ensemble",
+    "ensemble_sensitivities": "sensitivity.ensemble", "fit": "identification.fit", "load": "scene.scene",
     "load_run": "simulation.trajectory_file:load", "names": "scene.library", "parse": "scene.scene",
-    "read_bag": "graph.bag:read", "simulate": "simulation.simulate",
+    "read_bag": "graph.bag:read", "sensitivities": "sensitivity.sensitivities", "simulate": "simulation.simulate",
+    "spectrum": "sensitivity.spectrum",
 }
 __all__ = sorted(_PLACES)
 

@@ -14,6 +14,9 @@ from grasp_ros.scene.scene import Scene as Scene
 from grasp_ros.scene.scene import compose as compose
 from grasp_ros.scene.scene import load as load
 from grasp_ros.scene.scene import parse as parse
+from grasp_ros.sensitivity.ensemble import ensemble_sensitivities as ensemble_sensitivities
+from grasp_ros.sensitivity.sensitivities import sensitivities as sensitivities
+from grasp_ros.sensitivity.spectrum import spectrum as spectrum
 from grasp_ros.simulation.ensemble import ensemble as ensemble
 from grasp_ros.simulation.plots import draw as draw
 from grasp_ros.simulation.simulate import simulate as simulate
@@ -22,7 +25,8 @@ from grasp_ros.simulation.trajectory_file import load as load_run
 
 __all__ = [
     "LEFT", "OBJECT", "RIGHT", "Refused", "Scene", "Status", "Trajectory", "Transition", "compose", "design", "draw",
-    "ensemble", "fit", "load", "load_run", "names", "parse", "read_bag", "simulate",
+    "ensemble", "ensemble_sensitivities", "fit", "load", "load_run", "names", "parse", "read_bag", "sensitivities",
+    "simulate", "spectrum",
 ]
 
 CONFIG: Path

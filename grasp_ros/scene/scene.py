@@ -18,7 +18,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, Grasp
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects import BY_SECTION, EFFECTS
+from grasp_ros.scene.effects import BY_SECTION, EFFECTS, build
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import read_text, reading
@@ -68,12 +68,7 @@ class Scene(Frozen):
     @cached_property
     def system(self) -> System:
         """What is simulated, as arrays; not to be changed."""
-        system = System()
-        for effect in self.effects:
-            effect.build(self.values, system)
-        for array in (system.bodies, system.pairs, system.state):
-            array.setflags(write=False)
-        return system
+        return build(self.values)
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:

@@ -11,22 +11,44 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.compilation.vectors import WIDTH, add_product, highest, larger, load, spread, store
 from grasp_ros.exact.contact.series import put
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, V, X, Z
-from grasp_ros.sensitivity.series import NOTHING, WIDTH, combine, evaluate, multiply
-from grasp_ros.sensitivity.tangents import STATES, Motion, Rates, Row, Table
+from grasp_ros.sensitivity.tangents import BLOCK, STATES, STEP, Motion, Rates, Row, Table
 
 MOST_HALVINGS = 200
-NEGLECTED = 64.0 * EPS
+NEGLECTED = 128.0 * EPS
 FIRST = 6  # terms of a series, one of which is about its size
+BODY_OF = (LEFT, LEFT, OBJECT, OBJECT, RIGHT, RIGHT)  # by lane of a state
 
 
 @kernel
 def touches(motion: Motion, body: Body) -> bool:
     """Whether a body takes part in the contacts of a step; the others fly."""
     return body == OBJECT or motion.mode[body] == Pair.CONTACT
+
+
+@kernel
+def multiply(f: Array, g: Array, out: Array, n: int) -> None:
+    """Write the products of eight series with eight others up to the order n; coefficients k stand from 8 k on.
+
+    Four at a time: one sum alone would wait for each addition before the next. Behind n there must be room for three.
+    """
+    for k in range(0, n + 1, 4):
+        a = b = c = d = spread(0.0)
+        place = WIDTH * k
+        for i in range(0, place + WIDTH, WIDTH):
+            x, j = load(f, i), place - i
+            a, b = add_product(a, x, load(g, j)), add_product(b, x, load(g, j + WIDTH))
+            c, d = add_product(c, x, load(g, j + 2 * WIDTH)), add_product(d, x, load(g, j + 3 * WIDTH))
+        x, y, z = load(f, place + WIDTH), load(f, place + 2 * WIDTH), load(f, place + 3 * WIDTH)
+        first, second, third = load(g, 0), load(g, WIDTH), load(g, 2 * WIDTH)
+        store(out, place, a)
+        store(out, place + WIDTH, add_product(b, x, first))
+        store(out, place + 2 * WIDTH, add_product(add_product(c, x, second), y, first))
+        store(out, place + 3 * WIDTH, add_product(add_product(add_product(d, x, third), y, second), z, first))
 
 
 @kernel
@@ -69,117 +91,121 @@ def base_series(motion: Motion, table: Table, n: int) -> None:
     for side in (LEFT, RIGHT):
         hertzian, loss = motion.pairs[side, Law.HERTZIAN], motion.pairs[side, Law.DISSIPATION]
         slope, drag = rows[Row.SLOPE + side], rows[Row.DRAG + side]
-        force, lost = rows[Row.FORCE + side], rows[Row.LOSS + side]
+        stiffer, lost = rows[Row.HERTZIAN + side], rows[Row.LOSS + side]
         for k in range(n + 1):
             i = LANES * k + side
             slope[k], drag[k] = 1.5 * hertzian * second[i], loss * hertzian * second[i + 2]
-            force[k], lost[k] = hertzian * (second[i + 2] + loss * third[i]), hertzian * third[i]
+            stiffer[k], lost[k] = second[i + 2] + loss * third[i], hertzian * third[i]
 
 
 @inlined
-def close(table: Table, several: int, k: int) -> None:
-    """Write coefficient k of u and u' of both pairs."""
-    n, wide = several, table.wide
-    f, out = table.series[table.stride * k :], table.closing[4 * wide * k :]
-    for pair, front, back in ((0, X.L.value, X.O.value), (2, X.O.value, X.R.value)):
-        for lane in range(2):
-            first, second, apart = f[(front + lane) * n :], f[(back + lane) * n :], out[(pair + lane) * wide :]
-            for j in range(n):
-                apart[j] = first[j] - second[j]
+def impact(law: Array, table: Table, at: tuple[int, int], side: Body, sums: tuple[Array, Array]) -> Array:
+    """Coefficient k of the impact force of a pair, times dt/ds, from the sums of what u and u' change of it."""
+    (block, k), rows = at, table.rows
+    hertzian, loss = load(law[side, Law.HERTZIAN], WIDTH * block), load(law[side, Law.DISSIPATION], WIDTH * block)
+    stiffer = add_product(sums[0] + sums[1], hertzian, rows[Row.HERTZIAN + side, k])
+    return add_product(stiffer, loss, rows[Row.LOSS + side, k])
 
 
 @inlined
-def impact(motion: Motion, law: Array, table: Table, side: Body, k: int) -> None:
-    """Write coefficient k of the impact force of a pair, times dt/ds, to the total."""
-    wide, rows = table.wide, table.rows
-    force, lost, first = rows[Row.FORCE + side, k], rows[Row.LOSS + side, k], table.stride + side * wide
-    per_hertz, columns = force / motion.pairs[side, Law.HERTZIAN], 2 * side * wide
-    for column in range(0, wide, WIDTH):
-        by_u = combine(table.closing, 4 * wide, columns + column, rows[Row.SLOPE + side], k, NOTHING)
-        put(table.total, first + column,
-            combine(table.closing, 4 * wide, columns + wide + column, rows[Row.DRAG + side], k, by_u))
-    for j in range(law.shape[2]):
-        table.total[first + j] += law[side, Law.HERTZIAN, j] * per_hertz + law[side, Law.DISSIPATION, j] * lost
-
-
-@inlined
-def advance_body(motion: Motion, acting: Array, table: Table, body: Body, k: int) -> None:
-    """Write coefficient k + 1 of a body; the total has the products of the six numbers, and both impacts."""
-    n, v, rates, row = acting.shape[2], velocity_lane(body), acting[body], motion.bodies[body]
-    share, inverse, total, out = INVERSE[k + 1], 1.0 / row[Of.MASS], table.total, table.stride * (k + 1)
-    stiffness, damping = row[Of.STIFFNESS] * inverse, row[Of.DAMPING] * inverse
+def advance_body(motion: Motion, acting: Array, table: Table, at: tuple[int, int], body: Body,
+                 sums: tuple[Array, Array], push: Array) -> None:
+    """Write coefficient k + 1 of a body, from coefficients k of x dt/ds, v dt/ds and the impacts on it."""
+    (block, k), (x, moved) = at, sums
+    v, row, rates, first = velocity_lane(body), motion.bodies[body], acting[body], WIDTH * block
+    share, inverse = INVERSE[k + 1], 1.0 / row[Of.MASS]
     place = LANES * k + (3 if body == OBJECT else 2 + 2 * body)  # of its x, and of its v, among the products
     pace, way, speed = table.rows[Row.PACE, k], table.products[2, place], table.products[2, place + 3]
     gain = (k + 1) * motion.c[LANES * (k + 1) + v]
-    left = 1.0 if body == OBJECT else (-1.0 if body == LEFT else 0.0)
-    right = -1.0 if body == OBJECT else (1.0 if body == RIGHT else 0.0)
-    on_left, on_right = total[table.stride :], total[table.stride + table.wide :]
-    x, moved = total[(v - 1) * n :], total[v * n :]
-    next_x, next_v = table.series[out + (v - 1) * n :], table.series[out + v * n :]
-    mass, spring, damper, force = rates[Of.MASS], rates[Of.STIFFNESS], rates[Of.DAMPING], rates[Of.FORCE]
-    for j in range(n):
-        push = force[j] * pace - spring[j] * way - damper[j] * speed + left * on_left[j] + right * on_right[j]
-        next_x[j] = share * moved[j]
-        next_v[j] = share * (inverse * (push - mass[j] * gain) - (stiffness * x[j] + damping * moved[j]))
+    driven = pace * load(rates[Of.FORCE], first) - gain * load(rates[Of.MASS], first)
+    slowed = way * load(rates[Of.STIFFNESS], first) + speed * load(rates[Of.DAMPING], first)
+    held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * moved
+    place = BLOCK * block + STEP * (k + 1) + WIDTH * (v - 1)
+    store(table.series, place, share * moved)
+    store(table.series, place + WIDTH, share * (inverse * (push + driven - slowed) - held))
+
+
+@inlined
+def advance_block(motion: Motion, rates: Rates, table: Table, at: tuple[int, int]) -> None:
+    """Write coefficient k + 1 of all bodies in contact, of eight directions: one loop sums all products of series."""
+    block, k = at
+    f, rows, i = table.series, table.rows, BLOCK * block
+    left, right = touches(motion, LEFT), touches(motion, RIGHT)
+    x_l = v_l = x_o = v_o = x_r = v_r = spread(0.0)
+    slope_l = drag_l = slope_r = drag_r = on_l = on_r = spread(0.0)
+    for m in range(k, -1, -1):
+        g, x, v = rows[Row.PACE, m], load(f, i + WIDTH * X.O), load(f, i + WIDTH * V.O)
+        x_o, v_o = add_product(x_o, x, g), add_product(v_o, v, g)
+        if left:
+            arm, moved = load(f, i + WIDTH * X.L), load(f, i + WIDTH * V.L)
+            x_l, v_l = add_product(x_l, arm, g), add_product(v_l, moved, g)
+            slope_l = add_product(slope_l, arm - x, rows[Row.SLOPE + LEFT, m])
+            drag_l = add_product(drag_l, moved - v, rows[Row.DRAG + LEFT, m])
+        if right:
+            arm, moved = load(f, i + WIDTH * X.R), load(f, i + WIDTH * V.R)
+            x_r, v_r = add_product(x_r, arm, g), add_product(v_r, moved, g)
+            slope_r = add_product(slope_r, x - arm, rows[Row.SLOPE + RIGHT, m])
+            drag_r = add_product(drag_r, v - moved, rows[Row.DRAG + RIGHT, m])
+        i += STEP
+    if left:
+        on_l = impact(rates.law, table, at, LEFT, (slope_l, drag_l))
+        advance_body(motion, rates.acting, table, at, LEFT, (x_l, v_l), spread(0.0) - on_l)
+    if right:
+        on_r = impact(rates.law, table, at, RIGHT, (slope_r, drag_r))
+        advance_body(motion, rates.acting, table, at, RIGHT, (x_r, v_r), on_r)
+    advance_body(motion, rates.acting, table, at, OBJECT, (x_o, v_o), on_l - on_r)
 
 
 @kernel
 def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
     """Write the series of the tangents over a Taylor step of degree n."""
     base_series(motion, table, n)
-    several, stride, series = rates.x.shape[1], table.stride, table.series
-    series[: stride * (n + 1)] = 0.0
-    for lane in range(STATES):
-        for j in range(several):
-            series[lane * several + j] = rates.x[lane, j]
-    table.total[:] = 0.0
-    begin = 0 if touches(motion, LEFT) else WIDTH * (X.O * several // WIDTH)
-    end = stride if touches(motion, RIGHT) else X.R * several
+    blocks = rates.x.shape[1] // WIDTH
+    for block in range(blocks):
+        for lane in range(STATES):
+            store(table.series, BLOCK * block + WIDTH * lane, load(rates.x[lane], WIDTH * block))
     for k in range(n):
-        close(table, several, k)
-        for column in range(begin, end, WIDTH):
-            put(table.total, column, combine(series, stride, column, table.rows[Row.PACE], k, NOTHING))
-        for side in (LEFT, RIGHT):
-            if motion.mode[side] == Pair.CONTACT:
-                impact(motion, rates.law, table, side, k)
-        for body in (LEFT, OBJECT, RIGHT):
-            if touches(motion, body):
-                advance_body(motion, rates.acting, table, body, k)
+        for block in range(blocks):  # none of which waits for another
+            advance_block(motion, rates, table, (block, k))
 
 
 @kernel
 def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) -> None:
     """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""
-    several = rates.x.shape[1]
-    for column in range(0, table.stride, WIDTH):
-        put(table.total, column, evaluate(table.series, table.stride, column, n, s))
-    for body in (LEFT, OBJECT, RIGHT):
-        if touches(motion, body):
-            v = velocity_lane(body)
-            for j in range(several):
-                rates.at[v - 1, j], rates.at[v, j] = table.total[(v - 1) * several + j], table.total[v * several + j]
+    for block in range(rates.x.shape[1] // WIDTH):
+        for body in (LEFT, OBJECT, RIGHT):
+            if touches(motion, body):
+                lane, x, v = velocity_lane(body) - 1, spread(0.0), spread(0.0)
+                for k in range(n, -1, -1):
+                    place = BLOCK * block + STEP * k + WIDTH * lane
+                    x, v = load(table.series, place) + s * x, load(table.series, place + WIDTH) + s * v
+                store(rates.at[lane], WIDTH * block, x)
+                store(rates.at[lane + 1], WIDTH * block, v)
 
 
 @kernel
-def exact_length(table: Table, n: int, s: float) -> float:
+def ends_within(series: Array, first: int, n: int, s: float) -> bool:
+    """Whether the last terms of eight series at s are below NEGLECTED of their first ones."""
+    nothing, power = spread(0.0), s ** (n - 1)
+    last = larger(load(series, first + STEP * (n - 1)), nothing) + s * larger(load(series, first + STEP * n), nothing)
+    largest, scale = nothing, 1.0
+    for k in range(FIRST):
+        largest, scale = larger(largest, scale * load(series, first + STEP * k)), scale * s
+    return not highest(power * last - NEGLECTED * largest) > 0.0
+
+
+@kernel
+def exact_length(motion: Motion, table: Table, blocks: int, n: int, s: float) -> float:
     """The largest s 2^-k at which the last terms of all tangents are below NEGLECTED of their first ones.
 
     The step of the run is as long as its own motion allows, which may have died down where its tangents have not.
     """
-    for _ in range(MOST_HALVINGS):
-        fits, power = True, s ** (n - 1)
-        for column in range(table.stride):
-            last = power * (abs(table.series[table.stride * n + column]) * s
-                            + abs(table.series[table.stride * (n - 1) + column]))
-            if last > 0.0:
-                largest, scale = 0.0, 1.0
-                for k in range(FIRST):
-                    largest = max(largest, scale * abs(table.series[table.stride * k + column]))
-                    scale *= s
-                fits = fits and last <= NEGLECTED * largest
-        if fits:
-            break
-        s *= 0.5
+    for block in range(blocks):
+        for lane in range(STATES):
+            if touches(motion, BODY_OF[lane]):
+                halvings = 0
+                while halvings < MOST_HALVINGS and not ends_within(table.series, BLOCK * block + WIDTH * lane, n, s):
+                    s, halvings = 0.5 * s, halvings + 1
     return s
 
 
@@ -187,9 +213,20 @@ def exact_length(table: Table, n: int, s: float) -> float:
 def shift(c: Array, n: int, s: float) -> None:
     """Expand the polynomials of all lanes about s, by Horner's scheme."""
     for first in range(n):
-        for k in range(n - 1, first - 1, -1):
-            for lane in range(LANES):
-                c[LANES * k + lane] += s * c[LANES * (k + 1) + lane]
+        above = load(c, LANES * n)
+        for i in range(LANES * (n - 1), LANES * first - 1, -LANES):
+            above = load(c, i) + s * above
+            store(c, i, above)
+
+
+@inlined
+def time_at(c: Array, n: int, s: float) -> tuple[float, float]:
+    """Time since the begin of a step at s, and its derivative by s."""
+    time = pace = 0.0
+    for k in range(n, -1, -1):
+        pace = pace * s + time
+        time = time * s + c[LANES * k + Lane.TIME]
+    return time, pace
 
 
 @kernel
@@ -197,10 +234,7 @@ def variable_at(c: Array, n: int, s: float, tau: float) -> float:
     """The s at which the time of a step is tau, which is within its length: by bisection and Newton's iteration."""
     low, high, at = 0.0, s, 0.5 * s
     for _ in range(MOST_HALVINGS):
-        time, pace = 0.0, 0.0
-        for k in range(n, -1, -1):
-            pace = pace * at + time
-            time = time * at + c[LANES * k + Lane.TIME]
+        time, pace = time_at(c, n, at)
         if time > tau:
             high = at
         else:

@@ -1,14 +1,14 @@
 """Directions: how a number of a scene changes what is simulated, to the last digits.
 
-Nearly every number enters the arrays of a system linearly, and angles enter by their sine: a central difference over
-any width is exact for the first, one over half a turn for the second.
+Nearly every number enters the arrays of a system linearly, and angles enter by their sine: a difference over any width
+is exact for the first, one over half a turn for the second.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from grasp_ros.physics.layout import LEFT
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.effects import BY_SECTION, build
 from grasp_ros.scene.parameter import Parameter
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
@@ -63,7 +63,9 @@ def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
             raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
                           " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
     forced = any(key.partition(".")[0].endswith(("_pulse", "_sine", "_table")) for key in keys)
-    found = [_derivative(scene, key, sampled, forced) for key in keys]
+    ticks = scene.ticks if forced else 0
+    here = _numbers(scene.system, ticks, sampled)
+    found = [_derivative(scene, key, here, partial(_numbers, ticks=ticks, sampled=sampled)) for key in keys]
     return Directions(*(np.ascontiguousarray(np.stack(arrays, axis=-1)) for arrays in zip(*found, strict=True)))
 
 
@@ -86,21 +88,20 @@ def check_key(scene: Scene, key: str) -> Parameter:
     return parameter
 
 
-def _derivative(scene: Scene, key: str, sampled: bool, forced: bool) -> Directions:
-    """Derivatives of all arrays of a system by one number."""
+def _derivative(scene: Scene, key: str, here: Directions, numbers: Callable[[System], Directions]) -> Directions:
+    """Derivatives of all arrays of a system by one number, from these arrays."""
     parameter, (section, _, name) = check_key(scene, key), key.partition(".")
     value = scene.values[section][name]
-    width, divisor = (0.5 * math.pi, 2.0) if parameter.unit == "rad" else (0.5 * abs(value) or 1.0, 0.0)
-    above, below = value + width, value - width
-    high, low = (_numbers(_moved(scene, section, name, at), scene.ticks if forced else 0, sampled)
-                 for at in (above, below))
-    return Directions(*((b - a) / (divisor or above - below) for a, b in zip(low, high, strict=True)))
 
+    def at(other: float) -> Directions:  # which need not be in its range
+        return numbers(build({**scene.values, section: {**scene.values[section], name: other}}))
 
-def _moved(scene: Scene, section: str, name: str, value: float) -> System:
-    """The system with another number, which need not be in its range."""
-    numbers = {**scene.values[section], name: value}
-    return replace(scene, values={**scene.values, section: numbers}).system
+    if parameter.unit == "rad":
+        low, high, width = at(value - 0.5 * math.pi), at(value + 0.5 * math.pi), 2.0
+    else:
+        width = float(value) or 1.0
+        low, high = here, at(value + width)
+    return Directions(*((b - a) / width for a, b in zip(low, high, strict=True)))
 
 
 def _numbers(system: System, ticks: int, sampled: bool) -> Directions:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from grasp_ros.physics.impact_law import damping_factor, elastic_force, elastic_slope
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Entry, Law, Of, Transition
-from grasp_ros.physics.model import Array, impact_force_of
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -22,62 +22,67 @@ class Moments(NamedTuple):
 
     state: Array  # (e, 6)
     rates: Array  # (e, 6, n) its derivatives
-    forces: Array  # (e, 3, n + 1) derivatives of the constant forces that act on the bodies, and these
+    forces: Array  # (e, 3, 1 + n) constant forces that act on the bodies, and their derivatives
 
 
-class _Event:
-    """One event: what its function g and its rate follow from."""
+class _Events:
+    """Events of one kind: what their function g and its rate follow from."""
 
-    def __init__(self, bodies: Array, pairs: Array, changes: Directions, moment: Moments, closings: Array,
-                 changed: Array) -> None:
-        self._bodies, self._pairs, self._changes = bodies, pairs, changes
-        self._y, self._dy = moment.state, moment.rates
-        self._forces, self._drives = moment.forces[:, -1], moment.forces[:, :-1]
-        self._closings, self._changed = closings, changed  # (2, 2) u and u' by side, and (2, 2, n) their derivatives
+    def __init__(self, bodies: Array, pairs: Array, changes: Directions, moments: Moments) -> None:
+        self._bodies, self._pairs, self._changes, self._moments = bodies, pairs, changes, moments
+        self._forces, self._drives = moments.forces[:, :, 0], moments.forces[:, :, 1:]
 
-    def _impact(self, side: int) -> tuple[float, float, float, float]:
+    def _impact(self, side: int) -> tuple[Array, Array, Array, Array]:
         """u, u', the impact force of a pair, and 1 + p u'; no force where condition (10) does not hold."""
         hertzian, loss = self._pairs[side]
-        u, rate = self._closings[side].tolist()
-        return u, rate, float(impact_force_of(hertzian, loss, u, rate)), float(damping_factor(loss, rate))
+        u, rate = closing(side, self._moments.state)
+        factor, pressed = damping_factor(loss, rate), np.maximum(u, 0.0)
+        return pressed, rate, np.maximum(factor, 0.0) * elastic_force(hertzian, pressed), factor
 
-    def acceleration(self, body: int) -> float:
-        """Acceleration of a body, m/s^2."""
+    def acceleration(self, body: int) -> Array:
+        """Acceleration (e,) of a body, m/s^2."""
         mass, stiffness, damping, _ = self._bodies[body]
-        x, v = self._y[COLUMN[body] : COLUMN[body] + 2]
-        push = self._forces[body] - stiffness * x - damping * v
+        x, v = self._moments.state[:, COLUMN[body] : COLUMN[body] + 2].T
+        push = self._forces[:, body] - stiffness * x - damping * v
         for side in (LEFT, RIGHT) if body == OBJECT else (body,):
             push += SIGN[side] * (1.0 if body == OBJECT else -1.0) * self._impact(side)[2]
-        return float(push / mass)
+        return np.asarray(push / mass)
 
-    def pair(self, side: int) -> tuple[Array, float]:
-        """Change of u, and u'."""
-        return self._changed[side, 0], float(self._closings[side, 1])
+    def pair(self, side: int) -> tuple[Array, Array]:
+        """Change (e, n) of u, and u'."""
+        return closing(side, self._moments.rates)[0], closing(side, self._moments.state)[1]
 
-    def surface(self, side: int) -> tuple[Array, float]:
+    def surface(self, side: int) -> tuple[Array, Array]:
         """Change of u' + 1/p, and its rate."""
         rate = SIGN[side] * (self.acceleration(side) - self.acceleration(OBJECT))
-        moved = self._changed[side, 1]
-        return moved - self._changes.pairs[side, Law.DISSIPATION] / self._pairs[side, Law.DISSIPATION] ** 2, rate
+        moved, loss = closing(side, self._moments.rates)[1], self._pairs[side, Law.DISSIPATION]
+        return moved - self._changes.pairs[side, Law.DISSIPATION] / loss**2, rate
 
-    def stop(self) -> tuple[Array, float]:
+    def stop(self, _: int) -> tuple[Array, Array]:
         """Change of the object's velocity, and its acceleration before it stops."""
-        return self._dy[COLUMN[OBJECT] + 1], self.acceleration(OBJECT)
+        return self._moments.rates[:, COLUMN[OBJECT] + 1], self.acceleration(OBJECT)
 
-    def slip(self) -> tuple[Array, float]:
+    def slip(self, _: int) -> tuple[Array, Array]:
         """Change of what pushes a stuck object beyond its friction, and its rate."""
-        change, rate = np.array(self._drives[OBJECT]), 0.0
+        change, rate = self._drives[:, OBJECT].copy(), np.zeros(len(self._drives))
         for side in (LEFT, RIGHT):
             u, speed, force, factor = self._impact(side)
-            if force == 0.0:
+            sign, (hertzian, loss), (d_hertzian, d_loss) = SIGN[side], self._pairs[side], self._changes.pairs[side]
+            if not hertzian:
                 continue
-            (hertzian, loss), (d_hertzian, d_loss) = self._pairs[side], self._changes.pairs[side]
-            slope, drag = elastic_slope(hertzian, u) * factor, loss * elastic_force(hertzian, u)
-            deeper, faster = self._changed[side]
-            change += SIGN[side] * (slope * deeper + drag * faster + force / hertzian * d_hertzian
-                                    + speed * elastic_force(hertzian, u) * d_loss)
-            rate += SIGN[side] * slope * speed + drag * self.acceleration(side)  # the object stands still
-        return change - np.sign(rate) * self._changes.coulomb, rate
+            elastic = np.where(force == 0.0, 0.0, elastic_force(hertzian, u))
+            slope, drag = np.where(force == 0.0, 0.0, elastic_slope(hertzian, u) * factor), loss * elastic
+            deeper, faster = closing(side, self._moments.rates)
+            change += sign * (slope[:, None] * deeper + drag[:, None] * faster
+                              + np.outer(force / hertzian, d_hertzian) + np.outer(speed * elastic, d_loss))
+            rate += sign * slope * speed + drag * self.acceleration(side)  # the object stands still
+        return change - np.sign(rate)[:, None] * self._changes.coulomb, rate
+
+
+FUNCTIONS = {
+    Transition.TOUCH: _Events.pair, Transition.RELEASE: _Events.pair, Transition.CLAMP: _Events.surface,
+    Transition.REENTRY: _Events.surface, Transition.STICK: _Events.stop, Transition.SLIP: _Events.slip,
+}
 
 
 def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array, moments: Moments) -> Array:
@@ -96,29 +101,19 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     system = scene.system
     bodies = np.array(system.bodies if sampled else system.closed_loop)
     bodies[bodies[:, Of.MASS] == 0.0, Of.MASS] = 1.0  # of what is not there
-    closings, changed = (np.array([closing(side, values) for side in (LEFT, RIGHT)])
-                         for values in (moments.state, moments.rates))
     found: Array = np.zeros((len(events), moments.rates.shape[2]))
-    for row, event in enumerate(events):
-        side, kind = int(event[Entry.BODY]), int(event[Entry.KIND])
-        if event[Entry.TIME] == 0.0 or (kind == Transition.SLIP and _is_tick(scene, sampled, event[Entry.TIME])):
-            continue
-        at = _Event(bodies, system.pairs, changes, Moments(*(part[row] for part in moments)), closings[:, :, row],
-                    changed[:, :, row])
-        if kind in (Transition.TOUCH, Transition.RELEASE):
-            change, rate = at.pair(side)
-        elif kind in (Transition.CLAMP, Transition.REENTRY):
-            change, rate = at.surface(side)
-        else:
-            change, rate = at.stop() if kind == Transition.STICK else at.slip()
+    time, side, kind = events[:, Entry.TIME], events[:, Entry.BODY], events[:, Entry.KIND]
+    moves = (time > 0.0) & ~((kind == Transition.SLIP) & _are_ticks(scene, sampled, time))
+    for body, which in np.unique(events[moves][:, [Entry.BODY, Entry.KIND]].astype(int), axis=0).tolist():
+        rows = moves & (side == body) & (kind == which)
+        found_here = _Events(bodies, system.pairs, changes, Moments(*(part[rows] for part in moments)))
+        change, rate = FUNCTIONS[Transition(which)](found_here, body)
         with np.errstate(divide="ignore", invalid="ignore"):
-            found[row] = -change / rate
+            found[rows] = -change / rate[:, None]
     return found
 
 
-def _is_tick(scene: Scene, sampled: bool, time: float) -> bool:
-    """Whether inputs change at a time."""
-    if not (sampled or scene.system.external):
-        return False
-    ticks = time * NANOSECONDS / scene.period_ns
-    return bool(abs(ticks - round(ticks)) <= 8.0 * EPS * ticks)
+def _are_ticks(scene: Scene, sampled: bool, times: Array) -> Any:
+    """Where inputs change at times (e,)."""
+    ticks = times * NANOSECONDS / scene.period_ns
+    return (sampled or bool(scene.system.external)) & (abs(ticks - np.round(ticks)) <= 8.0 * EPS * ticks)

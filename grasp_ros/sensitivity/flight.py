@@ -13,6 +13,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.compilation.vectors import WIDTH, load, store
 from grasp_ros.exact.impact import elastic_force, elastic_slope
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V
@@ -77,19 +78,19 @@ def flow_of_body(stiffness: float, damping: float, t: float, m: Array) -> None:
 def fly_tangent(motion: Motion, rates: Rates, m: Array, body: Body, span: float) -> None:
     """Write the tangents of a body after `span` s of flight to `at`."""
     row, own, v = motion.bodies[body], rates.acting[body], velocity_lane(body)
-    mass, begin, end = row[Of.MASS], rates.x[v - 1 : v + 1], rates.at[v - 1 : v + 1]
+    mass, x_0, v_0 = row[Of.MASS], motion.before[v - 1], motion.before[v]
     stiffness, damping, steady = row[Of.STIFFNESS] / mass, row[Of.DAMPING] / mass, row[Of.FORCE] / mass
     flow_of_body(stiffness, damping, span, m)
-    x_0, v_0 = motion.before[v - 1], motion.before[v]
     for i in range(2):
-        by_k = m[BY_STIFFNESS, i, 0] * x_0 + m[BY_STIFFNESS, i, 1] * v_0 + m[BY_STIFFNESS, i, STEADY] * steady
-        by_c = m[BY_DAMPING, i, 0] * x_0 + m[BY_DAMPING, i, 1] * v_0 + m[BY_DAMPING, i, STEADY] * steady
-        for j in range(begin.shape[1]):
-            heavier = own[Of.MASS, j]
-            change = (by_k * (own[Of.STIFFNESS, j] - stiffness * heavier)
-                      + by_c * (own[Of.DAMPING, j] - damping * heavier)
-                      + m[FLOW, i, STEADY] * (own[Of.FORCE, j] - steady * heavier)) / mass
-            end[i, j] = m[FLOW, i, 0] * begin[0, j] + m[FLOW, i, 1] * begin[1, j] + change
+        by_x, by_v, by_steady = m[FLOW, i, 0], m[FLOW, i, 1], m[FLOW, i, STEADY] / mass
+        by_k = (m[BY_STIFFNESS, i, 0] * x_0 + m[BY_STIFFNESS, i, 1] * v_0 + m[BY_STIFFNESS, i, STEADY] * steady) / mass
+        by_c = (m[BY_DAMPING, i, 0] * x_0 + m[BY_DAMPING, i, 1] * v_0 + m[BY_DAMPING, i, STEADY] * steady) / mass
+        by_mass = by_k * stiffness + by_c * damping + by_steady * steady
+        for first in range(0, rates.x.shape[1], WIDTH):
+            moved = by_x * load(rates.x[v - 1], first) + by_v * load(rates.x[v], first)
+            stiffer = by_k * load(own[Of.STIFFNESS], first) + by_c * load(own[Of.DAMPING], first)
+            driven = by_steady * load(own[Of.FORCE], first) - by_mass * load(own[Of.MASS], first)
+            store(rates.at[v - 1 + i], first, moved + stiffer + driven)
 
 
 @kernel

@@ -17,14 +17,14 @@ from grasp_ros.sensitivity.tangents import Inputs, Rates
 def act(mode: Integers, rates: Rates, inputs: Inputs) -> None:
     """Write how the directions change what acts on the bodies in a segment."""
     for body in (LEFT, RIGHT, OBJECT):
-        for j in range(rates.x.shape[1]):
+        for j in range(inputs.force.shape[1]):
             for column in range(3):
                 rates.acting[body, column, j] = inputs.given[body, column, j]
             rates.acting[body, Of.FORCE, j] = inputs.given[body, Of.FORCE, j] + inputs.force[body, j]
     slide = mode[OBJECT]
     if slide in (Slide.RIGHTWARD, Slide.LEFTWARD):
         against = -1.0 if slide == Slide.RIGHTWARD else 1.0
-        for j in range(rates.x.shape[1]):
+        for j in range(inputs.force.shape[1]):
             rates.acting[OBJECT, Of.FORCE, j] += against * inputs.coulomb[j]
 
 
@@ -53,7 +53,7 @@ def enter_tick(inputs: Inputs, before: Array, moved: Array, tick: int) -> None:
     delay = inputs.waiting.shape[0]
     slot = tick % delay if delay > 0 else 0
     for body in (LEFT, RIGHT, OBJECT):
-        for j in range(moved.shape[1]):
+        for j in range(inputs.force.shape[1]):
             force = answer(inputs, before, moved, body, tick, j) if body != OBJECT else 0.0
             if delay > 0 and body != OBJECT:
                 force, inputs.waiting[slot, body, j] = inputs.waiting[slot, body, j], force

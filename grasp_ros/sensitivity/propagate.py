@@ -14,6 +14,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import allocating, kernel
+from grasp_ros.exact.compilation.vectors import WIDTH
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.records import Array
@@ -24,12 +25,12 @@ from grasp_ros.sensitivity.contact import (
     expand_tangents,
     shift,
     step_tangents,
+    time_at,
     touches,
     variable_at,
 )
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
-from grasp_ros.sensitivity.series import evaluate
 from grasp_ros.sensitivity.tangents import Count, Motion, Number, Outputs, Rates, Tangents, copy_matrix, tangents_at
 
 FINISH = -1  # in place of a kind of segment
@@ -113,11 +114,11 @@ def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
 @kernel
 def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
     """Write what stands in `at` to the next output, and the forces that act."""
-    row, n = outputs.counts[Count.FILLED], rates.x.shape[1]
+    row, n = outputs.counts[Count.FILLED], outputs.counts[Count.DIRECTIONS]
     for body in (LEFT, RIGHT, OBJECT):
-        outputs.forces[row, body, n] = motion.bodies[body, Of.FORCE]
+        outputs.forces[row, body, 0] = motion.bodies[body, Of.FORCE]
         for j in range(n):
-            outputs.forces[row, body, j] = rates.acting[body, Of.FORCE, j]
+            outputs.forces[row, body, 1 + j] = rates.acting[body, Of.FORCE, j]
     copy_matrix(outputs.out[row], rates.at)
     outputs.counts[Count.FILLED] = row + 1
 
@@ -216,9 +217,9 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         motion.c[place] = t.source[place]
     while True:
         expand_tangents(motion, rates, t.table, n)
-        part = exact_length(t.table, n, left)
+        part = exact_length(motion, t.table, rates.x.shape[1] // WIDTH, n, left)
         ends = part == left
-        reached = span if ends else evaluate(motion.c, LANES, 0, n, part)[0]  # its time
+        reached = span if ends else time_at(motion.c, n, part)[0]
         while is_due(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.exact.compilation.vectors import WIDTH
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.exact.records import Integers, Tables
 from grasp_ros.observe.observer import address_of
@@ -16,8 +17,25 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions, law_rows
 from grasp_ros.sensitivity.propagate import FINISH, UNSEEN, propagate
-from grasp_ros.sensitivity.series import padded
-from grasp_ros.sensitivity.tangents import NUMBERS, ROWS, STATES, TERMS, Count, Number, Place
+from grasp_ros.sensitivity.tangents import BLOCK, NUMBERS, ROOM, ROWS, STATES, TERMS, Count, Number, Place
+
+LINE_BYTES = 64
+
+
+def _zeros(*shape: int) -> Array:
+    """Zeros that begin on a line of the processor's cache: vectors that lie on two lines take twice as long."""
+    count = math.prod(shape)
+    whole = np.zeros(count + WIDTH)
+    first = -whole.ctypes.data % LINE_BYTES // whole.itemsize
+    return whole[first : first + count].reshape(shape)
+
+
+def _padded(array: Array) -> Array:
+    """An array with zeros behind its last axis, up to a multiple of WIDTH."""
+    n = array.shape[-1]
+    wide = _zeros(*array.shape[:-1], n + -n % WIDTH)
+    wide[..., :n] = array
+    return wide
 
 
 class Carrier:
@@ -36,32 +54,30 @@ class Carrier:
         Derivatives of the state now.
     out : array (m, 6, n)
         At the output times.
-    forces : array (m, 3, n + 1)
-        Derivatives of the constant forces that act on the bodies there, and behind them these forces, N.
+    forces : array (m, 3, 1 + n)
+        Constant forces that act on the bodies there, N, and behind them their derivatives.
     """
 
     def __init__(self, integrator: Integrator, directions: Directions, grid: Array) -> None:
         n, plant, state = directions.state.shape[1], integrator.plant, integrator.records
-        self.x, self.out = np.array(directions.state, order="C"), np.zeros((len(grid), STATES, n))
-        self.forces = np.zeros((len(grid), 3, n + 1))
+        x, law = _padded(directions.state), _padded(directions.pairs)
+        wide = x.shape[1]
+        self.x, self.out, self.forces = x[:, :n], np.zeros((len(grid), STATES, n)), np.zeros((len(grid), 3, 1 + n))
         self.counts, self.numbers = np.zeros(len(Count), dtype=np.int64), np.zeros(NUMBERS)
-        self.counts[Count.DIRECTIONS], self.counts[Count.OUTPUTS] = n, len(grid)
+        self.counts[Count.DIRECTIONS], self.counts[Count.COLUMNS], self.counts[Count.OUTPUTS] = n, wide, len(grid)
         self.counts[Count.TICK], self.counts[Count.SLIDE] = -1, UNSEEN
         self.numbers[Number.CORNER] = math.inf
-        stride, wide = padded(STATES * n), padded(n)
-        self.counts[Count.STRIDE], self.counts[Count.WIDE] = stride, wide
         self.before = state.y.copy()
         self._arrays: dict[Place, Array | Integers] = {
             Place.Y: state.y, Place.MODE: state.mode, Place.CLOCK: state.clock, Place.BODIES: plant.bodies,
             Place.PAIRS: plant.pairs, Place.COUNTS: self.counts, Place.NUMBERS: self.numbers,
-            Place.BEFORE: self.before, Place.X: self.x, Place.AT: np.zeros((STATES, n)),
-            Place.GIVEN: directions.bodies, Place.ACTING: np.zeros((3, 4, n)), Place.FORCE: np.zeros((3, n)),
-            Place.LAW: directions.pairs, Place.COULOMB: directions.coulomb, Place.GRID: grid,
+            Place.BEFORE: self.before, Place.X: x, Place.AT: _zeros(STATES, wide),
+            Place.GIVEN: directions.bodies, Place.ACTING: _zeros(3, 4, wide), Place.FORCE: np.zeros((3, n)),
+            Place.LAW: law, Place.COULOMB: directions.coulomb, Place.GRID: grid,
             Place.OUT: self.out, Place.FORCES: self.forces,
-            Place.SERIES: np.zeros(stride * TERMS), Place.CLOSING: np.zeros(4 * wide * TERMS),
-            Place.TOTAL: np.zeros(stride + 2 * wide), Place.ROWS: np.zeros((ROWS, TERMS)),
-            Place.FACTORS: np.zeros((2, LANES * TERMS)), Place.PRODUCTS: np.zeros((3, LANES * TERMS)),
-            Place.MATRICES: np.zeros((5, STATES, STATES)), Place.OWN: np.zeros(LANES * TERMS),
+            Place.SERIES: _zeros(wide // WIDTH * BLOCK), Place.ROWS: np.zeros((ROWS, TERMS)),
+            Place.FACTORS: _zeros(2, ROOM), Place.PRODUCTS: _zeros(3, ROOM),
+            Place.MATRICES: np.zeros((5, STATES, STATES)), Place.OWN: _zeros(LANES * TERMS),
             Place.CONTROL: np.zeros((2, len(Column))), Place.CONTROL_RATES: np.zeros((2, len(Column), n)),
             Place.NORMALS: np.zeros((1, 2, 2)), Place.WAITING: np.zeros((0, 2, n)),
             Place.EXTERNAL: directions.external,

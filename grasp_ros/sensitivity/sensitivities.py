@@ -13,7 +13,7 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.impact_law import elastic_force, stored_energy
-from grasp_ros.physics.layout import Law, Of
+from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
@@ -137,18 +137,21 @@ def complete(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -
 
 def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:
     """Derivatives (m, n) of V_c at states (m, 6) with derivatives (m, 6, n); of bodies with the feedback in them."""
-    total: Array = np.zeros((len(state), rates.shape[2]))
+    gradient, explicit, weights = np.zeros_like(state), [], []
     for body in system.present:
-        place, own = COLUMN[body], changes.bodies[body]
-        x, v = state[:, place, None], state[:, place + 1, None]
+        place = COLUMN[body]
+        x, v = state[:, place], state[:, place + 1]
         mass, stiffness, _, force = system.closed_loop[body]
-        total += 2.0 * mass * v * rates[:, place + 1] + own[Of.MASS] * v * v
-        total += 2.0 * (stiffness * x - force) * rates[:, place] + own[Of.STIFFNESS] * x * x - 2.0 * own[Of.FORCE] * x
-        if stiffness > 0.0:
-            away = force / stiffness
-            total += 2.0 * away * own[Of.FORCE] - away * away * own[Of.STIFFNESS]
+        away = force / stiffness if stiffness > 0.0 else 0.0
+        gradient[:, place], gradient[:, place + 1] = 2.0 * (stiffness * x - force), 2.0 * mass * v
+        explicit += [v * v, x * x - away * away, 2.0 * (away - x)]
+        weights += [changes.bodies[body, column] for column in (Of.MASS, Of.STIFFNESS, Of.FORCE)]
     for side in system.contacts:
-        deeper, pressed = closing(side, rates)[0], np.maximum(closing(side, state)[0], 0.0)[:, None]
-        total += 2.0 * elastic_force(system.pairs[side, Law.HERTZIAN], pressed) * deeper
-        total += 2.0 * stored_energy(changes.pairs[side, Law.HERTZIAN], pressed)
-    return total
+        pressed = np.maximum(closing(side, state)[0], 0.0)
+        push = 2.0 * elastic_force(system.pairs[side, Law.HERTZIAN], pressed)
+        front, back = (side, OBJECT) if side == LEFT else (OBJECT, side)  # u is the place of one less that of the other
+        gradient[:, COLUMN[front]] += push
+        gradient[:, COLUMN[back]] -= push
+        explicit.append(2.0 * stored_energy(1.0, pressed))
+        weights.append(changes.pairs[side, Law.HERTZIAN])
+    return np.asarray(np.einsum("mi,min->mn", gradient, rates) + np.stack(explicit, axis=1) @ np.array(weights))

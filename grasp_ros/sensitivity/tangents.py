@@ -12,6 +12,7 @@ from typing import NamedTuple
 from numba import carray
 
 from grasp_ros.exact.compilation.jit import allocating, kernel
+from grasp_ros.exact.compilation.vectors import WIDTH
 from grasp_ros.exact.contact.step_order import higher_order, series_order
 from grasp_ros.exact.driver.callback import floats_at, integers_at
 from grasp_ros.exact.records import Array, Integers
@@ -21,6 +22,9 @@ from grasp_ros.physics.layout import LANES
 
 TERMS = higher_order(series_order(FINEST)) + 1  # of the longest series
 STATES = 6
+STEP = STATES * WIDTH  # numbers of one coefficient of all states, for WIDTH directions
+BLOCK = STEP * TERMS
+ROOM = LANES * (TERMS + 3)  # of eight series for `contact.multiply`
 COLUMNS = len(Column)
 
 
@@ -30,7 +34,7 @@ class Row(IntEnum):
     PACE = 0  # dt/ds itself
     SLOPE = 1  # dF/du
     DRAG = 3  # dF/du'
-    FORCE = 5  # F
+    HERTZIAN = 5  # dF/dH
     LOSS = 7  # dF/dp
 
 
@@ -49,8 +53,7 @@ class Count(IntEnum):
     NORMALS = 6  # rows of `normals`
     DRIVEN = 7  # whether inputs change at ticks
     SLIDE = 8  # mode of the object in the last segment; -1: there was none
-    STRIDE = 9  # see `Table`
-    WIDE = 10
+    COLUMNS = 9  # of tangents: the directions, and zeros up to a multiple of WIDTH
 
 
 class Number(IntEnum):
@@ -87,19 +90,17 @@ class Place(IntEnum):
     GRID = 16
     OUT = 17
     SERIES = 18
-    CLOSING = 19
-    ROWS = 20
-    MATRICES = 21
-    CONTROL = 22
-    CONTROL_RATES = 23
-    NORMALS = 24
-    WAITING = 25
-    EXTERNAL = 26
-    TOTAL = 27
-    FACTORS = 28
-    PRODUCTS = 29
-    FORCES = 30
-    OWN = 31  # where the Taylor table is copied to
+    ROWS = 19
+    MATRICES = 20
+    CONTROL = 21
+    CONTROL_RATES = 22
+    NORMALS = 23
+    WAITING = 24
+    EXTERNAL = 25
+    FACTORS = 26
+    PRODUCTS = 27
+    FORCES = 28
+    OWN = 29  # where the Taylor table is copied to
 
 
 PLACES, COUNTS = len(Place), len(Count)
@@ -118,25 +119,21 @@ class Motion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Derivatives of its state, and of the numbers that act in it."""
+    """Derivatives of its state, and of the numbers that act in it; with zeros up to `Count.COLUMNS` directions."""
 
-    x: Array  # (6, n) of the state at its begin, then at its end
-    at: Array  # (6, n) scratch: the same at some time of the segment
-    acting: Array  # (3, 4, n) of the bodies
-    law: Array  # (2, 2, n) of H and p
+    x: Array  # (6, N) of the state at its begin, then at its end
+    at: Array  # (6, N) scratch: the same at some time of the segment
+    acting: Array  # (3, 4, N) of the bodies
+    law: Array  # (2, 2, N) of H and p
 
 
 class Table(NamedTuple):
-    """Scratch: the series of a Taylor step, see `series`."""
+    """Scratch: the series of a Taylor step."""
 
-    stride: int  # columns of `series`: 6 n, padded
-    wide: int  # a quarter of those of `closing`: n, padded
-    series: Array  # (stride TERMS,) of the tangents
-    closing: Array  # (4 wide TERMS,) of u_l, u_l', u_r, u_r'
-    total: Array  # (stride + 2 wide,)
+    series: Array  # (N / WIDTH BLOCK,) of the tangents, WIDTH directions after another
     rows: Array  # (ROWS, TERMS) of the run, see `Row`
-    factors: Array  # (2, LANES TERMS)
-    products: Array  # (3, LANES TERMS) see `contact.pair_series`
+    factors: Array  # (2, ROOM)
+    products: Array  # (3, ROOM) see `contact.pair_series`
 
 
 class Inputs(NamedTuple):
@@ -159,7 +156,7 @@ class Outputs(NamedTuple):
     numbers: Array  # see `Number`
     grid: Array  # (m,) output times, s
     out: Array  # (m, 6, n)
-    forces: Array  # (m, 3, n + 1) derivatives of the constant forces that act on the bodies, and these in N
+    forces: Array  # (m, 3, 1 + n) constant forces that act on the bodies, N, and their derivatives
 
 
 class Tangents(NamedTuple):
@@ -179,22 +176,19 @@ def tangents_at(address: int) -> Tangents:
     """The tangents behind an address."""
     at = carray(integers_at(address), (PLACES,))
     counts = carray(integers_at(at[Place.COUNTS]), (COUNTS,))
-    n, outputs = counts[Count.DIRECTIONS], counts[Count.OUTPUTS]
+    n, wide, outputs = counts[Count.DIRECTIONS], counts[Count.COLUMNS], counts[Count.OUTPUTS]
     motion = Motion(
         carray(floats_at(at[Place.OWN]), (LANES * TERMS,)), carray(floats_at(at[Place.Y]), (8,)),
         carray(integers_at(at[Place.MODE]), (3,)), carray(floats_at(at[Place.CLOCK]), (3,)),
         carray(floats_at(at[Place.BODIES]), (3, 4)), carray(floats_at(at[Place.PAIRS]), (2, 2)),
         carray(floats_at(at[Place.BEFORE]), (8,)))
     rates = Rates(
-        carray(floats_at(at[Place.X]), (STATES, n)), carray(floats_at(at[Place.AT]), (STATES, n)),
-        carray(floats_at(at[Place.ACTING]), (3, 4, n)), carray(floats_at(at[Place.LAW]), (2, 2, n)))
-    stride, wide = counts[Count.STRIDE], counts[Count.WIDE]
+        carray(floats_at(at[Place.X]), (STATES, wide)), carray(floats_at(at[Place.AT]), (STATES, wide)),
+        carray(floats_at(at[Place.ACTING]), (3, 4, wide)), carray(floats_at(at[Place.LAW]), (2, 2, wide)))
     table = Table(
-        stride, wide, carray(floats_at(at[Place.SERIES]), (stride * TERMS,)),
-        carray(floats_at(at[Place.CLOSING]), (4 * wide * TERMS,)),
-        carray(floats_at(at[Place.TOTAL]), (stride + 2 * wide,)), carray(floats_at(at[Place.ROWS]), (ROWS, TERMS)),
-        carray(floats_at(at[Place.FACTORS]), (2, LANES * TERMS)),
-        carray(floats_at(at[Place.PRODUCTS]), (3, LANES * TERMS)))
+        carray(floats_at(at[Place.SERIES]), (wide // WIDTH * BLOCK,)),
+        carray(floats_at(at[Place.ROWS]), (ROWS, TERMS)), carray(floats_at(at[Place.FACTORS]), (2, ROOM)),
+        carray(floats_at(at[Place.PRODUCTS]), (3, ROOM)))
     inputs = Inputs(
         carray(floats_at(at[Place.GIVEN]), (3, 4, n)), carray(floats_at(at[Place.FORCE]), (3, n)),
         carray(floats_at(at[Place.COULOMB]), (n,)), carray(floats_at(at[Place.CONTROL]), (2, COLUMNS)),
@@ -212,7 +206,7 @@ def tangents_at(address: int) -> Tangents:
 
 @kernel
 def copy_matrix(target: Array, source: Array) -> None:
-    """Copy a matrix, without the scratch that an assignment of arrays may need."""
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
+    """Copy what two matrices have in common, without the scratch that an assignment of arrays may need."""
+    for i in range(min(target.shape[0], source.shape[0])):
+        for j in range(min(target.shape[1], source.shape[1])):
             target[i, j] = source[i, j]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
+from grasp_ros.sensitivity.sensitivities import sensitivities
 from grasp_ros.simulation import simulate
 from lab.studies.accuracy import default_scenes
 
@@ -41,3 +42,16 @@ def test_method(benchmark: Any, method: str) -> None:
 def test_elastic_over_a_long_time(benchmark: Any) -> None:
     scene = scenes.load("case_02", ["time.duration_s=200"])
     benchmark(simulate, scene, grid=np.array([200.0]))
+
+
+TWELVE = [
+    f"{side}_{number}" for side in ("left", "right") for number in (
+        "arm.mass_kg", "arm.stiffness_N_per_m", "arm.damping_Ns_per_m", "contact.hertz_N_per_m1_5",
+        "contact.dissipation_s_per_m", "feedback.position_gain_N_per_m",
+    )
+]
+
+
+@pytest.mark.parametrize("count", [1, 12])
+def test_derivatives_at_the_end(benchmark: Any, count: int) -> None:
+    benchmark(sensitivities, SCENES["case_01"], TWELVE[:count])

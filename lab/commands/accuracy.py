@@ -94,8 +94,8 @@ def add_derivatives(commands: Any) -> Parser:
     """`python -m lab derivatives`."""
     text = "derivatives through impacts beside the reference, which takes hours and resumes, random scenes, and peers"
     sub = add_command(commands, "derivatives", _derivatives, text)
-    sub.add_argument("--table", dest="tables", action="append", choices=("reference", "random", "peers"),
-                     help="one of the page's tables; repeatable (default reference and random)")
+    sub.add_argument("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
+                     help="one of the page's tables; repeatable (default all but peers)")
     sub.add_argument("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)")
     add_docs(sub)
     add_study_directory(sub)
@@ -107,8 +107,8 @@ def _derivatives(options: argparse.Namespace) -> int:
 
     docs = page_directory(options, "derivatives")
     prepare()
-    found = derivatives.tables(options.tables or [derivatives.REFERENCE, derivatives.RANDOM], options.output,
-                               options.draws)
+    wanted = options.tables or [name for name in derivatives.TABLES if name != derivatives.PEERS]
+    found = derivatives.tables(wanted, options.output, options.draws)
     print("\n\n".join(found.values()))
     if docs is not None:
         print(f"written to {derivatives.write(docs, found)}")

@@ -14,7 +14,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.sensitivities import sensitivities
 from lab.oracles.differences import VERDICTS, WRONG, judge_draw
 from lab.reference.derivative import difference
-from lab.studies import pages, peer_derivatives
+from lab.studies import derivative_cost, pages, peer_derivatives
 from lab.studies.records import Journal, scene_key
 
 P, PLACE = "left_contact.dissipation_s_per_m", "object.position_m"
@@ -27,7 +27,7 @@ PARTS = (0.25, 0.5, 1.0)  # of the horizon
 SECONDS = {"delay": 3.0}  # horizons of scenes with many ticks, which take the reference long
 ROUNDINGS = 4  # runs whose initial places are off by one
 PAGE = "derivatives.md"
-REFERENCE, RANDOM, PEERS = TABLES = "reference", "random", "peers"
+REFERENCE, RANDOM, PEERS, COST = TABLES = "reference", "random", "peers", "cost"
 
 
 class Known(NamedTuple):
@@ -107,7 +107,7 @@ def tables(names: list[str], directory: Path, draws: int) -> dict[str, str]:
     """The named tables of the page, measured now."""
     measures = {
         REFERENCE: lambda: report(run(directory)), RANDOM: lambda: random_scenes(draws),
-        PEERS: lambda: peer_derivatives.report(peer_derivatives.run()),
+        PEERS: lambda: peer_derivatives.report(peer_derivatives.run()), COST: derivative_cost.run,
     }
     return {name: measures[name]() for name in names}
 

@@ -1,0 +1,164 @@
+"""Eight numbers at once: vectors that kernels load, combine and store, each operation one or two instructions.
+
+Sums that are written out become vector instructions where the compiler finds them; a vector is one by its type. Each of
+its numbers has the bits that it would have alone.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core.cgutils import get_or_insert_function
+from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
+from numba.extending import intrinsic, lower_builtin, models, register_model
+
+from grasp_ros.exact.compilation.fma import fma
+from grasp_ros.exact.compilation.jit import COMPILED
+from grasp_ros.exact.records import Array
+
+WIDTH = 8
+LANES, INDEX = ir.VectorType(ir.DoubleType(), WIDTH), ir.IntType(32)
+ALIGNMENT = np.dtype(float).alignment  # of arrays: vectors lie anywhere in them
+
+
+class Vector(types.Type):
+    """The type of a vector in kernels."""
+
+
+VECTOR, REAL = Vector(name="vector"), types.float64
+
+
+@register_model(Vector)
+class VectorModel(models.PrimitiveModel):
+    """What a vector is for the machine: a register."""
+
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, LANES)
+
+
+def _filled(builder: Any, kind: Any, value: Any) -> Any:
+    """A vector as it is, a number as a vector of it."""
+    if kind == VECTOR:
+        return value
+    nothing = ir.Constant(LANES, ir.Undefined)
+    each = ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH)
+    return builder.shuffle_vector(builder.insert_element(nothing, value, INDEX(0)), nothing, each)
+
+
+def _emit(instruction: Callable[..., Any]) -> Any:
+    """Code of an operation on vectors, and on numbers in their place."""
+    def code(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        return instruction(builder, *(_filled(builder, *pair) for pair in zip(kinds.args, values, strict=True)))
+
+    return code
+
+
+def _of_llvm(name: str) -> Callable[..., Any]:
+    def instruction(builder: Any, *vectors: Any) -> Any:
+        kind = ir.FunctionType(LANES, [LANES] * len(vectors))
+        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64"), vectors)
+
+    return instruction
+
+
+def _place(context: Any, builder: Any, kinds: Any, array: Any, index: Any) -> Any:
+    data = context.make_array(kinds.args[0])(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), LANES.as_pointer())
+
+
+def _code_of_load(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+    return builder.load(_place(context, builder, kinds, *values), align=ALIGNMENT)
+
+
+def _code_of_store(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+    builder.store(values[2], _place(context, builder, kinds, *values[:2]), align=ALIGNMENT)
+    return context.get_dummy_value()
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def load(_: Any, array: Any, index: Any) -> Any:
+    """The eight numbers of an array (n,) from an index on."""
+    return VECTOR(array, types.intp), _code_of_load
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def store(_: Any, array: Any, index: Any, vector: Any) -> Any:
+    """Write a vector to an array (n,) from an index on."""
+    return types.void(array, types.intp, VECTOR), _code_of_store
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def spread(_: Any, number: Any) -> Any:
+    """A vector of one number."""
+    return VECTOR(REAL), _emit(lambda _, vector: vector)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def add_product(_: Any, total: Any, vector: Any, factor: Any) -> Any:
+    """A total and the product of a vector with another one or a number, with one rounding."""
+    fused = _of_llvm("fma")
+    return VECTOR(total, vector, factor), _emit(lambda builder, c, a, b: fused(builder, a, b, c))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def larger(_: Any, first: Any, second: Any) -> Any:
+    """The larger of two sizes, number by number."""
+    size, most = _of_llvm("fabs"), _of_llvm("maxnum")
+    return VECTOR(first, second), _emit(lambda builder, a, b: most(builder, size(builder, a), size(builder, b)))
+
+
+def _code_of_highest(_: Any, builder: Any, __: Any, values: Any) -> Any:
+    found, *others = (builder.extract_element(values[0], INDEX(i)) for i in range(WIDTH))
+    for other in others:
+        found = builder.select(builder.fcmp_ordered(">", other, found), other, found)
+    return found
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def highest(_: Any, vector: Any) -> Any:
+    """The highest number of a vector."""
+    return REAL(vector), _code_of_highest
+
+
+for operation, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
+
+    @infer_global(operation)
+    class Kinds(ConcreteTemplate):
+        """What the operator takes beside numbers."""
+
+        cases = tuple(signature(VECTOR, *pair) for pair in ((VECTOR, VECTOR), (VECTOR, REAL), (REAL, VECTOR)))
+
+    for case in Kinds.cases:
+        lower_builtin(operation, *case.args)(_emit(getattr(ir.IRBuilder, name)))
+
+
+if not COMPILED:
+
+    def load(array: Array, index: int) -> Array:
+        """The eight numbers of an array (n,) from an index on."""
+        return array[index : index + WIDTH].copy()
+
+    def store(array: Array, index: int, vector: Array) -> None:
+        """Write a vector to an array (n,) from an index on."""
+        array[index : index + WIDTH] = vector
+
+    def spread(number: float) -> Array:
+        """A vector of one number."""
+        return np.full(WIDTH, number)
+
+    def add_product(total: Array, vector: Array, factor: float | Array) -> Array:
+        """A total and the product of a vector with another one or a number, with one rounding."""
+        return np.array([*map(fma, vector, np.broadcast_to(factor, WIDTH), total)])
+
+    def larger(first: Array, second: Array) -> Array:
+        """The larger of two sizes, number by number."""
+        return np.fmax(abs(first), abs(second))
+
+    def highest(vector: Array) -> float:
+        """The highest number of a vector."""
+        return float(np.fmax.reduce(vector))

@@ -1,0 +1,60 @@
+"""What derivatives cost: runs of case 1 with them, as multiples of the same run without."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.exact.integrator import Integrator
+from grasp_ros.physics.model import Array
+from grasp_ros.scene import Scene
+from grasp_ros.sensitivity.directions import directions
+from grasp_ros.sensitivity.sensitivities import carry, complete, sensitivities
+from grasp_ros.simulation.simulate import GRID_POINTS, simulate
+from lab.studies import pages
+
+NUMBERS = [
+    f"{side}_{number}" for side in ("left", "right") for number in (
+        "arm.mass_kg", "arm.stiffness_N_per_m", "arm.damping_Ns_per_m", "contact.hertz_N_per_m1_5",
+        "contact.dissipation_s_per_m", "feedback.position_gain_N_per_m",
+    )
+]
+ROUNDS = 80
+
+
+def run() -> str:
+    """A table of Markdown: the quickest of ROUNDS, in turn."""
+    scene, rows = scenes.load("case_01"), []
+    for times in (np.array([scene.duration]), np.linspace(0.0, scene.duration, GRID_POINTS)):
+        without, *others = quickest([
+            partial(simulate, scene, grid=times),
+            *(partial(what, scene, NUMBERS[:count], times)
+              for what in (states_alone, sensitivities) for count in (1, len(NUMBERS))),
+        ])
+        rows.append((f"{len(times)}", f"{1e3 * without:.2f}", *(f"{seconds / without:.1f}" for seconds in others)))
+    heads = ("output times", "`simulate`, ms", "states by 1 number", "by 12", "`sensitivities` by 1", "by 12")
+    return pages.table(heads, rows)
+
+
+def states_alone(scene: Scene, keys: Sequence[str], times: Array) -> Array:
+    """Derivatives (m, 6, n) of the states alone: one run."""
+    integrator = Integrator(scene.system, continuous=True)
+    carrier = carry(scene, integrator, directions(scene, keys, False), times, False)
+    complete(scene, integrator, False, times)
+    carrier.finish(scene.duration)
+    return carrier.out
+
+
+def quickest(calls: Sequence[Callable[[], object]]) -> list[float]:
+    """Least time of each call in s, all of them in turn."""
+    best = [np.inf] * len(calls)
+    for _ in range(ROUNDS):
+        for place, call in enumerate(calls):
+            begin = time.perf_counter()
+            call()
+            best[place] = min(best[place], time.perf_counter() - begin)
+    return best
