@@ -103,7 +103,6 @@ def test_nobody_makes_a_scene_around_the_checks() -> None:
         "scene/scene.py"
     ]
     assert [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.rglob("*.py")) if "replace" in called(path)] == [
-        "sensitivity/directions.py",  # a difference of systems, whose numbers need not be in their ranges
         "simulation/lyapunov.py",  # of a system
     ]
 
