@@ -77,7 +77,7 @@ def _value(text: str) -> tuple[str, float]:
 def _data(found: Fit) -> dict[str, Any]:
     """The same as data; the scene with the estimates as YAML."""
     return {
-        "source": found.source, "samples": len(found.t), "scene": found.scene.to_yaml(),
+        "source": found.source, "acting": found.acting, "samples": len(found.t), "scene": found.scene.to_yaml(),
         "numbers": {key: {"estimate": value, "low": low, "high": high} for key, value, low, high
                     in zip(found.keys, found.estimates, found.low, found.high, strict=True)},
         "not_identifiable": found.not_identifiable, "covariance": found.covariance, "correlation": found.correlation,

@@ -74,7 +74,7 @@ def _result(problem: Problem, y: Array, against: Mapping[str, float]) -> Fit:
     low, high = ([float(number.at(end)) for number, end in zip(problem.numbers, ends.tolist(), strict=True)]
                  for ends in (y - sight.reach, y + sight.reach))
     return Fit(
-        problem.scene_at(y), data.name, tuple(estimates), np.array([*estimates.values()]), np.array(low),
+        problem.scene_at(y), data.name, data.acting, tuple(estimates), np.array([*estimates.values()]), np.array(low),
         np.array(high), sight.covariance * np.outer(scale, scale),
         tuple(tuple(problem.numbers[place].key for place in places) for places in sight.unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),

@@ -44,6 +44,13 @@ class Measured(NamedTuple):
     foreign: str = ""  # why the controllers of the scene do not tell what acted; empty if they do
 
     @property
+    def acting(self) -> str:
+        """What acts on the bodies, in words."""
+        if self.inputs is not None:
+            return "the inputs of the data"
+        return "commands that the scene holds" if self.sampled else "the continuous feedback of the scene"
+
+    @property
     def channels(self) -> list[int]:
         """Columns of the state that are measured."""
         return [place for place in range(6) if not np.isnan(self.state[:, place]).any()]

@@ -57,6 +57,8 @@ class Fit(Frozen):
         With the estimates.
     source : str
         What the data came from.
+    acting : str
+        What acted on the bodies: inputs of the data, or what the scene has in their place.
     keys : tuple of str
     estimates, low, high : arrays (n,)
         With 95 % intervals; infinite, or from 0, for what is not identifiable.
@@ -78,6 +80,7 @@ class Fit(Frozen):
 
     scene: Scene
     source: str
+    acting: str
     keys: tuple[str, ...]
     estimates: Array
     low: Array
@@ -171,7 +174,7 @@ def whiteness(residuals: Array) -> float:
 def _lines(found: Fit) -> Iterator[str]:
     """Estimates, what is not identifiable, correlations, noise, residuals, and tests."""
     width = max(map(len, found.keys))
-    yield f"{found.source}: {len(found.t)} samples, {found.t[0]:g} to {found.t[-1]:g} s"
+    yield f"{found.source}: {len(found.t)} samples, {found.t[0]:g} to {found.t[-1]:g} s, under {found.acting}"
     yield f"{'':<{width}}  {'estimate':>13}  95 % interval"
     lost = {key for keys in found.not_identifiable for key in keys}
     for key, value, low, high in zip(found.keys, found.estimates, found.low, found.high, strict=True):

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from grasp_ros.scene import Scene
 from lab.paper.cases import Cases, Start, text_of
-from lab.paper.claims import Claim
+from lab.paper.claims import Claim, Part
 from lab.paper.conclusions import conclusions
 from lab.paper.measures import Measures, measure, remember
 from lab.paper.observations import observations
 from lab.paper.running_text import running_text
-from lab.paper.statement import Statement
+from lab.paper.statement import Judged, Statement
 
 
 def statements() -> dict[str, Statement]:
@@ -25,23 +25,29 @@ Wish = tuple[Scene, bool]
 
 
 class Task(NamedTuple):
-    """What a process needs to judge one statement."""
+    """What a process needs to judge one part, which stands in one statement or in several."""
 
-    key: str
+    place: int  # among `parts`
     cases: Cases
     starts: Sequence[Start]
     known: dict[Wanted, Measures]
 
 
-def wanted_of(cases: Cases, starts: Sequence[Start], keys: Iterable[str]) -> dict[str, dict[Wanted, Wish]]:
-    """What each statement compares; what settles is measured until then everywhere, and only once."""
-    known = statements()
-    found = {key: list(known[key].scenes(cases, starts)) for key in keys}
-    settling = {text_of(scene) for wishes in found.values() for scene, settle in wishes if settle}
-    return {
-        key: {(text := text_of(scene), text in settling): (scene, text in settling) for scene, _ in wishes}
-        for key, wishes in found.items()
-    }
+def parts() -> list[Judged]:
+    """The parts of all statements, each once."""
+    found: list[Judged] = []
+    for part in (part for statement in statements().values() for part in statement.parts):
+        if part not in found:
+            found.append(part)
+    return found
+
+
+def wanted_of(cases: Cases, starts: Sequence[Start]) -> list[dict[Wanted, Wish]]:
+    """What each part compares; what settles is measured until then everywhere, and only once."""
+    found = [list(part.scenes(cases, starts)) for part in parts()]
+    settling = {text_of(scene) for wishes in found for scene, settle in wishes if settle}
+    return [{(text := text_of(scene), text in settling): (scene, text in settling) for scene, _ in wishes}
+            for wishes in found]
 
 
 def measured(wish: Wish) -> tuple[Wanted, Measures]:
@@ -50,17 +56,23 @@ def measured(wish: Wish) -> tuple[Wanted, Measures]:
     return (text_of(scene), settle), measure(scene, settle)
 
 
-def judged(task: Task) -> Claim:
-    """The judgement of one statement; for a process."""
+def judged(task: Task) -> tuple[int, Part]:
+    """The place of a part, and how it is judged; for a process."""
     remember(task.known)
-    return statements()[task.key].judge(task.cases, task.starts)
+    return task.place, parts()[task.place].judge(task.cases, task.starts)
 
 
 def tasks(
-    cases: Cases, starts: Sequence[Start], wanted: Mapping[str, Iterable[Wanted]], known: Mapping[Wanted, Measures]
+    cases: Cases, starts: Sequence[Start], wanted: Sequence[Iterable[Wanted]], known: Mapping[Wanted, Measures]
 ) -> list[Task]:
-    """A task for each statement, with the measures that it asks for."""
-    return [Task(key, cases, starts, {each: known[each] for each in own}) for key, own in wanted.items()]
+    """A task for each part, with the measures that it asks for."""
+    return [Task(place, cases, starts, {each: known[each] for each in own}) for place, own in enumerate(wanted)]
+
+
+def claims_of(found: Mapping[int, Part]) -> list[Claim]:
+    """The statements, put together of their parts."""
+    order = parts()
+    return [each.claim([found[order.index(part)] for part in each.parts]) for each in statements().values()]
 
 
 def judge(cases: Cases, starts: Sequence[Start], keys: Iterable[str]) -> dict[str, Claim]:

@@ -9,12 +9,16 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
+from grasp_ros.observe.sight import Wanted
+from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import Transition
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.quantities import HORIZONS, SETTLED, settled_distance, settling_times
+from grasp_ros.simulation.outcomes import Runs, find
+from grasp_ros.simulation.quantities import HORIZONS, SETTLED, settled_distance, settling_times, watch_again
+from grasp_ros.simulation.trajectory import Trajectory
 from lab.paper.cases import OFFSETS, Start, columns_of, start_of, started, text_of, value_of
 
 STRETCH = 20.0  # s, the paper's time axis
@@ -103,16 +107,24 @@ def _measure(scene: Scene, settle: bool) -> Measures:
         raise RuntimeError(f"{scene.name}: {run.stop}")
     one, two, five = (
         float(settling_times(run, part, HORIZONS).max()) if settle else np.nan for part in BOUNDS)
-    states, V_c = run.state, run.energy.V_c
+    states, V_c = run.state, energy(scene.system, run.state[[0, -1]]).V_c
     farthest = settled_distance(scene, 1.0)
     turns = sum(np.count_nonzero(np.diff(np.sign(states[1:, column]))) for column in (1, 5))
     return Measures(
         settling=two, settling_1=one, settling_5=five, swings=two / _period(scene), rest=float(V_c[-1] / V_c[0]),
         size=float(np.sqrt(np.mean(states[:, [0, 4]] ** 2))) / farthest, frequency=turns / 4.0 / STRETCH,
-        input=over(scene, [start_of(scene)], "input")[0],
+        input=_largest_input(run),
         contacts=int(np.count_nonzero(run.event_table[:, 2] == Transition.TOUCH)),
         lopsided=float(np.abs(states[:, 0] + states[:, 4]).max()) / farthest,
     )
+
+
+def _largest_input(run: Trajectory) -> float:
+    integrator, watcher = watch_again(run, Wanted.INPUTS)
+    integrator.advance(run.scene.duration)
+    watcher.finish()
+    runs = Runs(watcher.seen[None], run.state, np.zeros((1, 2)), np.zeros(1))
+    return max(float(peak.read(runs)[0]) for peak in find(["peak_input"]))
 
 
 def _period(scene: Scene) -> float:

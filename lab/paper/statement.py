@@ -30,9 +30,8 @@ class Statement(NamedTuple):
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Claim:
         """Judge all parts."""
-        return Claim(self.key, self.where, self.statement, [part.judge(cases, starts) for part in self.parts])
+        return self.claim([part.judge(cases, starts) for part in self.parts])
 
-    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
-        """Scenes that its parts will measure, and whether until they settle."""
-        for part in self.parts:
-            yield from part.scenes(cases, starts)
+    def claim(self, parts: Sequence[Part]) -> Claim:
+        """The judgement, put together of that of its parts."""
+        return Claim(self.key, self.where, self.statement, parts)

@@ -34,7 +34,7 @@ from lab.paper.compare import Comparison, Variant
 from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
-from lab.paper.judgement import Wanted, judged, measured, statements, tasks, wanted_of
+from lab.paper.judgement import Wanted, claims_of, judged, measured, statements, tasks, wanted_of
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import SHORT, Measures, remember
 from lab.paper.page import Image, Picture, Report, agreement, summary
@@ -62,8 +62,8 @@ def report(graph: bool, starts: int) -> Report:
         Random starts.
     """
     cases, drawn = load_cases(), random_starts(starts)
-    asked = wanted_of(cases, drawn, statements())
-    wanted = list({key: wish for own in asked.values() for key, wish in own.items()}.values())
+    asked = wanted_of(cases, drawn)
+    wanted = list({key: wish for own in asked for key, wish in own.items()}.values())
     context = multiprocessing.get_context("spawn")
     with context.Pool(os.cpu_count() or 1) as pool, tqdm(
         total=len(wanted), desc="random starts and sweeps", file=sys.stderr
@@ -73,7 +73,7 @@ def report(graph: bool, starts: int) -> Report:
             known[each] = found
             bar.update()
         remember(known)
-        jobs = [*_jobs(cases, drawn), *(("claim", judged, (task,)) for task in tasks(cases, drawn, asked, known))]
+        jobs = [*_jobs(cases, drawn), *(("part", judged, (task,)) for task in tasks(cases, drawn, asked, known))]
         bar.reset(len(jobs))
         bar.set_description("figures, verdicts, what the paper lacks")
         done: dict[str, list[Any]] = {}
@@ -219,8 +219,7 @@ def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]
 def _put_together(
     cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]], graph: list[Any]
 ) -> Report:
-    order = list(statements())
-    claims = sorted(done["claim"], key=lambda claim: order.index(claim.key))
+    claims = claims_of(dict(done["part"]))
     found = {key: value for key, value, _ in done["found"]}
     images = {**dict(done["image"]), **{key: each for key, _, each in done["found"]}}
     images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, claims)))

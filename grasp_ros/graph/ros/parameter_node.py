@@ -13,10 +13,11 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from grasp_ros.graph.parameters import PARAMETERS
+from grasp_ros.graph.parameters import FREE, PARAMETERS
 from grasp_ros.graph.ros import messages
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
+from grasp_ros.scene.suggestion import allowed
 
 RCLError = rclpy_implementation.RCLError
 
@@ -77,7 +78,9 @@ class ParameterNode(Node):
                     given[name] = found
         unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
         if unknown:  # rclpy itself would not say a word
-            raise Refused(f"{', '.join(unknown)}: no such parameter; allowed: {', '.join(sorted(self._parameters))}")
+            hint = allowed(unknown[0], sorted(self._parameters))
+            hint = "allowed: with free_running:=true" if unknown[0] in FREE else hint
+            raise Refused(f"{', '.join(unknown)}: no such parameter; {hint}")
         return given
 
     def forget_scene(self) -> None:
