@@ -33,10 +33,10 @@ class Task(NamedTuple):
     known: dict[Wanted, Measures]
 
 
-def parts() -> list[Judged]:
-    """The parts of all statements, each once."""
+def parts(known: Mapping[str, Statement]) -> list[Judged]:
+    """The parts of all statements, each once; in every process in the same order."""
     found: list[Judged] = []
-    for part in (part for statement in statements().values() for part in statement.parts):
+    for part in (part for statement in known.values() for part in statement.parts):
         if part not in found:
             found.append(part)
     return found
@@ -44,7 +44,7 @@ def parts() -> list[Judged]:
 
 def wanted_of(cases: Cases, starts: Sequence[Start]) -> list[dict[Wanted, Wish]]:
     """What each part compares; what settles is measured until then everywhere, and only once."""
-    found = [list(part.scenes(cases, starts)) for part in parts()]
+    found = [list(part.scenes(cases, starts)) for part in parts(statements())]
     settling = {text_of(scene) for wishes in found for scene, settle in wishes if settle}
     return [{(text := text_of(scene), text in settling): (scene, text in settling) for scene, _ in wishes}
             for wishes in found]
@@ -59,7 +59,7 @@ def measured(wish: Wish) -> tuple[Wanted, Measures]:
 def judged(task: Task) -> tuple[int, Part]:
     """The place of a part, and how it is judged; for a process."""
     remember(task.known)
-    return task.place, parts()[task.place].judge(task.cases, task.starts)
+    return task.place, parts(statements())[task.place].judge(task.cases, task.starts)
 
 
 def tasks(
@@ -71,8 +71,9 @@ def tasks(
 
 def claims_of(found: Mapping[int, Part]) -> list[Claim]:
     """The statements, put together of their parts."""
-    order = parts()
-    return [each.claim([found[order.index(part)] for part in each.parts]) for each in statements().values()]
+    known = statements()
+    order = parts(known)
+    return [each.claim([found[order.index(part)] for part in each.parts]) for each in known.values()]
 
 
 def judge(cases: Cases, starts: Sequence[Start], keys: Iterable[str]) -> dict[str, Claim]:
