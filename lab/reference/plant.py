@@ -6,7 +6,6 @@ that K = 0, C = 0 and critical damping are no special cases.
 
 from __future__ import annotations
 
-import math
 from decimal import Decimal
 from typing import Any, NamedTuple
 
@@ -33,7 +32,7 @@ def number(value: Real, decimal: bool = False) -> Real:
 
 def propagator(trace: Real, det: Real, t: Real) -> tuple[tuple[Real, Real], tuple[Real, Real]]:
     """exp(A t) and its integral over [0, t] as a + b A, for A of given trace and determinant: A^2 = trace A - det."""
-    doublings = max(0, math.ceil(gmpy2.log2(max(abs(trace), gmpy2.sqrt(det)) * t + FEW)) + 8)
+    doublings = max(0, int(gmpy2.ceil(gmpy2.log2(max(abs(trace), gmpy2.sqrt(det)) * t + FEW))) + 8)
     t = t / mpfr(2) ** doublings
     a, b = mpfr(1), mpfr(0)  # (A t)^k / k!
     flow, integral = (a, b), (t, b)
