@@ -10,13 +10,14 @@ import ctypes
 import json
 import os
 import signal
+import socket
 import sys
 import threading
 import time
 from contextlib import suppress
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-GRACE_SECONDS = 10.0  # to end cleanly after the process that started this one has ended
+GRACE_SECONDS = 10.0  # to end cleanly after a signal, or after the process that started this one has ended
 MOST_WORDS = 4000  # characters
 PR_SET_PDEATHSIG = 1  # of prctl(2)
 _parent: list[int] = []  # file descriptor of the way to the process that started this one, if it is one of ours
@@ -30,6 +31,36 @@ def note_signals(received: list[int]) -> None:
     for number in STOP_SIGNALS:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, lambda which, _: received.append(which))
+
+
+def end_late_by_force(name: str) -> None:
+    """Let a process that is still there GRACE_SECONDS after a noted signal end by force.
+
+    A law that does not return, or a call of DDS that waits for a lock, would keep it for ever.
+
+    Parameters
+    ----------
+    name : str
+        Of the node.
+    """
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)  # written to at once, whatever the process does
+
+    def watch() -> None:
+        with reader, writer:
+            reader.recv(1)
+            _end_late(name)
+
+    threading.Thread(target=watch, name="signals", daemon=True).start()
+
+
+def _end_late(name: str) -> None:
+    threading.Event().wait(GRACE_SECONDS)
+    with suppress(OSError):  # nobody may read it
+        print(f"{name}: has not ended {GRACE_SECONDS:g} s after it was asked to: ended by force", file=sys.stderr,
+              flush=True)
+    os._exit(1)
 
 
 def raise_on_signals() -> None:
@@ -78,7 +109,6 @@ def end_with_parent(received: list[int], name: str) -> None:
         with suppress(OSError):  # nobody may read it
             print(f"{name}: what started this process has ended; it ends, too", file=sys.stderr)
         received.append(signal.SIGHUP)
-        threading.Event().wait(GRACE_SECONDS)
-        os._exit(1)
+        _end_late(name)
 
     threading.Thread(target=watch, name="parent", daemon=True).start()

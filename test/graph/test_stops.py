@@ -97,6 +97,34 @@ sys.exit(start.main("plant"))
 """
 
 
+STUCK = """
+import ctypes
+from grasp_ros.graph import stopping
+
+stopping.GRACE_SECONDS = 0.5
+stopping.note_signals([])
+stopping.end_late_by_force("left_controller")
+print("there", flush=True)
+{}
+"""
+HELD = {
+    "a law that does not return": "while True:\n    pass",
+    "a lock that is never free": "lock = ctypes.create_string_buffer(256)\n"
+                                 "while True:\n    ctypes.CDLL(None).pthread_mutex_lock(lock)",
+}
+
+
+@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signal.Signals) -> None:
+    process = launch(sys.executable, "-c", STUCK.format(HELD[held]), stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout.readline() == "there\n"
+    process.send_signal(number)
+    _, err = process.communicate(timeout=DEADLINE)
+    assert err == "left_controller: has not ended 0.5 s after it was asked to: ended by force\n"
+    assert process.returncode == 1
+
+
 def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(launch: Any, tmp_path: Path) -> None:
     """A plant that pushes its arms harder than the commands say."""
     options = ["--ros-args", "-p", "wait_for_monitor:=true"]

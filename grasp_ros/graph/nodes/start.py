@@ -15,7 +15,7 @@ from importlib import import_module
 from grasp_ros.graph.host import check_reach, this_host
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.shared_memory import remove_left
-from grasp_ros.graph.stopping import STOP_SIGNALS, end_with_parent, note_signals
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
 
 
@@ -37,6 +37,7 @@ def main(name: str, child: bool = False) -> int:
         return 2
     received: list[int] = []
     note_signals(received)
+    end_late_by_force(name)
     gc.disable()  # until the nodes are there: imports make little garbage and much to look through
     if child:
         end_with_parent(received, name)
