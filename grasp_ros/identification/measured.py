@@ -48,7 +48,7 @@ class Measured(NamedTuple):
         """What acts on the bodies, in words."""
         if self.inputs is not None:
             return "the inputs of the data"
-        return "commands that the scene holds" if self.sampled else "the continuous feedback of the scene"
+        return "the held commands of the scene" if self.sampled else "the continuous feedback of the scene"
 
     @property
     def channels(self) -> list[int]:

@@ -18,7 +18,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, Grasp
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects import BY_SECTION, EFFECTS, build
+from grasp_ros.scene.effects import BY_SECTION, build, named
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import read_text, reading
@@ -63,7 +63,7 @@ class Scene(Frozen):
     @property
     def effects(self) -> list[Effect]:
         """What the scene names, in the order of the registry."""
-        return [effect for effect in EFFECTS if effect.section in self.values]
+        return named(self.values)
 
     @cached_property
     def system(self) -> System:

@@ -21,7 +21,6 @@ from grasp_ros.sensitivity.tangents import BLOCK, STATES, STEP, Motion, Rates, R
 MOST_HALVINGS = 200
 NEGLECTED = 128.0 * EPS
 FIRST = 6  # terms of a series, one of which is about its size
-BODY_OF = (LEFT, LEFT, OBJECT, OBJECT, RIGHT, RIGHT)  # by lane of a state
 
 
 @kernel
@@ -195,17 +194,18 @@ def ends_within(series: Array, first: int, n: int, s: float) -> bool:
 
 
 @kernel
-def exact_length(motion: Motion, table: Table, blocks: int, n: int, s: float) -> float:
+def exact_length(motion: Motion, table: Table, n: int, s: float) -> float:
     """The largest s 2^-k at which the last terms of all tangents are below NEGLECTED of their first ones.
 
     The step of the run is as long as its own motion allows, which may have died down where its tangents have not.
     """
-    for block in range(blocks):
-        for lane in range(STATES):
-            if touches(motion, BODY_OF[lane]):
-                halvings = 0
-                while halvings < MOST_HALVINGS and not ends_within(table.series, BLOCK * block + WIDTH * lane, n, s):
-                    s, halvings = 0.5 * s, halvings + 1
+    for block in range(table.series.shape[0] // BLOCK):
+        for body in (LEFT, OBJECT, RIGHT):
+            first, halvings = BLOCK * block + WIDTH * (velocity_lane(body) - 1), 0
+            while touches(motion, body) and halvings < MOST_HALVINGS and not (
+                ends_within(table.series, first, n, s) and ends_within(table.series, first + WIDTH, n, s)
+            ):
+                s, halvings = 0.5 * s, halvings + 1
     return s
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from grasp_ros.physics.impact_law import damping_factor, elastic_force, elastic_slope
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Entry, Law, Of, Transition
-from grasp_ros.physics.model import Array
+from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -34,10 +34,8 @@ class _Events:
 
     def _impact(self, side: int) -> tuple[Array, Array, Array, Array]:
         """u, u', the impact force of a pair, and 1 + p u'; no force where condition (10) does not hold."""
-        hertzian, loss = self._pairs[side]
-        u, rate = closing(side, self._moments.state)
-        factor, pressed = damping_factor(loss, rate), np.maximum(u, 0.0)
-        return pressed, rate, np.maximum(factor, 0.0) * elastic_force(hertzian, pressed), factor
+        contact, (u, rate) = Contact(*self._pairs[side]), closing(side, self._moments.state)
+        return np.maximum(u, 0.0), rate, impact_force(contact, u, rate), damping_factor(contact.dissipation, rate)
 
     def acceleration(self, body: int) -> Array:
         """Acceleration (e,) of a body, m/s^2."""
@@ -106,8 +104,8 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     moves = (time > 0.0) & ~((kind == Transition.SLIP) & _are_ticks(scene, sampled, time))
     for body, which in np.unique(events[moves][:, [Entry.BODY, Entry.KIND]].astype(int), axis=0).tolist():
         rows = moves & (side == body) & (kind == which)
-        found_here = _Events(bodies, system.pairs, changes, Moments(*(part[rows] for part in moments)))
-        change, rate = FUNCTIONS[Transition(which)](found_here, body)
+        these = _Events(bodies, system.pairs, changes, Moments(*(part[rows] for part in moments)))
+        change, rate = FUNCTIONS[Transition(which)](these, body)
         with np.errstate(divide="ignore", invalid="ignore"):
             found[rows] = -change / rate[:, None]
     return found

@@ -14,7 +14,6 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import allocating, kernel
-from grasp_ros.exact.compilation.vectors import WIDTH
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.records import Array
@@ -217,7 +216,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         motion.c[place] = t.source[place]
     while True:
         expand_tangents(motion, rates, t.table, n)
-        part = exact_length(motion, t.table, rates.x.shape[1] // WIDTH, n, left)
+        part = exact_length(motion, t.table, n, left)
         ends = part == left
         reached = span if ends else time_at(motion.c, n, part)[0]
         while is_due(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):

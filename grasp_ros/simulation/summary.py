@@ -15,7 +15,7 @@ from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.losses import CAUSES, Losses, losses
-from grasp_ros.simulation.outcomes import Runs, find, wanted_by
+from grasp_ros.simulation.outcomes import find, of_one, wanted_by
 from grasp_ros.simulation.quantities import HORIZONS, by_output_times, settling_from, settling_times, watch_again
 from grasp_ros.simulation.repeat import UNLIMITED
 from grasp_ros.simulation.trajectory import Trajectory
@@ -24,7 +24,6 @@ MOTION, OUTPUTS = "motion", "output times"  # what a number is of
 ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
 PEAKS = find(("peak_input", "peak_impact"))  # in the order of FORCES
-NONE = np.zeros((1, 2))
 
 
 class _Observed(NamedTuple):
@@ -85,8 +84,8 @@ def _of_the_motion(run: Trajectory) -> _Observed:
     integrator.advance(run.scene.duration)
     watcher.finish()
     seen = watcher.seen.copy()
-    largest = [float(peak.read(Runs(seen[None], run.state, NONE, NONE))[0]) for peak in PEAKS]
-    return _Observed(settling_from(run, integrator, watcher), Losses(*seen[CAUSES]), MOTION, largest)
+    settled, largest = settling_from(run, integrator, watcher), of_one(PEAKS, seen, run.state)
+    return _Observed(settled, Losses(*seen[CAUSES]), MOTION, largest)
 
 
 def _by_output_times(run: Trajectory) -> _Observed:

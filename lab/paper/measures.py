@@ -16,7 +16,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.outcomes import Runs, find
+from grasp_ros.simulation.outcomes import find, of_one
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED, settled_distance, settling_times, watch_again
 from grasp_ros.simulation.trajectory import Trajectory
 from lab.paper.cases import OFFSETS, Start, columns_of, start_of, started, text_of, value_of
@@ -123,8 +123,7 @@ def _largest_input(run: Trajectory) -> float:
     integrator, watcher = watch_again(run, Wanted.INPUTS)
     integrator.advance(run.scene.duration)
     watcher.finish()
-    runs = Runs(watcher.seen[None], run.state, np.zeros((1, 2)), np.zeros(1))
-    return max(float(peak.read(runs)[0]) for peak in find(["peak_input"]))
+    return max(of_one(find(["peak_input"]), watcher.seen, run.state))
 
 
 def _period(scene: Scene) -> float:

@@ -98,8 +98,7 @@ def test_the_example_of_the_documentation_works(monkeypatch: pytest.MonkeyPatch)
     for effect in namespace["EFFECTS"]:
         monkeypatch.setitem(BY_SECTION, effect.section, effect)
     others = [effect for effect in EFFECTS if not effect.section.endswith("_rail")]  # a reader may have added it
-    for user in ("grasp_ros.scene.effects", "grasp_ros.scene.scene"):
-        monkeypatch.setattr(f"{user}.EFFECTS", (*others, *namespace["EFFECTS"]))
+    monkeypatch.setattr("grasp_ros.scene.effects.EFFECTS", (*others, *namespace["EFFECTS"]))
     rail = scenes.load("case_01", ["left_rail.drag_Ns_per_m=0.3", "time.duration_s=5.0"])
     assert rail.system.bodies[LEFT].tolist() == [1.0, 10.0, 0.5, 0.0]
     same = scenes.load("case_01", ["left_arm.damping_Ns_per_m=0.5", "time.duration_s=5.0"])

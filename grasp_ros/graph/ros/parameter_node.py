@@ -78,8 +78,9 @@ class ParameterNode(Node):
                     given[name] = found
         unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
         if unknown:  # rclpy itself would not say a word
-            hint = allowed(unknown[0], sorted(self._parameters))
-            hint = "allowed: with free_running:=true" if unknown[0] in FREE else hint
+            name, free = unknown[0], self._parameters.get("free_running")
+            missed = free is not None and not free.value and name in FREE
+            hint = "allowed: with free_running:=true" if missed else allowed(name, sorted(self._parameters))
             raise Refused(f"{', '.join(unknown)}: no such parameter; {hint}")
         return given
 

@@ -3,11 +3,12 @@
 The order is that of the topics in a bag and that in which effects build the system.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import bodies, contact, feedback, force, friction, loop, saturation, sensing, tilt, time
+from grasp_ros.scene.effects.base import Effect
 
 EFFECTS = (
     *time.EFFECTS,
@@ -24,12 +25,16 @@ EFFECTS = (
 BY_SECTION = {effect.section: effect for effect in EFFECTS}
 
 
+def named(sections: Collection[str]) -> list[Effect]:
+    """The effects of some sections, in the order of the registry."""
+    return [effect for effect in EFFECTS if effect.section in sections]
+
+
 def build(values: Mapping[str, Mapping[str, Any]]) -> System:
     """What the numbers of a scene describe, as arrays; they need not be in their ranges."""
     system = System()
-    for effect in EFFECTS:
-        if effect.section in values:
-            effect.build(values, system)
+    for effect in named(values):
+        effect.build(values, system)
     for array in (system.bodies, system.pairs, system.state):
         array.setflags(write=False)
     return system
