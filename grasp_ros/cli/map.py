@@ -11,10 +11,11 @@ import numpy as np
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, load_scene, prepare, whole
 from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import bar, note, show
-from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
+from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
+from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation.chunk import STATUSES, Setup
-from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.outcomes import GROUPS, find
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED
 
 PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
@@ -83,6 +84,11 @@ def _run(options: argparse.Namespace) -> int:
         run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
     data = store.read(options.output)
     show(options, report(data), data_of(data))
+    done = data["status"].values == DONE
+    for outcome in find(outcomes):
+        if outcome.wanted & Wanted.SETTLING and np.isnan(data[outcome.name].values[done]).any():
+            note(f"{outcome.name} is nan where V_c proves nothing; {scene.certificate_in_words(setup.sampled)};"
+                 " --outcome last_outside says how long a mass was outside")
     for column in store.columns_of(data):
         path = options.output.with_name(f"{options.output.stem}_{column}.png")
         figures.draw(data, plan, column, path)
@@ -92,10 +98,12 @@ def _run(options: argparse.Namespace) -> int:
 
 
 HEADS = {"least": 0.0, "5 %": 0.05, "median": 0.5, "95 %": 0.95, "largest": 1.0}
+COUNTS = {"inf": np.isinf, "nan": np.isnan}
+DONE = STATUSES.index(Status.DONE.name)
 
 
 def data_of(data: Any) -> dict[str, Any]:
-    """Of each outcome its quantiles, unit and number of infinite values; and how the runs ended."""
+    """Of each outcome its quantiles, unit and numbers of infinite values and of nan; and how the runs ended."""
     from grasp_ros.maps import store
 
     found: dict[str, Any] = {}
@@ -104,7 +112,7 @@ def data_of(data: Any) -> dict[str, Any]:
         finite = values[np.isfinite(values)]
         cells = np.quantile(finite, [*HEADS.values()]).tolist() if len(finite) else [np.nan] * len(HEADS)
         found[name] = {"units": data[name].attrs["units"], **dict(zip(HEADS, cells, strict=True)),
-                       "inf": int(np.isinf(values).sum())}
+                       **{head: int(count(values).sum()) for head, count in COUNTS.items()}}
     codes, counts = np.unique(data["status"].values, return_counts=True)
     found["status"] = {STATUSES[code] if code >= 0 else "not done": int(count)
                        for code, count in zip(codes, counts, strict=True)}
@@ -115,9 +123,9 @@ def report(data: Any) -> str:
     """A line for each outcome, and how the runs ended."""
     found = data_of(data)
     width = max(map(len, found))
-    lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in (*HEADS, "inf"))]
+    lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in (*HEADS, *COUNTS))]
     for name, row in found.items():
         if name != "status":
-            lines.append(f"{name:<{width}}" + "".join(f"{row[head]:12.6g}" for head in HEADS) + f"{row['inf']:12d}")
+            lines.append(f"{name:<{width}}" + "".join(f"{row[head]:12.6g}" for head in (*HEADS, *COUNTS)))
     ended = ", ".join(f"{name} {count}" for name, count in found["status"].items())
     return "\n".join([*lines, f"{'status':<{width}}  {ended}"])

@@ -65,6 +65,10 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
         times, never = found["settled_s"], f"not within {found['settled_within_s']:g} s"
         settled = ", ".join(f"{name} {time:.2f} s" for name, time in times.items())
         rows.append((f"settled to {SETTLED:.0%}", settled if np.isfinite([*times.values()]).all() else never))
+    if "last_outside_s" in found:
+        times = found["last_outside_s"].items()
+        outside = ", ".join(f"{name} {f'{time:.2f} s' if np.isfinite(time) else 'at the end'}" for name, time in times)
+        rows.append((f"last outside {SETTLED:.0%}", f"{outside}; V_c may rise, and does not tell what follows"))
     largest = [f"{name} {value:.5g} N" for name, value in found["largest_N"].items() if value > 0.0]
     if largest:
         exact = found["largest_of"] == MOTION

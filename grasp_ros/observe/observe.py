@@ -134,6 +134,7 @@ def finish(context: Integers) -> None:
             sight = kept_sight(sight_of(context, 0, 0.0, 0.0, 0), kept[body])
             seen[Seen.OUTSIDE + body] = kept[body, Kept.BEGIN] + last_outside(sight, body, seen[Seen.BOUND])
             kept[body, Kept.KIND] = NONE
+    seen[Seen.LAST_OUTSIDE] = max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
     pairs, y = carray(floats_at(context[Context.PAIRS]), (2, 2)), carray(floats_at(context[Context.Y]), (STATES,))
     loop = bodies_at(context, Context.LOOP)
     if context[Context.CERTAIN] != 0:
@@ -161,10 +162,11 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
     if not math.isfinite(sight.y.sum() + t):
         return 0
     seen[Seen.SEGMENTS] += 1.0
-    if wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value | Wanted.SETTLING.value):
+    bound = wanted & (Wanted.SETTLING.value | Wanted.BOUND.value)
+    if bound or wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value):
         write_ranges(sight)
         watch_quantities(sight, seen, wanted)
-    if wanted & Wanted.SETTLING.value:
+    if bound:
         watch_bound(sight, seen, kept_at(context), now)
     if context[Context.LOSSES] != 0:
         call(context[Context.LOSSES], address, kind, t, s, degree)

@@ -41,6 +41,7 @@ class Wanted(IntFlag):
     LOSSES = 8  # energy by cause
     SETTLING = 16  # when every body stays within a bound for good
     RISE = 32  # of V_c
+    BOUND = 64  # when a body was last outside it within the run
 
 
 class Seen(IntEnum):
@@ -59,8 +60,9 @@ class Seen(IntEnum):
     OUTSIDE = 32  # of each body: last time outside the bound, s; inf: when the last segment ended
     BOUND = 35  # m
     SETTLED = 36  # time from which on no body leaves the bound, s; inf: not within the run; nan: V_c cannot tell
-    SEGMENTS = 37
-    STATE = 38  # at the begin of the next segment
+    LAST_OUTSIDE = 37  # the largest of OUTSIDE at the end of the run, s; a run that goes on until it settles keeps it
+    SEGMENTS = 38
+    STATE = 39  # at the begin of the next segment
 
 
 SEEN = Seen.STATE + STATES

@@ -12,12 +12,13 @@ import numpy as np
 
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.plan import check as check_plan
+from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup, check
 from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.outcomes import GROUPS, find
+from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
 
 
 class Bound(NamedTuple):
@@ -66,6 +67,13 @@ class Problem:
         self.setup = (setup or Setup())._replace(outcomes=self.names)
         check_plan(Plan(scene, self.setup, self.axes, sample=1))
         check(scene, self.setup)
+
+    def why_unsettled(self) -> str:
+        """Why no run is known to settle, where that is asked for and V_c may rise."""
+        asked = wanted_by(column for name in self.names for column in find([name])) & Wanted.SETTLING
+        if not (asked and self.scene.caveats(self.setup.sampled)):
+            return ""
+        return f"; {self.scene.certificate_in_words(self.setup.sampled)}; last_outside needs no proof"
 
     @cached_property
     def units(self) -> dict[str, str]:

@@ -113,7 +113,7 @@ def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | 
     if found.fun >= BROKEN:
         wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
-                      + (f" with {wish}" if wish else ""))
+                      + (f" with {wish}" if wish else "") + problem.why_unsettled())
     outcomes = {name: float(values[0]) for name, values in problem.run(found.x[None]).outcomes.items()}
     numbers = {key: float(values[0]) for key, values in problem.numbers(found.x[None]).items()}
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)

@@ -149,10 +149,14 @@ class Scene(Frozen):
             for key, value in self.values[effect.section].items()
         }
 
+    def caveats(self, sampled: bool) -> list[str]:
+        """Why V_c may rise, if the commands are held or not; empty: it cannot."""
+        held = [HELD] if sampled and not self.sampled and self.system.laws else []
+        return [*held, *self.system.caveats]
+
     def certificate_in_words(self, sampled: bool) -> str:
         """Whether V_c can rise in this scene, and why."""
-        held = [HELD] if sampled and not self.sampled and self.system.laws else []
-        caveats = [*held, *self.system.caveats]
+        caveats = self.caveats(sampled)
         return f"V_c may rise: {'; '.join(caveats)}" if caveats else "V_c cannot rise"
 
     def time_of(self, tick: int) -> float:

@@ -88,6 +88,9 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
     "settling_times": tuple(
         Outcome(f"settling_time_{name}", "s", f"the same of the {name} mass alone, where all settle", Wanted.SETTLING,
                 _settled(body)) for body, name in NAMES.items()),
+    "last_outside": (Outcome(
+        "last_outside", "s", "last time within the run at which a mass is outside the bound, of every scene, and no"
+        " proof of what follows; inf: at its end", Wanted.BOUND, _seen(Seen.LAST_OUTSIDE)),),
     "touches": tuple(
         Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _touch(side))
         for side, name in enumerate(_SIDES)),

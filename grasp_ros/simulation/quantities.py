@@ -81,10 +81,14 @@ def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZ
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
 
 
+def may_rise(run: Trajectory) -> bool:
+    """Whether V_c may rise, so that it proves nothing of what follows."""
+    return bool(run.controllers or run.scene.caveats(run.sampled))
+
+
 def _may_settle(run: Trajectory, part: float) -> bool:
     """Whether V_c cannot rise, and there is a distance to come into."""
-    held = run.sampled or run.controllers or run.scene.system.caveats
-    return not held and settled_distance(run.scene, part) > 0.0
+    return not (run.sampled or may_rise(run)) and settled_distance(run.scene, part) > 0.0
 
 
 def settling_from(run: Trajectory, integrator: Integrator, watcher: Watcher, part: float = SETTLED,

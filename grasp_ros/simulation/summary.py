@@ -16,7 +16,16 @@ from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.losses import CAUSES, Losses, losses
 from grasp_ros.simulation.outcomes import find, of_one, wanted_by
-from grasp_ros.simulation.quantities import HORIZONS, by_output_times, settling_from, settling_times, watch_again
+from grasp_ros.simulation.quantities import (
+    HORIZONS,
+    by_output_times,
+    last_outside,
+    may_rise,
+    settled_distance,
+    settling_from,
+    settling_times,
+    watch_again,
+)
 from grasp_ros.simulation.repeat import UNLIMITED
 from grasp_ros.simulation.trajectory import Trajectory
 
@@ -39,8 +48,9 @@ class _Observed(NamedTuple):
 def summary(run: Trajectory) -> dict[str, Any]:
     """Numbers of a run by names that end with their unit; what the run does not have is left out.
 
-    `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled, and is left out
-    where it proves nothing; `touches` is left out for methods that do not look for them. V_c is twice the energy.
+    `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled. Where V_c may
+    rise, `last_outside_s` has the last times outside the same bound, by the output times, in its place. `touches` is
+    left out for methods that do not look for them. V_c is twice the energy.
     """
     scene, method = run.scene, METHODS[run.method]
     found: dict[str, Any] = {
@@ -68,14 +78,21 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     if not METHODS[run.method].energy_check:
         found["V_c_rise_J"] = float((level - np.minimum.accumulate(level)).max())
     observed = _by_output_times(run) if by_output_times(run) else _of_the_motion(run)
-    if not np.isnan(observed.settled).any():
-        found["settled_s"] = {NAMES[body]: float(observed.settled[COLUMN[body] // 2]) for body in system.present}
+    distance = settled_distance(run.scene)
+    if may_rise(run) and distance > 0.0:
+        found["last_outside_s"] = _by_body(run, last_outside(run.t, run.state[:, 0::2], distance))
+    elif not np.isnan(observed.settled).any():
+        found["settled_s"] = _by_body(run, observed.settled)
         found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
     found["largest_of"], found["largest_N"] = observed.largest_of, dict(zip(FORCES, observed.largest, strict=True))
     if len(run.t) > 1 and not system.external:
         found["lost_J"] = {cause: float(value) for cause, value in observed.lost._asdict().items()}
         found["lost_by"] = OUTPUTS if by_output_times(run) else MOTION
     return found
+
+
+def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
+    return {NAMES[body]: float(times[COLUMN[body] // 2]) for body in run.scene.system.present}
 
 
 def _of_the_motion(run: Trajectory) -> _Observed:

@@ -17,6 +17,7 @@ from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.chunk import SETTLED, Setup
 from grasp_ros.simulation.ensemble import Table, ensemble
 from grasp_ros.simulation.outcomes import GROUPS, LYAPUNOV
+from grasp_ros.simulation.summary import summary
 from lab.oracles.closed_forms import impact_numbers
 
 EVERY = tuple(group for group in GROUPS if group != LYAPUNOV)
@@ -81,6 +82,13 @@ def check_settling(found: float, scene: Scene) -> None:
     assert run.t[outside[-1]] <= found <= run.t[outside[-1] + 1]
 
 
+def check_last_outside(found: float, run: Trajectory) -> None:
+    """Between the last output time outside and the next one."""
+    places = np.abs(np.nan_to_num(run.state[:, 0::2]))
+    row = int(np.flatnonzero((places > SETTLED * places[0].max()).any(axis=1))[-1])
+    assert run.t[row] <= found <= run.t[row + 1] if row + 1 < len(run.t) else found == np.inf
+
+
 def check_balance(found: dict[str, float], run: Trajectory) -> None:
     level = run.energy.V_c
     taken = sum(found[f"lost_{cause}"] for cause in ("dampers", "feedback", "friction", "impacts"))
@@ -96,6 +104,7 @@ def test_outcomes_are_those_of_a_fine_grid(name: str) -> None:
     check_extremes(found, run)
     check_forces(found, run)
     check_settling(found["settling_time"], scene)
+    check_last_outside(found["last_outside"], run)
     check_balance(found, run)
     assert math.isfinite(found["settling_time"]) == (name in SETTLES)
 
@@ -107,7 +116,27 @@ def test_outcomes_of_a_sampled_loop_are_those_of_its_ticks(name: str) -> None:
     run = simulate(scene, sampled=True, grid=np.linspace(0.0, scene.duration, FINE))
     check_extremes(found, run)
     check_forces(found, run)
+    check_last_outside(found["last_outside"], run)
     assert math.isnan(found["settling_time"])  # a held command may bring energy: nobody knows what follows
+
+
+def test_last_outside_is_of_the_run_though_it_goes_on_until_it_settles() -> None:
+    """The arm of case 1 leaves 2 % for the last time behind 10 s, and none of its runs knows it that early."""
+    scene = scenes.load("case_01", ["time.duration_s=10.0"])
+    found = outcomes_of(scene)
+    assert found["last_outside"] == np.inf
+    assert 18.0 < found["settling_time"] < 19.0
+    later = outcomes_of(scene.changed({"time.duration_s": 20.0}))["last_outside"]
+    assert later == pytest.approx(found["settling_time"], rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["case_01", "delay"])
+def test_a_run_of_held_commands_says_when_it_was_last_outside(name: str) -> None:
+    scene = scenes.load(name)
+    told = summary(simulate(scene, sampled=True))
+    assert "settled_s" not in told
+    assert max(told["last_outside_s"].values()) == pytest.approx(outcomes_of(scene, sampled=True)["last_outside"],
+                                                                 abs=1e-2)
 
 
 def test_the_last_state_is_that_of_a_simulation_to_the_last_bit() -> None:

@@ -69,6 +69,11 @@ def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: An
         gr.design(gr.load("case_01"), free, minimise, bounds)
 
 
+def test_a_settling_time_that_nothing_proves_is_refused_with_the_reason() -> None:
+    with pytest.raises(gr.Refused, match=r"V_c may rise: commands are held .* last_outside needs no proof"):
+        gr.design(gr.load("case_01", ["loop={}"]), {BOTH_KV: (1.0, 2.0)}, "settling_time")
+
+
 @pytest.mark.parametrize("text", ["peak_input", "peak_input<=", "peak_input<=nan", "peak_input>=3", "beauty<=3"])
 def test_a_bound_is_written_in_one_way(text: str) -> None:
     with pytest.raises(gr.Refused):

@@ -86,6 +86,6 @@ def test_the_site_is_built_strictly(tmp_path: Path) -> None:
         capture_output=True, text=True, timeout=1200, check=False)
     assert result.returncode == 0, result.stderr
     assert all((tmp_path / "tutorials" / f"{name}.png").stat().st_size > 10_000
-               for name in ("restitution", "bifurcation", "closed_form", "map_settling_time"))
+               for name in ("restitution", "bifurcation", "closed_form", "map_last_outside"))
     commands = (tmp_path / "reference" / "commands" / "index.html").read_text(encoding="utf-8")
     assert all(f">grasp {name}<" in commands for name in ("simulate", "map", "run", "verify"))
