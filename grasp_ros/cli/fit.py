@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
@@ -18,11 +19,13 @@ from grasp_ros.cli.arguments import (
     prepare,
     warn,
 )
-from grasp_ros.cli.output import image_format, show, write_figure
+from grasp_ros.cli.output import destination, image_format, show, write_figure
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
 from grasp_ros.physics.errors import Refused, printable
+
+SCENE = ".yaml"
 
 
 def add_to(commands: Any) -> None:
@@ -39,7 +42,8 @@ def add_to(commands: Any) -> None:
                      help="test whether the data reject this value of a number that is free; repeatable")
     sub.add_argument("--by-sensors", action="store_true",
                      help="of a bag: what the sensors of its scene have measured, in place of the exact states")
-    add_output(sub, "FIGURE", "draw measured against fitted, .png, .svg or .pdf; - is the standard output")
+    add_output(sub, "FILE", "the scene with the estimates, .yaml, or measured against fitted, .png, .svg or .pdf; - is"
+               " the standard output")
     add_force(sub)
     add_json(sub)
 
@@ -47,7 +51,8 @@ def add_to(commands: Any) -> None:
 def _fit(options: argparse.Namespace) -> int:
     if options.output is not None:
         check_output(options.output, options.force, [options.source])
-        image_format(options.output)
+        if options.output.suffix != SCENE:
+            image_format(options.output)
     scene = None
     if options.scene is not None:
         scene = load_scene(options.scene, options.settings)
@@ -60,10 +65,18 @@ def _fit(options: argparse.Namespace) -> int:
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
     show(options, printable(str(found)), _data(found))
     if options.output is not None:
-        from grasp_ros.identification.figure import measured_and_fitted
-
-        write_figure(measured_and_fitted(found), options.output)
+        _write(found, options.output)
     return 1 if found.not_identifiable else 0
+
+
+def _write(found: Fit, path: Path) -> None:
+    if path.suffix == SCENE:
+        with destination(path) as file:
+            file.write(found.scene.to_yaml().encode())
+        return
+    from grasp_ros.identification.figure import measured_and_fitted
+
+    write_figure(measured_and_fitted(found), path)
 
 
 def _value(text: str) -> tuple[str, float]:

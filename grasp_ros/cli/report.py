@@ -132,12 +132,12 @@ def _timing(found: dict[str, Any]) -> list[Row]:
     """What a free run came to."""
     if "overruns" not in found:
         return []
-    ages = "; ".join(f"{side} {age['max']:.0f}, 99 % {age['p99']:.0f}"
+    ages = "; ".join(f"{side} at most {age['max']:.0f} periods, 99 % at most {age['p99']:.0f}"
                      for side, age in found["command_age_periods"].items())
     return [
         ("reached", f"{found['reached_s_per_s']:.3g} s in a second, {found['overruns']} overruns,"
                     f" {found['given_up_s']:.2g} s given up"),
-        ("oldest commands", f"{ages or 'none'}, periods"),
+        ("age of commands", ages or "none came"),
     ]
 
 

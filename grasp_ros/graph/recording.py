@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph.recorder import NOT_RECORDED
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
@@ -231,12 +232,13 @@ class Recording(Tabular, Frozen):
     def missing(self) -> dict[str, int]:
         """Ticks up to the last one recorded that have no message, by topic; without the commands of a free run.
 
-        And what is `unheard`.
+        And what is `unheard`, and what the monitor says that it did not record.
         """
         ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else self.scene.controllers.values()
         every_tick = [topic.name for topic in self.scene.topics if topic not in held]
-        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard}
+        told = {NOT_RECORDED: number} if (number := int(self.lost.get(NOT_RECORDED, 0))) else {}
+        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard, **told}
 
 
 def acted_from(ticks: np.ndarray, effort: Array) -> Array:

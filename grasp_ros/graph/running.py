@@ -61,7 +61,11 @@ class Running:
     @property
     def words(self) -> str:
         """For a reader."""
-        return "lockstep" if self.lockstep else f"free-running, {self.real_time_factor:g} s in a second"
+        if self.lockstep:
+            return "lockstep"
+        silence = sorted({f"{self.reactions[side]} after {seconds:g} s" for side, seconds in self.timeouts.items()})
+        without = f"; without commands {' or '.join(silence)}" if silence else ""
+        return f"free-running, {self.real_time_factor:g} s in a second{without}"
 
     def to_yaml(self) -> str:
         """As YAML; `parse` of it gives the same."""

@@ -7,7 +7,7 @@ from difflib import SequenceMatcher, get_close_matches
 from itertools import islice
 
 SHOWN = 12  # of many words that are allowed
-ALIKE, TIE, MOST_MEANT = 0.6, 1e-9, 4  # of difflib; words that are as much alike are all named
+ALIKE, TIE, MOST_MEANT = 0.65, 1e-9, 4  # of difflib; words that are as much alike are all named
 
 
 def _alike(word: str, name: str) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import unicodedata
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -14,6 +14,7 @@ from grasp_ros.scene.effects.base import Effect
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.suggestion import allowed as what_is_allowed
 
+CONTROLS = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # categories Cc, without the line break, and Cs
 SOMETHING = frozenset(("left_arm", "object", "right_arm"))
 
 
@@ -23,9 +24,7 @@ class SceneError(Refused):
 
 def is_text(value: Any) -> bool:
     """Whether a value is a text that a terminal and a file can take: no controls but line breaks."""
-    return isinstance(value, str) and not any(
-        unicodedata.category(character) in ("Cc", "Cs") and character != "\n" for character in value
-    )
+    return isinstance(value, str) and not CONTROLS.search(value)
 
 
 def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str], needed: Sequence[str]

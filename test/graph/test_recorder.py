@@ -29,7 +29,7 @@ from rosbags.typesys import Stores, get_typestore
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.chunks import Messages
-from grasp_ros.graph.recorder import RESERVE_BYTES, Recorder
+from grasp_ros.graph.recorder import NOT_RECORDED, RESERVE_BYTES, Recorder
 from grasp_ros.graph.recover import recover
 from grasp_ros.graph.rosbag2 import INFORMATION
 from grasp_ros.scene.topics import DIAGNOSTICS, JOINT_STATES
@@ -279,6 +279,16 @@ def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: 
     with pytest.raises(bag.BagError, match="nothing can be recovered: it holds no complete tick"):
         recover(tmp_path / "bag", tmp_path / "new")
     assert not (tmp_path / "new").exists()
+
+
+def test_what_the_monitor_did_not_record_is_lost(tmp_path: Path, run: Trajectory, command: Any) -> None:
+    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
+    for tick in study.ticks_of(run):
+        recorder.write_tick(*tick)
+    recorder.close({NOT_RECORDED: 7})
+    result = command("inspect", "bag")
+    assert re.search(r"^lost +messages not recorded 7$", result.stdout, re.M)
+    assert bag.read(tmp_path / "bag").missing[NOT_RECORDED] == 7
 
 
 def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path, run: Trajectory) -> None:

@@ -76,6 +76,9 @@ def test_data_without_noise_give_the_numbers_back(held: Trajectory, tmp_path: Pa
         assert data["numbers"][key]["estimate"] == pytest.approx(value, rel=1e-9)
     assert data["against"][P_LEFT]["rejected"]
     assert (tmp_path / "fit.png").stat().st_size > 10_000
+    command("fit", "run.npz", "--free", *CONTACTS, "-o", "fitted.yaml")
+    fitted = load(tmp_path / "fitted.yaml").values
+    assert fitted["left_contact"]["hertz_N_per_m1_5"] == pytest.approx(CONTACTS[H_LEFT], rel=1e-9)
 
 
 def test_a_value_is_rejected_only_where_the_data_say_so(held: Trajectory) -> None:

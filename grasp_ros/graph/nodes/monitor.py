@@ -22,7 +22,7 @@ from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
 from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen, seen_of
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.recorder import Recorder
+from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
@@ -51,7 +51,7 @@ from grasp_ros.scene.topics import (
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are judged at once, and of wall time that a tick waits for others
-MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**20  # of what does not come with every state: of one; in a second
+MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # of what does not come with every state: of one; of all of a report
 
 
 class Monitor(PeerNode):
@@ -88,7 +88,7 @@ class Monitor(PeerNode):
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "lost announcements": 0,
-            "alarms": 0, "ticks without V": 0, "messages not recorded": 0, "restored commands": 0,
+            "alarms": 0, "ticks without V": 0, NOT_RECORDED: 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
         self._output, self._template = self.publisher(LYAPUNOV), lyapunov_template()
@@ -182,7 +182,7 @@ class Monitor(PeerNode):
         if self._recorder is None or not (self._due or self.counters["ticks"]):
             return
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
-            self.refuse("messages not recorded", topic)
+            self.refuse(NOT_RECORDED, topic)
         elif self._due:
             self._due[-1][2].append((topic, cdr))
         else:
