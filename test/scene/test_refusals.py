@@ -109,7 +109,7 @@ def test_a_scene_needs_a_body() -> None:
     [
         (text_with("mass_kg: 1.0", "mass: 1.0"), ["left_arm.mass", "1.0", "mass_kg"]),  # without its unit
         (text_with("mass_kg: 1.0", "mass_g: 1000.0"), ["left_arm.mass_g", "1000.0", "mass_kg"]),
-        (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  colour: 3"), ["left_arm.colour", "3", "allowed: left_arm.mass_kg, "]),
+        (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  colour: 3"), ["left_arm.colour", "3", "allowed: left_arm.mass_kg"]),
         (text_with("mass_kg: 1.0", "mass_kg: 1.0\n  mass_kg: 2.0"), ["mass_kg", "twice"]),
         (text_with("object:", "left_arm:"), ["left_arm", "twice"]),
         (text_with("object:", "gravity: 9.81\nobject:"), ["gravity", "9.81", "allowed"]),
