@@ -29,10 +29,6 @@ _CHUNK, _INDEXES, _STATISTICS = (f"_Writer__{name}" for name in ("chunk_builder"
 class Messages:
     """Takes the messages for a writer of MCAP that has no chunk yet.
 
-    Parameters
-    ----------
-    writer : Writer
-
     Attributes
     ----------
     counts : Counter of int

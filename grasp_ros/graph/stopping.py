@@ -37,11 +37,6 @@ def end_late_by_force(name: str) -> None:
     """Let a process that is still there GRACE_SECONDS after a noted signal end by force.
 
     A law that does not return, or a call of DDS that waits for a lock, would keep it for ever.
-
-    Parameters
-    ----------
-    name : str
-        Of the node.
     """
     reader, writer = socket.socketpair()
     writer.setblocking(False)

@@ -30,11 +30,6 @@ class Limits:
 
     The package's own controllers keep to the limit. A command of another one that does not is neither taken nor cut:
     the actuator would not do it, and nobody has computed what it would do instead.
-
-    Parameters
-    ----------
-    node : GraspNode
-    scene : Scene
     """
 
     def __init__(self, node: GraspNode, scene: Scene) -> None:

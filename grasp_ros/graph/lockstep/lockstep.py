@@ -32,11 +32,6 @@ UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without co
 class Lockstep:
     """Takes the commands, and advances the plant when all of a tick are there.
 
-    Parameters
-    ----------
-    plant : SteppedNode
-    steering : Steering
-
     Attributes
     ----------
     topics : list of Topic

@@ -23,10 +23,6 @@ PAUSED, STEPPING = "paused", "stepping"  # beside the phases of a node
 class Steering:
     """Services `~/pause`, `~/resume`, `~/step`, `~/reset`, `~/status`, and the parameter `steps` of `~/step`.
 
-    Parameters
-    ----------
-    plant : SteppedNode
-
     Attributes
     ----------
     steps : int

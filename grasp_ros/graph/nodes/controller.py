@@ -41,13 +41,6 @@ class Controller(PeerNode):
     on them: at the beginning, after a reset, and when they were set while it runs. With a law of the user's own it
     announces nothing, and takes no other numbers. When a plant comes with another scene it goes on with that. Other
     parameters are `real_time_priority` and the numbers of the scene.
-
-    Parameters
-    ----------
-    name : str
-        The executable: left_controller or right_controller.
-    options
-        As in `rclpy.node.Node`.
     """
 
     why_read_only = "it is fixed for a run, so that the bag and a replay agree; set it in the scene"

@@ -50,12 +50,7 @@ class Seen(NamedTuple):
 
 
 class Judge:
-    """Knows the laws that were announced, and judges states and commands by them.
-
-    Parameters
-    ----------
-    scene : Scene
-    """
+    """Knows the laws that were announced, and judges states and commands by them."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene

@@ -60,11 +60,6 @@ class Monitor(PeerNode):
     It puts the messages of a tick together, computes V, V_c, V' of the laws that were announced, the energy of the
     plant alone and its balance from the states, publishes them, and records all in the order of the ticks, so that two
     equal runs give equal bags. Time in the bag goes on where a reset puts the plant back.
-
-    Parameters
-    ----------
-    options
-        As in `rclpy.node.Node`.
     """
 
     def __init__(self, **options: Any) -> None:

@@ -92,13 +92,7 @@ def _line(
 
 
 class Picture:
-    """Publishes both where somebody looks, at most thirty times a second.
-
-    Parameters
-    ----------
-    node : GraspNode
-    scene : Scene
-    """
+    """Publishes both where somebody looks, at most thirty times a second."""
 
     def __init__(self, node: GraspNode, scene: Scene) -> None:
         self._scene, self._next = scene, 0.0

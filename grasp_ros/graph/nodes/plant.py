@@ -57,13 +57,7 @@ class _Terminal(io.TextIOBase):
 
 
 class Plant(SteppedNode):
-    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, those of its loop, and those of the scene.
-
-    Parameters
-    ----------
-    options
-        As in `rclpy.node.Node`.
-    """
+    """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, those of its loop and of the scene."""
 
     why_read_only = "it describes what is simulated, which does not change in a run; set it in the scene or with -p"
 

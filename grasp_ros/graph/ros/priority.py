@@ -20,10 +20,6 @@ class Priority:
     loop. Linux gives this priority to whoever has the right, by CAP_SYS_NICE or a limit `rtprio`; without it the node
     says so and goes on.
 
-    Parameters
-    ----------
-    node : GraspNode
-
     Raises
     ------
     Refused

@@ -22,13 +22,7 @@ LOOK_SECONDS = 1e-3
 
 
 class Player(GraspNode):
-    """Node `player`; parameters bag and rate.
-
-    Parameters
-    ----------
-    options
-        As in `rclpy.node.Node`.
-    """
+    """Node `player`; parameters bag and rate."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("player", **options)

@@ -68,13 +68,7 @@ class Newest:
 
 
 class Watch(GraspNode):
-    """Node `watch`: draws the newest whole state some times a second. No plant waits for it; keys steer one.
-
-    Parameters
-    ----------
-    options
-        As in `rclpy.node.Node`.
-    """
+    """Node `watch`: draws the newest whole state some times a second. No plant waits for it; keys steer one."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__("watch", **options)
