@@ -117,11 +117,17 @@ def text_message(text: str) -> bytes:
 
 def list_message(
     time_ns: int, names: Sequence[str], position: Array, velocity: Array = NOTHING, effort: Array = NOTHING,
+    frame: str = "",
 ) -> bytes:
     """A stamped list of numbers with names, serialized; rclpy would pad it with stray bytes."""
     return bytes(_TYPES.serialize_cdr(_TYPES.types[NAMED_LIST](
-        header=_header(time_ns), name=list(names), position=position, velocity=velocity, effort=effort
+        header=_header(time_ns, frame), name=list(names), position=position, velocity=velocity, effort=effort
     ), NAMED_LIST))
+
+
+def numbers_message(time_ns: int, numbers: Mapping[str, float], number: int = 0) -> bytes:
+    """The same of numbers by their names; numbered where none may be missed."""
+    return list_message(time_ns, list(numbers), np.array([*numbers.values()], dtype=float), frame=str(number or ""))
 
 
 def lyapunov_template() -> Template:

@@ -22,6 +22,7 @@ from grasp_ros.graph.lockstep.ticks import PATIENCE_TICKS, Arrival, Ticks
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
+from lab.drills.nodes import plain_messages
 
 pytestmark = pytest.mark.alone  # it judges by wall time
 
@@ -30,11 +31,11 @@ BODIES = [0]
 
 
 def state(tick: int, position: float = 0.5) -> bytes:
-    return serialize_message(messages.joint_state(tick * PERIOD, BODIES, np.full(6, position), np.zeros(3)))
+    return serialize_message(plain_messages.joint_state(tick * PERIOD, BODIES, np.full(6, position), np.zeros(3)))
 
 
 def command(tick: int, force: float = 1.0) -> bytes:
-    return serialize_message(messages.wrench(tick * PERIOD, force))
+    return serialize_message(plain_messages.wrench(tick * PERIOD, force))
 
 
 def ticks(turn: list[int]) -> Ticks:
@@ -43,7 +44,7 @@ def ticks(turn: list[int]) -> Ticks:
 
 def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:
     for length in range(20):
-        message = messages.wrench(7, -1.5)
+        message = plain_messages.wrench(7, -1.5)
         message.header.frame_id = "x" * length
         assert messages.raw_force(serialize_message(message)) == -1.5
 
@@ -51,11 +52,11 @@ def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:
 def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
     found = ticks([0])
     assert found.put(JOINT_STATES, state(0)) is Arrival.TAKEN
-    strange = messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
+    strange = plain_messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
     strange.velocity = array("d", [1.0, 2.0])
-    nobody = messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
+    nobody = plain_messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
     nobody.name = ["nobody"]
-    long = messages.wrench(0, 1.0)
+    long = plain_messages.wrench(0, 1.0)
     long.header.frame_id = "x" * messages.MOST_BYTES
     for topic, cdr, arrival in (
         (JOINT_STATES, serialize_message(strange), Arrival.REFUSED),
@@ -66,8 +67,8 @@ def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
         (LEFT_COMMAND, command(1, np.inf), Arrival.REFUSED),
         (LEFT_COMMAND, serialize_message(long), Arrival.REFUSED),
         (LEFT_COMMAND, b"", Arrival.REFUSED),
-        (LEFT_COMMAND, serialize_message(messages.wrench(1, 1.0)), Arrival.STAMP),  # no tick
-        (LEFT_COMMAND, serialize_message(messages.wrench(1_800_000_000_000_000_000, 1.0)), Arrival.STAMP),
+        (LEFT_COMMAND, serialize_message(plain_messages.wrench(1, 1.0)), Arrival.STAMP),  # no tick
+        (LEFT_COMMAND, serialize_message(plain_messages.wrench(1_800_000_000_000_000_000, 1.0)), Arrival.STAMP),
         (LEFT_COMMAND, command(PATIENCE_TICKS + 1), Arrival.STAMP),
         (LEFT_COMMAND, command(-1), Arrival.STAMP),
         (LEFT_COMMAND, command(1), Arrival.TAKEN),

@@ -25,6 +25,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
+from lab.drills.nodes import plain_messages
 from lab.site.examples import titled
 
 pytestmark = pytest.mark.slow  # real processes
@@ -136,7 +137,7 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
             answer = status.call_async(Trigger.Request())
             executor.spin_until_future_complete(answer, timeout_sec=DEADLINE)
             assert json.loads(answer.result().message)["tick"] == last
-        recorded.publish(messages.lyapunov(next_one * period_ns, [0.0] * len(LYAPUNOV_NAMES)))
+        recorded.publish(plain_messages.lyapunov(next_one * period_ns, [0.0] * len(LYAPUNOV_NAMES)))
     assert ticks == list(range(len(ticks)))
 
 

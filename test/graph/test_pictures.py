@@ -115,6 +115,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from grasp_ros import scene
 from grasp_ros.graph.ros import messages
+from lab.drills.nodes import plain_messages
 from grasp_ros.graph.running import Running
 from grasp_ros.scene.topics import *
 rclpy.init()
@@ -137,7 +138,8 @@ while True:  # what belongs to a state comes up to 90 ticks behind it, as from a
             message = JointState(name=["left", "object", "right"], position=[v] * 3, velocity=[v] * 3, effort=[0.0] * 3)
             message.header.stamp = messages.to_time(ns)
         else:
-            message = messages.wrench(ns, v) if topic != LYAPUNOV else messages.lyapunov(ns, [v, v, *[0.0] * 6, 1.0])
+            values = [v, v, *[0.0] * 6, 1.0]
+            message = plain_messages.lyapunov(ns, values) if topic == LYAPUNOV else plain_messages.wrench(ns, v)
         out[topic].publish(message)
 """
 

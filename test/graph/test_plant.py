@@ -25,6 +25,7 @@ from grasp_ros import scene
 from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
 from grasp_ros.simulation import simulate
+from lab.drills.nodes import plain_messages
 
 pytestmark = pytest.mark.slow  # real processes
 
@@ -153,12 +154,12 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(
         now = messages.to_ns(message.header.stamp)
         forces = expected.scene.system.commands(now // 1_000_000, states[-1])
         for publisher in publishers:
-            publisher.publish(messages.wrench(now - 1_000_000, 100.0))
-            publisher.publish(messages.wrench(now, math.nan))
-            publisher.publish(messages.wrench(now, math.inf))
-        publishers[0].publish(messages.wrench(now, forces[0]))
-        publishers[0].publish(messages.wrench(now, 100.0))
-        publishers[1].publish(messages.wrench(now, forces[1]))
+            publisher.publish(plain_messages.wrench(now - 1_000_000, 100.0))
+            publisher.publish(plain_messages.wrench(now, math.nan))
+            publisher.publish(plain_messages.wrench(now, math.inf))
+        publishers[0].publish(plain_messages.wrench(now, forces[0]))
+        publishers[0].publish(plain_messages.wrench(now, 100.0))
+        publishers[1].publish(plain_messages.wrench(now, forces[1]))
 
     peer.create_subscription(JointState, JOINT_STATES.name, answer, messages.qos(JOINT_STATES))
     peer.create_subscription(String, SCENE.name, lambda message: scenes.append(message.data), messages.qos(SCENE))

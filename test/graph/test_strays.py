@@ -17,9 +17,11 @@ from rclpy.serialization import serialize_message
 from grasp_ros.graph import bag
 from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, GIVE_UP_SECONDS, Arrival, Ticks
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.rosbag2 import force_message
 from grasp_ros.graph.verify import verify
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT
+from lab.drills.nodes import plain_messages
 
 pytestmark = pytest.mark.alone  # it judges by wall time
 
@@ -28,11 +30,11 @@ RUN = [sys.executable, "-m", "grasp_ros.cli", "run"]
 
 
 def state(tick: int, effort: float = 0.0) -> bytes:
-    return serialize_message(messages.joint_state(tick * PERIOD, [LEFT], np.zeros(6), np.full(3, effort)))
+    return serialize_message(plain_messages.joint_state(tick * PERIOD, [LEFT], np.zeros(6), np.full(3, effort)))
 
 
 def command(tick: int, force: float) -> bytes:
-    return serialize_message(messages.wrench(tick * PERIOD, force))
+    return force_message(tick * PERIOD, force)  # the bytes of the package's own controllers
 
 
 @pytest.mark.parametrize("delay", [0, 2])

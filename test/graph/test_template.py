@@ -15,6 +15,7 @@ from grasp_ros.graph.template import Template
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
+from lab.drills.nodes import plain_messages
 
 TIME_NS = 1_234_567_890_123
 STATE, INPUTS = np.array([0.1, -0.0, np.inf, 5e-324, -1e300, 0.6]), np.array([7.0, np.pi, -9.0])
@@ -35,7 +36,7 @@ def test_states_are_those_of_the_message(bodies: list[int]) -> None:
     template = rosbag2.state_template([NAMES[body] for body in bodies])
     template.fill(7, [0.0] * len(numbers))  # leaves nothing behind
     found = deserialize_message(template.fill(TIME_NS, numbers), JointState)
-    assert found == messages.joint_state(TIME_NS, bodies, STATE, INPUTS)
+    assert found == plain_messages.joint_state(TIME_NS, bodies, STATE, INPUTS)
 
 
 def test_forces_and_clocks_have_their_time_and_number() -> None:

@@ -21,6 +21,7 @@ from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.lockstep.timing import Timing
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.rosbag2 import numbers_message
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -195,5 +196,5 @@ class FreeRunning:
         values = self._timing.take()
         if values:
             time_ns = self._plant.tick * self._plant.scene.period_ns
-            self._quality.publish(messages.named_list(time_ns, list(values), list(values.values())))
+            self._quality.publish(numbers_message(time_ns, values))
             self._plant.counters.update({name: f"{value:.6g}" for name, value in values.items()})

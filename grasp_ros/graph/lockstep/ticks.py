@@ -8,10 +8,9 @@ from collections.abc import Callable, Collection, Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from rclpy.serialization import serialize_message
-
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.states import State, StateReader
+from grasp_ros.graph.rosbag2 import force_message
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
@@ -182,7 +181,7 @@ class Ticks:
         for cdr in there:
             if messages.raw_force(cdr) == force:
                 return cdr, False
-        return (serialize_message(messages.wrench(time_ns, force)), True) if late else (None, False)
+        return (force_message(time_ns, force), True) if late else (None, False)
 
     def _acted(self, side: str, time_ns: int) -> float | None:
         """The force in N of the command that answers the first state, as a later one has it."""

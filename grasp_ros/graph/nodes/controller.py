@@ -21,7 +21,7 @@ from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.ros.priority import Priority
 from grasp_ros.graph.ros.states import State, StateReader
-from grasp_ros.graph.rosbag2 import force_template
+from grasp_ros.graph.rosbag2 import force_template, numbers_message
 from grasp_ros.physics.control import ControlLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
@@ -172,8 +172,7 @@ class Controller(PeerNode):
         self._law = self._scene.system.laws[SIDES[self._side]]
         if self._own is None:
             numbers, self._number = self._scene.numbers_of(self._executable), self._number + 1
-            message = messages.named_list(time_ns, list(numbers), list(numbers.values()), self._number)
-            self._announcements.publish(message)
+            self._announcements.publish(numbers_message(time_ns, numbers, self._number))
             # What a reader has received before it receives the command, it also sees before.
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")

@@ -1,15 +1,13 @@
-"""Conversion between numbers and messages, in one place.
+"""Messages of ROS: their types, qualities of service, and what is read of them.
 
-Jazzy does not check fields: an int or a numpy scalar in a float field travels as garbage. Every number that enters
-a message goes through float() here.
+Those with numbers are serialized by `graph.rosbag2`: rclpy would pad them with stray bytes.
 """
 
 from __future__ import annotations
 
 import math
 import struct
-from array import array
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import Enum
 
 from builtin_interfaces.msg import Time
@@ -22,11 +20,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES, SCENE, Topic
+from grasp_ros.scene.topics import SCENE, Topic
 
 TYPES = {
     "sensor_msgs/msg/JointState": JointState,
@@ -114,44 +110,6 @@ def raw_command(cdr: bytes) -> Command | None:
     except struct.error:
         return None
     return (raw_stamp_ns(cdr), force) if math.isfinite(force) else None
-
-
-def joint_state(time_ns: int, bodies: Sequence[int], state: Array, inputs: Array) -> JointState:
-    """State (6,) of some bodies, and the input forces (3,) in N by body."""
-    message = JointState(name=[NAMES[body] for body in bodies])
-    message.header.stamp = to_time(time_ns)
-    message.position = array("d", [state[COLUMN[body]] for body in bodies])
-    message.velocity = array("d", [state[COLUMN[body] + 1] for body in bodies])
-    message.effort = array("d", [inputs[body] for body in bodies])
-    return message
-
-
-def wrench(time_ns: int, force: float) -> WrenchStamped:
-    """A force along the line in N."""
-    message = WrenchStamped()
-    message.header.stamp = to_time(time_ns)
-    message.header.frame_id = FRAME
-    message.wrench.force.x = float(force)
-    return message
-
-
-def named_list(time_ns: int, names: Sequence[str], values: Sequence[float], number: int = 0) -> JointState:
-    """A stamped list of numbers with names, which plotters show by name; numbered where none may be missed."""
-    message = JointState(name=list(names))
-    message.header.frame_id = str(number or "")
-    message.header.stamp = to_time(time_ns)
-    message.position = array("d", [float(value) for value in values])
-    return message
-
-
-def lyapunov(time_ns: int, values: Sequence[float]) -> JointState:
-    """What the monitor computes at a tick, see `topics.LYAPUNOV_NAMES`."""
-    return named_list(time_ns, LYAPUNOV_NAMES, values)
-
-
-def clock(time_ns: int) -> Clock:
-    """Simulated time."""
-    return Clock(clock=to_time(time_ns))
 
 
 def text(content: str) -> String:

@@ -29,6 +29,7 @@ from grasp_ros.scene.topics import (
     RIGHT_CONTACT,
     Topic,
 )
+from lab.drills.nodes import plain_messages
 
 SETTLE_SECONDS = 4.0  # longer than discovery was ever seen to take
 PERIOD_NS = 1_000_000
@@ -67,10 +68,10 @@ class Bare(Node):
     def publish_state(self) -> None:
         """What the plant sends per tick."""
         clock, left, right, states = self._outputs
-        clock.publish(messages.clock(self._now_ns))
-        left.publish(messages.wrench(self._now_ns, 0.0))
-        right.publish(messages.wrench(self._now_ns, 0.0))
-        states.publish(messages.joint_state(self._now_ns, BODIES, np.zeros(6), np.zeros(3)))
+        clock.publish(plain_messages.clock(self._now_ns))
+        left.publish(plain_messages.wrench(self._now_ns, 0.0))
+        right.publish(plain_messages.wrench(self._now_ns, 0.0))
+        states.publish(plain_messages.joint_state(self._now_ns, BODIES, np.zeros(6), np.zeros(3)))
 
     def _on_command(self, name: str, _: Any) -> None:
         self._heard.add(name)
@@ -82,12 +83,12 @@ class Bare(Node):
                 self.publish_state()
 
     def _on_state(self, message: Any) -> None:
-        self._outputs[0].publish(messages.wrench(messages.to_ns(message.header.stamp), 0.0))
+        self._outputs[0].publish(plain_messages.wrench(messages.to_ns(message.header.stamp), 0.0))
 
     def _on_anything(self, cdr: bytes) -> None:
         self._now_ns += 1
         if self._now_ns % len(INPUTS) == 0:
-            self._outputs[0].publish(messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
+            self._outputs[0].publish(plain_messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
 
 
 def main(names: Sequence[str], ticks: int) -> None:

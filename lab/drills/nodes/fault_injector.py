@@ -24,6 +24,7 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import COMMANDS, DEPTH, DIAGNOSTICS, JOINT_STATES, Topic
+from lab.drills.nodes import plain_messages
 
 SPIN_SECONDS = 0.01
 MATCH_SECONDS = 40.0  # for the readers of what it sends to be found
@@ -136,7 +137,7 @@ class Stranger:
         row = state.name.index(side)
         if force is None:
             force = -POSITION_GAIN * state.position[row] - VELOCITY_GAIN * state.velocity[row]
-        message = messages.wrench(messages.to_ns(state.header.stamp), force)
+        message = plain_messages.wrench(messages.to_ns(state.header.stamp), force)
         filled(message, {key: value for key, value in self._answer.items() if key not in ("side", "force", "times")})
         for _ in range(times):
             self._commands.publish(message)
