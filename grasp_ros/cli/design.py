@@ -19,7 +19,7 @@ from grasp_ros.cli.arguments import (
     prepare,
     whole,
 )
-from grasp_ros.cli.output import bar, destination, image_format, show, write_figure
+from grasp_ros.cli.output import bar, image_format, show, write_figure, write_scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation.outcomes import GROUPS
 
@@ -78,8 +78,7 @@ def _design(options: argparse.Namespace) -> int:
         "scene": scene.name, "units": problem.units, "choices": [
             {"numbers": own.numbers, "outcomes": own.outcomes, "runs": own.runs} for own in found]})
     if options.output is not None:
-        with destination(options.output) as file:
-            file.write(found[0].scene.to_yaml().encode())
+        write_scene(found[0].scene, options.output)
     if options.figure is not None:
         from grasp_ros.optimization import figure
 

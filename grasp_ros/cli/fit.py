@@ -19,7 +19,7 @@ from grasp_ros.cli.arguments import (
     prepare,
     warn,
 )
-from grasp_ros.cli.output import destination, image_format, show, write_figure
+from grasp_ros.cli.output import image_format, show, write_figure, write_scene
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
@@ -71,8 +71,7 @@ def _fit(options: argparse.Namespace) -> int:
 
 def _write(found: Fit, path: Path) -> None:
     if path.suffix == SCENE:
-        with destination(path) as file:
-            file.write(found.scene.to_yaml().encode())
+        write_scene(found.scene, path)
         return
     from grasp_ros.identification.figure import measured_and_fitted
 

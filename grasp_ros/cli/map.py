@@ -126,6 +126,7 @@ def report(data: Any) -> str:
     lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in (*HEADS, *COUNTS))]
     for name, row in found.items():
         if name != "status":
-            lines.append(f"{name:<{width}}" + "".join(f"{row[head]:12.6g}" for head in (*HEADS, *COUNTS)))
+            cells = [f"{row[head]:12.6g}" for head in HEADS] + [f"{row[head]:12d}" for head in COUNTS]
+            lines.append(f"{name:<{width}}" + "".join(cells))
     ended = ", ".join(f"{name} {count}" for name, count in found["status"].items())
     return "\n".join([*lines, f"{'status':<{width}}  {ended}"])

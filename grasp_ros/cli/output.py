@@ -17,6 +17,7 @@ import numpy as np
 from grasp_ros.scene.files import replacing, writing
 
 if TYPE_CHECKING:
+    from grasp_ros.scene import Scene
     from grasp_ros.simulation.progress import Told
 
 STDOUT = Path("-")
@@ -75,6 +76,12 @@ def destination(path: Path) -> Iterator[BinaryIO]:
     with writing("standard output"):
         yield sys.stdout.buffer
         sys.stdout.buffer.flush()
+
+
+def write_scene(scene: Scene, path: Path) -> None:
+    """A scene into the file of `-o`, as YAML."""
+    with destination(path) as file:
+        file.write(scene.to_yaml().encode())
 
 
 def image_format(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -191,6 +192,19 @@ def test_the_command_prints_draws_and_completes(tmp_path: Path, capsys: pytest.C
     sample += ["--sample", "9", "--outcome", "peak_impact", "-o", str(tmp_path / "sample.zarr")]
     assert main(sample) == 0
     assert "peak_impact_left" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_settling_time_that_nothing_proves_is_counted_and_explained(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["map", "case_01", "--set", SHORT, "--set", "loop={}", "--x", f"{GAIN}=1:9:3", "--outcome", "settling_time",
+             "--outcome", "last_outside", "-o", str(tmp_path / "map.zarr")]
+    assert main(words) == 0
+    out, err = capsys.readouterr()
+    assert re.search(r"^settling_time( +nan){5} +0 +3$", out, re.M)
+    assert re.search(r"^last_outside .* +[0-3] +0$", out, re.M)
+    assert "settling_time is nan where V_c proves nothing; V_c may rise: commands are held" in err
 
 
 @pytest.mark.slow

@@ -51,7 +51,7 @@ from grasp_ros.scene.topics import (
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are judged at once, and of wall time that a tick waits for others
-MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # of what does not come with every state: of one; of all of a report
+MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
 
 
 class Monitor(PeerNode):
