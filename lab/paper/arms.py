@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import ensemble, simulate
+from grasp_ros.simulation import simulate
 from grasp_ros.simulation.losses import losses
-from lab.paper.cases import STANDARD, Cases, Start, columns_of, started, with_values
-from lab.paper.measures import over
+from lab.paper.cases import STANDARD, Cases, Start, started, with_values
+from lab.paper.measures import Wish, over
 from lab.paper.motion import contacts_found, first_contact_error, without_object
 from lab.paper.scatter import Median, median
 
@@ -34,24 +34,30 @@ class Stiffer(NamedTuple):
     starts: int
 
 
+def wishes(cases: Cases, starts: Sequence[Start]) -> list[Wish]:
+    """The settling times behind `stiffer` and `damped`."""
+    scenes = [*_of_stiffness(cases).values(), *_of_damping(cases).values()]
+    return [Wish(each, tuple(starts), "settling") for scene in scenes for each in (scene, without_object(scene))]
+
+
+def _of_stiffness(cases: Cases) -> dict[float, Scene]:
+    return {k: with_values(cases[STANDARD], {"k": k}) for k in STIFFNESSES}
+
+
+def _of_damping(cases: Cases) -> dict[float, Scene]:
+    return {C: with_values(cases[STANDARD], {"c": min(C, 0.2), "Kv": C - min(C, 0.2)}) for C in DAMPINGS}
+
+
 def stiffer(cases: Cases, starts: Sequence[Start]) -> list[Stiffer]:
     """Settling time and what makes it, over the stiffness of the arms."""
     found = []
-    for k in STIFFNESSES:
-        scene = with_values(cases[STANDARD], {"k": k})
+    for k, scene in _of_stiffness(cases).items():
         times = over(scene, starts, "settling")
         few = zip(starts[:MANY], times, strict=False)
         rate, speed, share = np.median([_causes(started(scene, start), time) for start, time in few], axis=0).tolist()
-        found.append(Stiffer(k, median(times), median(_alone(scene, starts)), rate, speed, share, len(starts)))
+        alone = over(without_object(scene), starts, "settling")
+        found.append(Stiffer(k, median(times), median(alone), rate, speed, share, len(starts)))
     return found
-
-
-def _alone(scene: Scene, starts: Sequence[Start]) -> list[float]:
-    """Settling times without an object."""
-    places = [start._replace(x_o=0.0) for start in starts]
-    changes = {key: values for key, values in columns_of(places).items() if not key.startswith("object")}
-    found = ensemble(without_object(scene), changes, ("settling_time",), threads=1)
-    return [float(time) for time in found.columns["settling_time"]]
 
 
 def _causes(scene: Scene, settling: float) -> tuple[float, float, float]:
@@ -82,9 +88,8 @@ class Damped(NamedTuple):
 def damped(cases: Cases, starts: Sequence[Start]) -> list[Damped]:
     """Settling time with and without the object, over the damping of the arms."""
     found = []
-    for C in DAMPINGS:
-        scene = with_values(cases[STANDARD], {"c": min(C, 0.2), "Kv": C - min(C, 0.2)})
-        together, alone = over(scene, starts, "settling"), _alone(scene, starts)
+    for C, scene in _of_damping(cases).items():
+        together, alone = (over(each, starts, "settling") for each in (scene, without_object(scene)))
         later = float(np.mean(np.greater(together, alone)))
         found.append(Damped(C, median(together), median(alone), later, len(starts)))
     return found

@@ -154,9 +154,11 @@ def columns_of(starts: Sequence[Start]) -> dict[str, list[float]]:
     return {key: [start[place] for start in starts] for place, key in enumerate(keys)}
 
 
-def text_of(scene: Scene) -> str:
-    """All numbers of a scene, to know it again by."""
-    return repr(scene.values)
+def text_of(scene: Scene, start: bool = True) -> str:
+    """All numbers of a scene, to know it again by; or all but the positions that it begins from."""
+    return repr(scene.values if start else {
+        section: {key: number for key, number in numbers.items() if key != "position_m"}
+        for section, numbers in scene.values.items()})
 
 
 def even(scene: Scene) -> bool:

@@ -20,7 +20,7 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.claims import HALF, Check, Kind, Part, almost_all
-from lab.paper.measures import MARGIN, NAMES, UNITS, measure, over, ratio, seconds, settles, settlings
+from lab.paper.measures import MARGIN, NAMES, UNITS, Wish, near, over, ratio, seconds
 from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
 
@@ -83,31 +83,26 @@ class Comparison(NamedTuple):
         """Whether a ratio is so by whatever amount."""
         return found > 1.0 if self.higher else found < 1.0
 
-    @property
-    def settle(self) -> bool:
-        """Whether it needs settling times, which take longer runs than the paper's 20 s."""
-        return any(map(settles, (self.measure, *self.words)))
-
-    def _value(self, scene: Scene, name: str) -> float:
-        """A measure of a scene."""
-        return float(getattr(measure(scene, self.settle), name))
-
-    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
-        """All scenes that `judge` measures, and whether until they settle, for several processes."""
-        return ((scene, self.settle) for scene in self._scenes(cases, starts))
-
-    def _scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[Scene]:
+    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[Wish]:
+        """All that `judge` measures."""
         for pair in self.decisive:
-            a, b = (each.scene(cases) for each in pair)
-            for scene in (a, b):
-                if self.measure != "settling":
-                    yield scene
-                    yield from (started(scene, start) for start in (*ALIKE, *read_starts(a, b).values()))
-                yield from (started(scene, start) for start in starts)
+            scenes = [each.scene(cases) for each in pair]
+            read = (*ALIKE, *read_starts(*scenes).values())
+            for scene in scenes:
+                for start in (start_of(scene), *read):
+                    yield Wish(scene, self._several(start), self.measure)
+                yield Wish(scene, tuple(starts), self.measure)
+        for word in self.words:
+            yield from (Wish(each.scene(cases), tuple(starts), word) for each in (self.changed, self.other))
+        yield from (Wish(scene, tuple(starts), self.measure) for scene in self._swept(cases))
 
-    def _several(self, scene: Scene) -> list[float]:
-        """The measure of a scene; of times that from starts that differ beyond what can be read."""
-        return settlings(scene) if self.measure == "settling" else [self._value(scene, self.measure)]
+    def _several(self, start: Start) -> tuple[Start, ...]:
+        """Where a scene is measured from in place of one start: of times from all that cannot be told apart."""
+        return near(start) if self.measure == "settling" else (start,)
+
+    def _swept(self, cases: Cases) -> list[Scene]:
+        other = self.other.scene(cases)
+        return [with_values(other, {self.letter: value}) for value in self.values]
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Measure and check."""
@@ -123,7 +118,8 @@ class Comparison(NamedTuple):
         return Part(self.statement, self.threshold, self.why, checks, self.reading, curve)
 
     def _check(self, kind: Kind, text: str, changed: Scene, other: Scene) -> Check:
-        pairs = list(zip(self._several(changed), self._several(other), strict=True))
+        several = (over(scene, self._several(start_of(scene)), self.measure) for scene in (changed, other))
+        pairs = list(zip(*several, strict=True))
         found = [ratio(a, b) for a, b in pairs]
         share = sum(map(self.true_of, found)) / len(found)
         if np.isnan(found).all():  # equal arms from a symmetric start, say: true, or not, whatever the other scene is
@@ -164,10 +160,8 @@ class Comparison(NamedTuple):
     def _ratios(
         self, cases: Cases, starts: Sequence[Start], word: str, changed: Variant, other: Variant
     ) -> list[float]:
-        a, b = changed.scene(cases), other.scene(cases)
-        return [
-            ratio(self._value(started(a, start), word), self._value(started(b, start), word)) for start in starts
-        ]
+        several = (over(each.scene(cases), starts, word) for each in (changed, other))
+        return [ratio(a, b) for a, b in zip(*several, strict=True)]
 
     def _random(
         self, cases: Cases, starts: Sequence[Start], word: str, changed: Variant, other: Variant
@@ -216,12 +210,10 @@ class Comparison(NamedTuple):
         """Value of the parameter and median ratio, over the sweep."""
         if not self.values:
             return []
-        other = self.other.scene(cases)
-        before = over(other, starts, self.measure)
+        before = over(self.other.scene(cases), starts, self.measure)
         return [
-            (value, median([ratio(a, b) for a, b in zip(
-                over(with_values(other, {self.letter: value}), starts, self.measure), before, strict=True)]))
-            for value in self.values
+            (value, median([ratio(a, b) for a, b in zip(over(scene, starts, self.measure), before, strict=True)]))
+            for value, scene in zip(self.values, self._swept(cases), strict=True)
         ]
 
 

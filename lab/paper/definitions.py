@@ -31,7 +31,7 @@ RANDOM_STARTS = 200
 
 def definitions(starts: int) -> list[tuple[str, str]]:
     """Name and text of each."""
-    bounds = " and ".join(f"{bound:.0%}" for bound in BOUNDS if bound != SETTLED)
+    bounds = " and ".join(f"{bound:.0%}" for bound in sorted(BOUNDS.values()) if bound != SETTLED)
     return [
         (
             "settled",

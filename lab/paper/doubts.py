@@ -23,14 +23,14 @@ from lab.paper.measures import measure, seconds, settlings
 def doubts(cases: Cases) -> list[tuple[str, str]]:
     """What is doubtful in the source: what, and what follows, with numbers."""
     standard = cases[STANDARD]
-    inputs = measure(cases[9]).input
+    inputs = measure(cases[9], "input")
     literal = started(standard, LITERAL)
     force = float(hertzian_force(standard.grasp.left_contact, np.array([LITERAL[0]]))[0])
     levels = [float(energy(scene.system, scene.initial_state).V_c) for scene in (standard, literal)]
     ps = sorted({*READ_P, 1.0})
     times = [seconds(settlings(with_values(standard, {"p": p}))) for p in ps]
     even, near, odd = (
-        [measure(started(cases[number], start)).settling for number in (STANDARD, 11)]
+        [measure(started(cases[number], start), "settling") for number in (STANDARD, 11)]
         for start in (SYMMETRIC, NEARLY, PRINTED)
     )
     return [

@@ -9,9 +9,11 @@ from functools import partial
 from grasp_ros.scene import Scene
 from lab.paper.cases import STANDARD, Cases, Start, started, value_of
 from lab.paper.compare import Comparison, Variant
-from lab.paper.measures import MARGIN, measure, ratio
+from lab.paper.measures import MARGIN, Wish, measure, ratio
 from lab.paper.properties import SETTLING, tenfold, wide
 from lab.paper.universal import Found, Share
+
+CHANGED = ("settling", "frequency")
 
 
 def _damping_ratio(scene: Scene) -> float:
@@ -31,14 +33,14 @@ def _more_damped(number: int, more: bool, cases: Cases, start: Start) -> Found:
 
 def _gain_matters(number: int, cases: Cases, start: Start) -> Found:
     """Largest change of settling time or frequency, as a ratio above 1."""
-    a, b = measure(started(cases[number], start)), measure(started(cases[1], start))
-    changes = [ratio(a.settling, b.settling), ratio(a.frequency, b.frequency)]
+    a, b = started(cases[number], start), started(cases[STANDARD], start)
+    changes = [ratio(measure(a, name), measure(b, name)) for name in CHANGED]
     change = max(max(each, 1.0 / each) if each else math.inf for each in changes)
     return Found(change, change > MARGIN)
 
 
-def _both(number: int, cases: Cases, start: Start) -> Iterator[Scene]:
-    yield from (started(cases[each], start) for each in (number, STANDARD))
+def _both(number: int, cases: Cases, start: Start) -> Iterator[Wish]:
+    yield from (Wish(cases[each], (start,), name) for each in (number, STANDARD) for name in CHANGED)
 
 
 def any_gain() -> tuple[Share, ...]:

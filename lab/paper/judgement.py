@@ -3,34 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from itertools import islice
 
-from grasp_ros.scene import Scene
-from lab.paper.cases import Cases, Start, text_of
+from lab.paper.cases import Cases, Start
 from lab.paper.claims import Claim, Part
 from lab.paper.conclusions import conclusions
-from lab.paper.measures import Measures, measure, remember
+from lab.paper.measures import Key, Known, Wish, found_of, key_of
 from lab.paper.observations import observations
 from lab.paper.running_text import running_text
 from lab.paper.statement import Judged, Statement
+
+PIECE = 50  # starts that a process measures before it reports
 
 
 def statements() -> dict[str, Statement]:
     """Observations O1 to O12, conclusions C1 to C3, running text T1 on."""
     return {each.key: each for each in (*observations(), *conclusions(), *running_text())}
-
-
-Wanted = tuple[str, bool]  # a scene by its numbers, and whether it is to be measured until it settles
-Wish = tuple[Scene, bool]
-
-
-class Task(NamedTuple):
-    """What a process needs to judge one part, which stands in one statement or in several."""
-
-    place: int  # among `parts`
-    cases: Cases
-    starts: Sequence[Start]
-    known: dict[Wanted, Measures]
 
 
 def parts(known: Mapping[str, Statement]) -> list[Judged]:
@@ -42,31 +30,33 @@ def parts(known: Mapping[str, Statement]) -> list[Judged]:
     return found
 
 
-def wanted_of(cases: Cases, starts: Sequence[Start]) -> list[dict[Wanted, Wish]]:
-    """What each part compares; what settles is measured until then everywhere, and only once."""
-    found = [list(part.scenes(cases, starts)) for part in parts(statements())]
-    settling = {text_of(scene) for wishes in found for scene, settle in wishes if settle}
-    return [{(text := text_of(scene), text in settling): (scene, text in settling) for scene, _ in wishes}
-            for wishes in found]
+def wishes_of(cases: Cases, starts: Sequence[Start]) -> list[list[Wish]]:
+    """What each part measures."""
+    return [list(part.wishes(cases, starts)) for part in parts(statements())]
 
 
-def measured(wish: Wish) -> tuple[Wanted, Measures]:
-    """A scene and its measures; for a process."""
-    scene, settle = wish
-    return (text_of(scene), settle), measure(scene, settle)
+def pieces(wishes: Iterable[Wish]) -> list[Wish]:
+    """What is measured in all, each once, in pieces for several processes."""
+    first: dict[Key, Wish] = {}
+    starts: dict[Key, dict[Start, None]] = {}
+    for wish in wishes:
+        key = key_of(wish.scene, wish.name)
+        first.setdefault(key, wish)
+        starts.setdefault(key, {}).update(dict.fromkeys(wish.starts))
+    return [
+        wish._replace(starts=tuple(islice(starts[key], begin, begin + PIECE)))
+        for key, wish in first.items() for begin in range(0, len(starts[key]), PIECE)
+    ]
 
 
-def judged(task: Task) -> tuple[int, Part]:
-    """The place of a part, and how it is judged; for a process."""
-    remember(task.known)
-    return task.place, parts(statements())[task.place].judge(task.cases, task.starts)
+def measured(wish: Wish) -> Known:
+    """What a wish finds; for a process."""
+    return found_of([wish])
 
 
-def tasks(
-    cases: Cases, starts: Sequence[Start], wanted: Sequence[Iterable[Wanted]], known: Mapping[Wanted, Measures]
-) -> list[Task]:
-    """A task for each part, with the measures that it asks for."""
-    return [Task(place, cases, starts, {each: known[each] for each in own}) for place, own in enumerate(wanted)]
+def judged(place: int, cases: Cases, starts: Sequence[Start]) -> tuple[int, Part]:
+    """The place of a part among `parts`, and how it is judged; for a process."""
+    return place, parts(statements())[place].judge(cases, starts)
 
 
 def claims_of(found: Mapping[int, Part]) -> list[Claim]:

@@ -51,7 +51,7 @@ def _edge(number: int, scene: Scene) -> Edge:
         apart,
         float(_asymmetry(scene, t).max()),
         float(t[above[0]]) if len(above) else float("inf"),
-        tuple(measure(moved(scene, -offset)).settling for offset in MOVED),
+        tuple(measure(moved(scene, -offset), "settling") for offset in MOVED),
     )
 
 

@@ -14,9 +14,9 @@ from grasp_ros.physics.lyapunov import largest_deformation
 from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
-from grasp_ros.simulation import Trajectory, ensemble, simulate
-from lab.paper.cases import Cases, Start, started, text_of
-from lab.paper.measures import MARGIN, measure, seconds, settlings
+from grasp_ros.simulation import Trajectory, simulate
+from lab.paper.cases import Cases, Start, text_of
+from lab.paper.measures import MARGIN, measure, over, seconds, settlings
 from lab.paper.universal import Found
 
 ROUNDING = 1e-12  # of V(0)
@@ -27,7 +27,6 @@ LAST = 1.0  # s, through which a grip must press
 DRIFT = 1e-9  # of V_c or of a displacement, that counts as none
 EXACT = 1e-9  # s, an error of a time that counts as none
 ORDER = 0.1  # how much more than h^2 |u'' / u'| / 8 counts as of second order, since u'' is not constant
-ALONE = 400.0  # s
 SHARE = 1e-3  # of the clearance of (37) that rounding may take, in epsilon
 
 
@@ -131,7 +130,7 @@ def falls_only_in_contact(scene: Scene) -> Found:
 
 def converges(scene: Scene) -> Found:
     """All masses settle, within the time that is looked at."""
-    time = measure(scene).settling
+    time = measure(scene, "settling")
     return Found(time, bool(np.isfinite(time)), f"{float(f'{time:.2g}'):g} s" if np.isfinite(time) else "never")
 
 
@@ -270,15 +269,9 @@ def without_object(scene: Scene) -> Scene:
     return scenes.compose(scene.name, kept)
 
 
-def alone_settling(scene: Scene) -> float:
-    """Settling time of the arms without an object, in s, from their closed form; infinite: not within ALONE."""
-    apart = without_object(scene.changed({"time.duration_s": ALONE}))
-    return float(ensemble(apart, {}, ("settling_time",), threads=1).columns["settling_time"][0])
-
-
 def collisions_help(cases: Cases, number: int, start: Start) -> Found:
     """Settling time with the object over that of the arms alone."""
-    scene = started(cases[number], start)
-    together, alone = measure(scene).settling, alone_settling(scene)
+    together, alone = (
+        over(scene, [start], "settling")[0] for scene in (cases[number], without_object(cases[number])))
     share = together / alone if np.isfinite(alone) else (0.0 if np.isfinite(together) else 1.0)
     return Found(share, share < 1.0 / MARGIN)

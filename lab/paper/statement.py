@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
-from grasp_ros.scene import Scene
 from lab.paper.cases import Cases, Start
 from lab.paper.claims import Claim, Part
+from lab.paper.measures import Wish
 
 
 class Judged(Protocol):
     """A part that can be judged: `Comparison`, `Universal` or `Share`."""
 
-    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
-        """Scenes that it will measure, and whether until they settle."""
+    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterable[Wish]:
+        """What it will measure, for several processes to measure it first."""
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Measure and check."""

@@ -7,6 +7,7 @@ import multiprocessing
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import PIL.Image
@@ -34,9 +35,9 @@ from lab.paper.compare import Comparison, Variant
 from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
-from lab.paper.judgement import Wanted, claims_of, judged, measured, statements, tasks, wanted_of
+from lab.paper.judgement import claims_of, judged, measured, pieces, statements, wishes_of
 from lab.paper.knife_edge import knife_edge
-from lab.paper.measures import SHORT, Measures, remember
+from lab.paper.measures import SHORT, Known, found_of, remember
 from lab.paper.page import Image, Picture, Report, agreement, summary
 from lab.paper.prints import compared
 from lab.paper.quantities import quantities
@@ -47,8 +48,7 @@ from lab.paper.svg import short_svg
 
 DPI = 220
 COLORS = 256  # of a PNG file
-CHUNK = 8  # scenes that a process measures before it reports
-Job = tuple[str, Callable[..., Any], tuple[Any, ...]]
+Job = tuple[str, Callable[..., Any], tuple[Any, ...], Known]  # what comes out, how, of what, and what is known
 
 
 def report(graph: bool, starts: int) -> Report:
@@ -62,18 +62,19 @@ def report(graph: bool, starts: int) -> Report:
         Random starts.
     """
     cases, drawn = load_cases(), random_starts(starts)
-    asked = wanted_of(cases, drawn)
-    wanted = list({key: wish for own in asked for key, wish in own.items()}.values())
+    wishes = wishes_of(cases, drawn)
+    wanted = pieces([*chain.from_iterable(wishes), *arms.wishes(cases, drawn)])
     context = multiprocessing.get_context("spawn")
     with context.Pool(os.cpu_count() or 1) as pool, tqdm(
         total=len(wanted), desc="random starts and sweeps", file=sys.stderr
     ) as bar:
-        known: dict[Wanted, Measures] = {}
-        for each, found in pool.imap_unordered(measured, wanted, CHUNK):
-            known[each] = found
+        for found in pool.imap_unordered(measured, wanted):
+            remember(found)
             bar.update()
-        remember(known)
-        jobs = [*_jobs(cases, drawn), *(("part", judged, (task,)) for task in tasks(cases, drawn, asked, known))]
+        jobs: list[Job] = [
+            *_jobs(cases, drawn),
+            *(("part", judged, (place, cases, drawn), found_of(own)) for place, own in enumerate(wishes)),
+        ]
         bar.reset(len(jobs))
         bar.set_description("figures, verdicts, what the paper lacks")
         done: dict[str, list[Any]] = {}
@@ -85,13 +86,15 @@ def report(graph: bool, starts: int) -> Report:
 
 
 def _called(job: Job) -> tuple[str, Any]:
-    key, function, arguments = job
+    key, function, arguments, known = job
+    remember(known)
     return key, function(*arguments)
 
 
 def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
     """What can be computed at the same time, the longest first."""
-    return [
+    settled = found_of(arms.wishes(cases, drawn))
+    several: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = [
         ("found", _chaos, (cases,)),
         ("found", _stiffer, (cases, drawn)),
         ("found", _damped, (cases, drawn)),
@@ -106,6 +109,7 @@ def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
         ("doubts", doubts, (cases,)),
         ("replays", _replays, (cases,)),
     ]
+    return [(*job, settled) for job in several]
 
 
 def image(drawing: Any) -> Image:
@@ -116,6 +120,7 @@ def image(drawing: Any) -> Image:
         metadata = {"Date": None} if kind == "svg" else {"Software": None}
         with canvas.style(figures.style()):
             drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
+        drawing.set_layout_engine("none")  # what the first has laid out stays
         files.append(file)
     return Image(short_svg(files[0].getvalue()), _few_colors(files[1]))
 

@@ -19,6 +19,7 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.claims import Check, Kind, Part, almost_all
+from lab.paper.measures import Wish
 
 FEW = 20  # random starts of each case
 FEWER = 10  # of each value of a sweep
@@ -52,9 +53,9 @@ class Universal(NamedTuple):
     base: int = STANDARD  # the case that the sweep begins from
     reading: bool = False
 
-    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
-        """Scenes that can be measured ahead: none; the tests are quick."""
-        return iter(())
+    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterable[Wish]:
+        """None: the tests are quick."""
+        return ()
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Test and check."""
@@ -120,7 +121,7 @@ class Share(NamedTuple):
     starts: int = 2 * FEW  # at most
     letter: str = ""  # swept in the first of the cases
     values: tuple[float, ...] = ()
-    measured: Callable[[Cases, Start], Iterable[Scene]] = lambda cases, start: ()  # what it measures until it settles
+    measured: Callable[[Cases, Start], Iterable[Wish]] = lambda cases, start: ()
     reading: bool = False
 
     def _changed(self, cases: Cases) -> list[tuple[float, Cases]]:
@@ -131,13 +132,13 @@ class Share(NamedTuple):
     def _read(self, cases: Cases) -> dict[str, Start]:
         return read_starts(*(cases[number] for number in self.of))
 
-    def scenes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[tuple[Scene, bool]]:
+    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[Wish]:
         """Those of `measured`."""
         for start in (PRINTED, *self._read(cases).values(), *starts[: self.starts]):
-            yield from ((scene, True) for scene in self.measured(cases, start))
+            yield from self.measured(cases, start)
         for _, changed in self._changed(cases):
             for start in starts[:FEWER]:
-                yield from ((scene, True) for scene in self.measured(changed, start))
+                yield from self.measured(changed, start)
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Test and check."""

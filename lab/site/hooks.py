@@ -1,31 +1,24 @@
-"""What `mkdocs build` calls: pages that the code itself writes, pages of the root, figures of the examples."""
+"""What `mkdocs build` calls: pages of the root, figures of the examples."""
 
 from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 
-from lab.site import examples, nodes, reference
+from lab.site import examples
 
-GENERATED: dict[str, Callable[[], str]] = {
-    "reference/python.md": reference.python, "reference/scenes.md": reference.scene_keys,
-    "reference/commands.md": reference.commands, "reference/topics.md": reference.topics_page,
-    "reference/nodes.md": nodes.page, "reference/exit-codes.md": reference.statuses,
-}
 ROOT_PAGES = {"index.md": "README.md", "changelog.md": "CHANGELOG.md", "contributing.md": "CONTRIBUTING.md"}
 ASSETS = ("LICENSE", "CITATION.cff")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add what is not in `docs`."""
-    for uri, write in GENERATED.items():
-        files.append(File.generated(config, uri, content=write()))
     for uri, name in ROOT_PAGES.items():
         files.append(File.generated(config, uri, content=_of_root(examples.ROOT / name)))
     for name in ASSETS:

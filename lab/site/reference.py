@@ -38,7 +38,8 @@ PUBLIC = {  # modules and their public names; what has `__all__` says it itself,
 
 def python() -> str:
     """The public Python interface, for mkdocstrings to fill in."""
-    parts = ["# Python", "All numbers are SI. What stands here is public and stays within a release."]
+    parts = ["# Python", "All numbers are SI. What stands here is public and stays within a release. The site,"
+             " which `make docs` builds, has arguments and results, too; so has `help(...)`."]
     known: set[str] = set()
     for name, listed in PUBLIC.items():
         module = importlib.import_module(name)
@@ -52,10 +53,11 @@ def python() -> str:
 
 
 def _names(module: str, things: dict[str, Any]) -> str:
-    """Where names of a module come from that are not its own."""
-    rows = [(f"`{module}.{name}`", f"`{thing.__module__}.{thing.__qualname__}`") for name, thing in things.items()
+    """Names of a module, with a line each, and where they come from."""
+    rows = [(f"`{module}.{name}`", _cell(str(thing.__doc__).partition("\n\n")[0]),
+             f"`{thing.__module__}.{thing.__qualname__}`") for name, thing in things.items()
             if inspect.isclass(thing) or inspect.isfunction(thing)]
-    return table(("name", "defined as"), rows)
+    return table(("name", "what it is", "defined as"), rows)
 
 
 def scene_keys() -> str:

@@ -1,6 +1,6 @@
 """The pages as they lie in the repository: every link leads somewhere, and every file can be reached.
 
-What is made while the site is built, the reference and figures of examples, `test_pages.py` looks at.
+What is made while the site is built, figures of examples, `test_pages.py` looks at.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from lab.site.__main__ import written
 from lab.site.examples import has_examples
 
 ROOT = Path(__file__).parents[2]
@@ -22,8 +23,7 @@ def links(page: Path) -> list[tuple[Path, str]]:
     """Files of this repository that a page links to or shows, with the anchor or an empty text."""
     text = re.sub(r"(?ms)^ {4}[^\n]*|^```.*?^```", "", page.read_text(encoding="utf-8"))  # code may have brackets, too
     targets = re.findall(r"\]\(([^)\s]+)\)", text) + re.findall(r'<img src="([^"]+)"', text)
-    found = [target.partition("#") for target in targets
-             if "://" not in target and not target.startswith(("../reference/", "reference/"))]
+    found = [target.partition("#") for target in targets if "://" not in target]
     return [((page.parent / path).resolve() if path else page, anchor) for path, _, anchor in found]
 
 
@@ -31,6 +31,12 @@ def anchors(page: Path) -> set[str]:
     """Anchors of the headings of a page, as GitHub names them."""
     titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
+
+
+def test_reference_is_what_the_code_says() -> None:
+    """Written by `python -m lab.site`."""
+    for page, text in written().items():
+        assert page.read_text(encoding="utf-8") == text, page
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
