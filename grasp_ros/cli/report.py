@@ -17,7 +17,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.quantities import SETTLED
-from grasp_ros.simulation.summary import MOTION, OUTPUTS
+from grasp_ros.simulation.summary import MOTION, TICKS
 
 Row = tuple[str, str]
 
@@ -75,7 +75,7 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
         rows.append(("largest forces" if exact else "largest at outputs", ", ".join(largest)))
     if "lost_J" in found:
         parts = [f"{name} {value:.4g}" for name, value in found["lost_J"].items() if value != 0.0]
-        how = "; trapezoidal rule at the output times" if parts and found["lost_by"] == OUTPUTS else ""
+        how = "; trapezoidal rule at the control periods" if parts and found["lost_by"] == TICKS else ""
         rows.append(("energy lost, J", (", ".join(parts) or "none") + how))
     return rows
 

@@ -6,6 +6,7 @@ simulated. Every key carries its unit. Nothing is repaired: a file that is not e
 
 from __future__ import annotations
 
+import copy
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +33,7 @@ from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
 from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, is_text, read_sections
 
 TEXTS = ("title", "readings", "watch")
+CHANGED, FEW = " [", 2  # in a title, before what was changed; changes that are named there
 PAPER = frozenset(  # the sections of the paper's grasp
     ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")
 )
@@ -170,20 +172,25 @@ class Scene(Frozen):
         return f"each command held for {self.period_ns / 1e6:g} ms" if sampled else "continuous feedback"
 
     def changed(self, numbers: Mapping[str, float]) -> Scene:
-        """The scene with other numbers, by "section.key".
+        """The scene with other numbers, by "section.key"; its title says so, and it has nothing to watch for.
 
         Raises
         ------
         SceneError
             If the result cannot be run.
         """
-        document = self._document()
+        document, other = self._document(), []
         for name, number in numbers.items():
             section, _, key = name.partition(".")
             if key not in self.values.get(section, {}):
                 known = [f"{own}.{key}" for own, found in self.values.items() for key in found]
                 raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(name, known)}")
             document[section][key] = number
+            if self.values[section][key] != number:
+                other.append(name)
+        if other:
+            words = [f"{name}={_short(numbers[name])}" for name in other]
+            document |= {"title": _retitled(self.title, words), "watch": ""}
         return _read(document, self.name, self.name)
 
     def to_yaml(self) -> str:
@@ -250,7 +257,10 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
         raise SceneError(f"{source}: {error}") from None
     if not isinstance(document, dict):
         raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
+    before = copy.deepcopy(document) if settings else document
     apply(settings, document)
+    if document != before and is_text(document.get("title")) and is_text(document.get("watch", "")):
+        document |= {"title": _retitled(document["title"], settings), "watch": ""}
     return _read(document, name, source)
 
 
@@ -280,6 +290,16 @@ def compose(
     check_keys(name, "", sections, tuple(BY_SECTION), ("time",))
     texts = {"title": name if title is None else title, "readings": readings, "watch": watch}
     return _read({**texts, **sections}, name, name)
+
+
+def _retitled(title: str, changes: Sequence[str]) -> str:
+    """A title that says what was changed, if it is little; what to watch for was said of the numbers before."""
+    before, again, _ = title.partition(CHANGED)
+    return f"{before}{CHANGED}{', '.join(changes) if len(changes) <= FEW and not again else 'other numbers'}]"
+
+
+def _short(number: Any) -> str:
+    return f"{number:g}" if isinstance(number, (int, float)) else "..."
 
 
 def _read(document: Mapping[Any, Any], name: str, source: str) -> Scene:

@@ -1,7 +1,7 @@
 """The energy that a motion lost, by cause, in J; V counts it twice.
 
 Of an exact run it is what an observer sees while the run is integrated again, from closed forms and polynomials; of any
-other motion what its output times tell.
+other motion what its states at every control period and output time tell.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import by_output_times, watch_again
+from grasp_ros.simulation.repeat import at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory
 
 CAUSES = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
@@ -56,12 +57,18 @@ def power_lost(system: System, state: Array) -> Losses:
 def running_losses(run: Trajectory) -> tuple[Array, Losses]:
     """Energy lost so far by each cause: times (n,) in s, and arrays (n,) in J; see `quantities.by_output_times`.
 
-    The times are those of outputs and events of an exact run, and its begin and end; those of outputs of any other,
-    whose sums follow the trapezoidal rule.
+    The times are those of outputs and events of an exact run, and its begin and end; those of outputs and control
+    periods of any other, whose sums follow the trapezoidal rule.
+
+    Raises
+    ------
+    Refused
+        If the output times of such a run leave control periods out, and it cannot be repeated, see `Trajectory.at`.
     """
     if not by_output_times(run):
         times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
         return times, observed_losses(run, times)
+    run = at_every_tick(run)
     steps = np.diff(run.t)
     rates = power_lost(run.scene.system, run.state)
     return run.t, Losses(*(np.concatenate([[0.0], np.cumsum(0.5 * steps * (r[1:] + r[:-1]))]) for r in rates))
@@ -81,9 +88,15 @@ def losses(run: Trajectory) -> Losses:
     """Energy lost by each cause over the whole run, in J; see `quantities.by_output_times`.
 
     What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
-    out of the arms, beside what they have stored in V_c, from the positions at the output times.
+    out of the arms, beside what they have stored in V_c.
+
+    Raises
+    ------
+    Refused
+        As `running_losses`.
     """
     exact = not by_output_times(run)
+    run = run if exact else at_every_tick(run)
     sums = observed_losses(run, np.array([0.0, run.scene.duration])) if exact else running_losses(run)[1]
     found = Losses(*(np.asarray(total[-1]) for total in sums))
     if not run.sampled:

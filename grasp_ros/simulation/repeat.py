@@ -7,6 +7,7 @@ used again as they are, whatever gave them; otherwise the laws of the scene answ
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +58,23 @@ def states_at(run: Trajectory, times: Array) -> Array:
     return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
 
 
+def at_every_tick(run: Trajectory) -> Trajectory:
+    """A run with every control period among its output times, up to where it is known.
+
+    Raises
+    ------
+    Refused
+        If it has not, and cannot be repeated, see `states_at`.
+    """
+    ticks = tick_times(run.scene)
+    ticks = ticks[ticks <= reached(run)]
+    if np.isin(ticks, run.t).all():
+        return run
+    grid = np.union1d(ticks, run.t)
+    states = states_at(run, grid)
+    return replace(run, t=grid, state=states, loop=solve(run.scene, grid, _how(run))[1])
+
+
 def breaks_of(run: Trajectory) -> Array:
     """Times (k,) in s between which a run is smooth: its begin and end, its events, and changes of its inputs."""
     scene, end = run.scene, reached(run)
@@ -77,9 +95,11 @@ def _again(run: Trajectory, grid: Array) -> Array:
     if run.controllers:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
                       " period, as without a grid")
-    exact = run.method == EXACT
-    how = How(run.method, run.setting, run.sampled, UNLIMITED, UNLIMITED if exact else MAX_WORK)
-    return solve(run.scene, grid, how)[0].state
+    return solve(run.scene, grid, _how(run))[0].state
+
+
+def _how(run: Trajectory) -> How:
+    return How(run.method, run.setting, run.sampled, UNLIMITED, UNLIMITED if run.method == EXACT else MAX_WORK)
 
 
 def _every_tick(run: Trajectory, last: Array) -> bool:

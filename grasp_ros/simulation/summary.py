@@ -9,6 +9,7 @@ import numpy as np
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.observe.sight import Wanted
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -26,10 +27,10 @@ from grasp_ros.simulation.quantities import (
     settling_times,
     watch_again,
 )
-from grasp_ros.simulation.repeat import UNLIMITED
+from grasp_ros.simulation.repeat import UNLIMITED, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory
 
-MOTION, OUTPUTS = "motion", "output times"  # what a number is of
+MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
 ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
 PEAKS = find(("peak_input", "peak_impact"))  # in the order of FORCES
@@ -39,7 +40,7 @@ class _Observed(NamedTuple):
     """What was seen of a run."""
 
     settled: Array  # (3,), s: left arm, object, right arm
-    lost: Losses
+    lost: Losses | None  # None: the run cannot be repeated at every control period
     largest_of: str
     largest: list[float]  # N, see FORCES
 
@@ -49,8 +50,8 @@ def summary(run: Trajectory) -> dict[str, Any]:
     """Numbers of a run by names that end with their unit; what the run does not have is left out.
 
     `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled. Where V_c may
-    rise, `last_outside_s` has the last times outside the same bound, by the output times, in its place. `touches` is
-    left out for methods that do not look for them. V_c is twice the energy.
+    rise, `last_outside_s` has the last times outside the same bound, at output times and control periods, in its place.
+    `touches` is left out for methods that do not look for them. V_c is twice the energy.
     """
     scene, method = run.scene, METHODS[run.method]
     found: dict[str, Any] = {
@@ -77,18 +78,27 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
     if not METHODS[run.method].energy_check:
         found["V_c_rise_J"] = float((level - np.minimum.accumulate(level)).max())
-    observed = _by_output_times(run) if by_output_times(run) else _of_the_motion(run)
+    dense = _dense(run)
+    observed = _by_output_times(dense) if by_output_times(run) else _of_the_motion(run)
     distance = settled_distance(run.scene)
     if may_rise(run) and distance > 0.0:
-        found["last_outside_s"] = _by_body(run, last_outside(run.t, run.state[:, 0::2], distance))
+        found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
     elif not np.isnan(observed.settled).any():
         found["settled_s"] = _by_body(run, observed.settled)
         found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
     found["largest_of"], found["largest_N"] = observed.largest_of, dict(zip(FORCES, observed.largest, strict=True))
-    if len(run.t) > 1 and not system.external:
+    if observed.lost is not None and len(dense.t) > 1 and not system.external:
         found["lost_J"] = {cause: float(value) for cause, value in observed.lost._asdict().items()}
-        found["lost_by"] = OUTPUTS if by_output_times(run) else MOTION
+        found["lost_by"] = TICKS if by_output_times(run) else MOTION
     return found
+
+
+def _dense(run: Trajectory) -> Trajectory:
+    """A run that output times alone tell of, with every control period among them if it can be repeated."""
+    try:
+        return at_every_tick(run) if by_output_times(run) else run
+    except Refused:
+        return run
 
 
 def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
@@ -112,4 +122,8 @@ def _by_output_times(run: Trajectory) -> _Observed:
         setup = Setup(accuracy=run.setting, sampled=run.sampled, max_events=UNLIMITED, max_work=UNLIMITED)
         columns = ensemble(run.scene, {}, [peak.name for peak in PEAKS], setup=setup, threads=1).columns
         where, largest = MOTION, [float(column[0]) for column in columns.values()]
-    return _Observed(settling_times(run), losses(run), where, largest)
+    try:
+        lost = losses(run)
+    except Refused:
+        lost = None
+    return _Observed(settling_times(run), lost, where, largest)

@@ -9,11 +9,12 @@ import pytest
 from exact.bench import bench
 from oracles import FREE
 
-from grasp_ros.exact.automaton.clamp_surface import glides, surface_side
+from grasp_ros.exact.automaton.clamp_surface import glides, has_glided, surface_side
 from grasp_ros.exact.automaton.modes import leave_gliding
 from grasp_ros.exact.automaton.resting_pair import impact_beside
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.kinematics import other
+from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Pair, Work
 from grasp_ros.physics.model import Contact, Grasp
 from grasp_ros.physics.system import System
@@ -44,6 +45,7 @@ def test_a_pair_glides_where_nothing_moves_it(side: Body, options: dict[str, Any
     ({"push": 0.003 * (1.0 + 1e-15), "stiffness": 0.3}, 0.6),
     ({"push": 0.003 * (1.0 - 1e-15), "stiffness": 0.3}, 0.6),
     ({"beside": (0.01, -2.0), "beside_mode": Pair.CONTACT}, 0.0),  # it glides, too
+    ({"beside": (0.01, 0.0), "beside_mode": Pair.CONTACT}, 10.0),  # it pushes the object
 ])
 def test_the_first_derivative_beyond_its_rounding_decides(side: Body, options: dict[str, Any], expected: float) -> None:
     b = bench(side, 0.01, -2.0, Pair.CONTACT, **options)
@@ -75,6 +77,14 @@ def test_beyond_the_third_derivative_only_bodies_without_an_impact_beside_are_kn
     assert push == 0.0
     b = bench(side, u, -2.0, Pair.CONTACT, **{**glides_beside, "object_speed": 2.0 + pace / k})
     assert surface_side(b.plant, b.state, side) == 0.0
+
+
+@SIDES
+@pytest.mark.parametrize(("d", "options", "expected"), [
+    (-2.0, {}, True), (-1.0, {}, False), (-2.0, {"push": 1.0}, False)])
+def test_a_pair_has_glided_at_the_surface_alone(side: Body, d: float, options: dict[str, Any], expected: bool) -> None:
+    b = bench(side, 0.01, d, Pair.CONTACT, **options)
+    assert bool(has_glided(b.plant, b.state, side, SURFACE)) is expected
 
 
 @SIDES

@@ -12,10 +12,10 @@ from mpmath import mp, mpf
 from oracles import first_touch_from_rest, flight, flight_array
 
 from grasp_ros.exact.flight.closed_form import fly, launch
-from grasp_ros.exact.flight.search import first_root, pair_in_flight
+from grasp_ros.exact.flight.search import first_root, motion_at, pair_in_flight, relative_bound
 from grasp_ros.exact.flight.segment import is_far
 from grasp_ros.exact.kinematics import bound
-from grasp_ros.exact.records import Flights, Motion, Plant, Regime
+from grasp_ros.exact.records import Flights, Motion, PairFlight, Plant, Regime
 from grasp_ros.exact.tolerances import FAR
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Transition, U, Work
 
@@ -54,6 +54,27 @@ def solve(body: Body, x: float, v: float, t: float) -> tuple[float, float]:
     return found[0], found[1]
 
 
+def uncompiled(kernel: Any) -> Any:
+    """A kernel as Python."""
+    return getattr(kernel, "py_func", kernel)  # there is one only where kernels are compiled
+
+
+def paired(arm: Body, body: Body, at: tuple[float, float, float, float], sign: float, inverse_p: float = 0.0
+           ) -> tuple[PairFlight, Motion]:
+    """A pair in flight, and its motion at the begin, from x, v of the arm and of the object."""
+    x, v, x_o, v_o = at
+    side = LEFT if sign > 0.0 else RIGHT
+    rows, y = np.zeros((3, 4)), np.zeros(8)
+    rows[:, Of.MASS] = 1.0
+    rows[side], rows[OBJECT] = arm, body
+    pairs = np.full((2, 2), 1.0 / inverse_p if inverse_p > 0.0 else 0.0)
+    u = sign * (x - x_o)
+    y[U.L + side] = u
+    launched = [launch(rows[row], *map(float, at[2 * (row == OBJECT) :][:2])) for row in (LEFT, RIGHT, OBJECT)]
+    pair = uncompiled(pair_in_flight)(Plant(rows, rows, pairs, 0.0), y, Flights(*launched), side)
+    return pair, Motion(x, v, x_o, v_o, u, sign * (v - v_o), abs(x) + abs(x_o))
+
+
 def root(
     arm: Body,
     body: Body,
@@ -65,19 +86,9 @@ def root(
     inverse_p: float = 0.0,
 ) -> tuple[float, int]:
     """First event of a flight from x, v of the arm and of the object, and the iterations it took."""
-    x, v, x_o, v_o = at
-    side = LEFT if sign > 0.0 else RIGHT
-    rows, y, work = np.zeros((3, 4)), np.zeros(8), np.zeros(len(Work), dtype=np.int64)
-    rows[:, Of.MASS] = 1.0
-    rows[side], rows[OBJECT] = arm, body
-    pairs = np.full((2, 2), 1.0 / inverse_p if inverse_p > 0.0 else 0.0)
-    u = sign * (x - x_o)
-    y[U.L + side] = u
-    launched = [launch(rows[row], *map(float, at[2 * (row == OBJECT) :][:2])) for row in (LEFT, RIGHT, OBJECT)]
-    uncompiled = getattr(pair_in_flight, "py_func", pair_in_flight)  # there is one only where kernels are compiled
-    pair = uncompiled(Plant(rows, rows, pairs, 0.0), y, Flights(*launched), side)
-    at = Motion(x, v, x_o, v_o, u, sign * (v - v_o), abs(x) + abs(x_o))
-    found, known = first_root(kind, pair, 0.0, at, span, math.inf, work)
+    work = np.zeros(len(Work), dtype=np.int64)
+    pair, begin = paired(arm, body, at, sign, inverse_p)
+    found, known = first_root(kind, pair, 0.0, begin, span, math.inf, work)
     assert known == math.inf
     return found, int(work[Work.ROOT_ITERATIONS])
 
@@ -399,6 +410,26 @@ def test_the_bound_holds_and_is_not_idle(body: Body) -> None:
             limit = bound(np.array(body), q, q_rate, span)
             assert largest <= limit * (1 + 1e-14)
             assert limit <= 30.0 * largest
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["left", "right"])
+def test_the_gap_follows_both_bodies(sign: float) -> None:
+    """Of a short flight by the ways of both, of a long one by their places."""
+    arm, body = (1.0, 15.0, 0.7, 0.0), (5.0, 2.0, 0.1, 1.0)
+    pair, _ = paired(arm, body, (0.3, 2.0, 0.4, -1.5), sign)
+    for t in (1e-3, 3.0):
+        x, x_o = (solve(own, *start, t)[0] for own, start in ((arm, (0.3, 2.0)), (body, (0.4, -1.5))))
+        assert uncompiled(motion_at)(pair, t).u == pytest.approx(sign * (x - x_o), rel=1e-13)
+
+
+def test_bodies_that_move_alike_are_bounded_as_one() -> None:
+    """The bound holds for the difference of their motions, and is far below that of each."""
+    body: Body = (2.0, 3.0, 0.5, 0.0)
+    pair, _ = paired(body, body, (0.3, 2.0, 0.301, 1.998), 1.0)
+    moved = [[flight(body, *start, 3.0 * j / 60)[0] for j in range(61)] for start in ((0.3, 2.0), (0.301, 1.998))]
+    largest = max(abs(x - x_o) for x, x_o in zip(*moved, strict=True))
+    limit = uncompiled(relative_bound)(pair, 0.3, 2.0, 0.301, 1.998, 3.0)
+    assert largest <= limit <= 30.0 * largest
 
 
 @pytest.mark.parametrize("size", [2.0**-540, 2.0**-700, 2.0**-900, 2.0**600])

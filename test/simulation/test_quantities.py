@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from documents import scene_of
 
 from grasp_ros import scene as scenes
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation import simulate
@@ -20,6 +23,8 @@ from grasp_ros.simulation.quantities import (
     last_outside,
     settling_times,
 )
+from grasp_ros.simulation.summary import summary
+from grasp_ros.simulation.ticks import tick_times
 
 
 def test_last_time_outside_of_known_motions() -> None:
@@ -75,6 +80,26 @@ def test_losses_of_a_run_without_feedback_of_its_own_have_its_output_times() -> 
     run = simulate(scenes.load("case_01"), sampled=True)
     assert by_output_times(run)
     assert np.array_equal(running_losses(run)[0], run.t)
+
+
+@pytest.mark.parametrize(("options", "rounding"), [({"sampled": True}, 0.0), ({"method": "dop853"}, 1e-6)])
+def test_losses_do_not_depend_on_the_output_times(options: dict[str, Any], rounding: float) -> None:
+    """Eleven output times once made dampers take an eighth, and held commands give energy."""
+    scene = scenes.load("case_01")
+    coarse = simulate(scene, grid=np.linspace(0.0, scene.duration, 11), **options)
+    fine = simulate(scene, grid=tick_times(scene), **options)
+    assert [*map(float, losses(coarse))] == pytest.approx([*map(float, losses(fine))], rel=rounding, abs=0.0)
+    assert summary(coarse)["lost_J"] == pytest.approx(summary(fine)["lost_J"], rel=rounding, abs=0.0)
+
+
+def test_losses_of_a_run_that_cannot_be_repeated_are_refused() -> None:
+    def rest(tick: int, t: float, x: float, v: float) -> float:
+        return 0.0
+
+    run = simulate(scenes.load("case_01"), grid=[0.0, 10.0], controllers={"left": rest})
+    with pytest.raises(Refused, match="output times at every control period"):
+        losses(run)
+    assert "lost_J" not in summary(run)
 
 
 def test_what_held_commands_take_is_their_work() -> None:
