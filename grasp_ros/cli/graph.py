@@ -163,7 +163,9 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
     spent.note("reading")
-    if not stopped:
+    if stopped:
+        rows.append(("interrupted", f"not verified, not drawn; `grasp verify {graph.bag}` does the one"))
+    else:
         whole = whole and not recording.alarms and not any(recording.missing.values())
     if not (stopped or options.no_check):
         comparison = compare_recording(recording)

@@ -39,6 +39,7 @@ from grasp_ros.simulation import simulate
 pytestmark = pytest.mark.slow  # real processes
 TRACK = 72  # columns
 CONFIG = Path(__file__).parents[2] / "config"
+TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
 
 
 def test_markers_show_the_states_and_only_where_somebody_looks(
@@ -151,8 +152,7 @@ def test_a_live_picture_is_one_state_and_no_writer_waits_for_it(
     peer, _ = node
     launch(sys.executable, "-c", LATE)
     ours, theirs = pty.openpty()
-    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
-    launch(*START, "watch", stdout=theirs, stderr=theirs, env=environment)
+    launch(*START, "watch", stdout=theirs, stderr=theirs, env={**os.environ, **TERMINAL})
     shown = ""
     while len(re.findall(r"t = 1\.\d+ s", shown)) < 3:
         shown += os.read(ours, 65536).decode(errors="replace")
@@ -170,6 +170,23 @@ def test_a_live_picture_is_one_state_and_no_writer_waits_for_it(
         assert [one.qos_profile.reliability for one in readers if one.node_name == "watch"] == [
             ReliabilityPolicy.BEST_EFFORT
         ], [(one.node_namespace, one.node_name) for one in readers]
+
+
+def test_a_plant_that_was_paused_before_anybody_watched_is_said_to_be_and_steps(launch: Any) -> None:
+    launch(*START, "plant", "--ros-args", "-p", "scene:=friction_slide", "-p", "paused:=true")
+    ask = [sys.executable, "-m", "grasp_ros.cli", "ctl", "status"]
+    wait_for(lambda: "paused" in subprocess.run(ask, capture_output=True, text=True, check=False).stdout, "a pause")
+    ours, theirs = pty.openpty()
+    launch(*START, "watch", stdin=theirs, stdout=theirs, stderr=theirs, env={**os.environ, **TERMINAL})
+
+    def shows(pattern: str) -> None:
+        shown = ""
+        while not re.search(pattern, re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown)):
+            shown += os.read(ours, 65536).decode(errors="replace")
+
+    shows("the plant is paused at tick 0; → steps it")
+    os.write(ours, b"\x1b[C")
+    shows(r"t = 0\.001 s[^│]*paused")
 
 
 def test_watch_without_a_plant_says_where_it_has_looked(launch: Any) -> None:

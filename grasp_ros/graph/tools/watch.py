@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections.abc import Callable, Sequence, Set
@@ -19,15 +20,17 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.host import place
 from grasp_ros.graph.keys import Key, Keys
+from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.life import run
-from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.view import Moment, View, named
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of
 
 FRAME_SECONDS = 0.1
 HINT = "Space pause   → step   q quit"
+STATUS_SECONDS = 0.5  # between questions to the plant
 PATIENCE_SECONDS = 10.0  # for a plant to come
 STALE_SECONDS = 1.0  # after a reset: what waits here may still be of the time before it
 MOST_OPEN = WINDOW + 500  # states of which not all has come; a monitor may be WINDOW behind
@@ -87,8 +90,12 @@ class Watch(GraspNode):
                 messages.TYPES[topic.type], topic.name, partial(self._on_message, topic), messages.glance_qos(topic),
                 raw=True,
             )
-        self._asks = {name: self.create_client(Trigger, f"plant/{name}") for name in ("pause", "resume", "step")}
+        services = ("pause", "resume", "step", "status")
+        self._asks = {name: self.create_client(Trigger, f"plant/{name}") for name in services}
         self._asks["steps"] = self.create_client(SetParameters, "plant/set_parameters")
+        self._told: dict[str, Any] = {}  # what the plant says that it is
+        self._waits_for_status = False
+        self.wall_timer(STATUS_SECONDS, self._ask_status)
         self.wall_timer(FRAME_SECONDS, self._look)
         self._keys = Keys()
         self._keys.start()
@@ -124,6 +131,20 @@ class Watch(GraspNode):
         if client.service_is_ready():
             client.call_async(request).add_done_callback(lambda future: then(future.result()))
 
+    def _ask_status(self) -> None:
+        if not self._waits_for_status:
+            self._waits_for_status = self._asks["status"].service_is_ready()
+            self._ask("status", self._on_status)
+
+    def _on_status(self, answer: Any) -> None:
+        self._waits_for_status, self._told = False, json.loads(answer.message)
+
+    def _words_of_status(self) -> str:
+        """Why nothing is seen yet: a paused plant publishes nothing."""
+        state, tick = self._told["state"], self._told["tick"]
+        hint = "; → steps it, Space lets it go on" if state == PAUSED and self._keys.there else ""
+        return f"the plant is {state} at tick {tick}{hint}"
+
     def _draw(self) -> None:
         held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
         there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.count_publishers(topic.name))
@@ -135,6 +156,10 @@ class Watch(GraspNode):
                 self._live.update(self._view.draw(moment, self._live.console.width), refresh=True)
         elif alone and time.monotonic() > self._created + PATIENCE_SECONDS:
             self.fail(self._nobody)
+        elif self._told:
+            self._live.update(self._words_of_status(), refresh=True)
+        if alone:
+            self._told, self._waits_for_status = {}, False
 
     def _moment(self, found: dict[Topic, bytes], alone: bool) -> Moment:
         """One state and all that belongs to it."""
@@ -152,7 +177,9 @@ class Watch(GraspNode):
             laws = self._view.scene.system.laws
             commands = {side: inputs[body] for side, body in SIDES.items() if body in laws}
         level = named(_read(LYAPUNOV, found).position) if LYAPUNOV in found else {}
-        words = "the plant has ended" if alone else f"{self._rate:.0f} ticks/s"
+        phase = self._told.get("state", Phase.RUNNING.value)
+        pace = f"{self._rate:.0f} ticks/s" if phase == Phase.RUNNING.value else phase
+        words = "the plant has ended" if alone else pace
         return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)
 
     def close(self) -> None:
