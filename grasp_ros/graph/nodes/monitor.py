@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from datetime import datetime
 from functools import partial
@@ -24,7 +24,6 @@ from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen, seen_of
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
 from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
 from grasp_ros.graph.running import Running
@@ -283,8 +282,3 @@ class Monitor(PeerNode):
                 self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._output)
-
-
-def main(_: str, received: Sequence[int]) -> int:
-    """Run the monitor."""
-    return run([Monitor], received)

@@ -222,6 +222,10 @@ class GraspNode(ParameterNode):
             if header is not None:
                 service.send_response(service.callback(request, service.srv_type.Response()), header)
 
+    def work(self, received: Sequence[int]) -> bool:
+        """Do in place of a spin what has an order of its own, until something is received; whether there is any."""
+        return False
+
     def behind(self) -> object:
         """What changes while it takes what had arrived before a signal; None: nothing that must be taken."""
         return None
