@@ -20,7 +20,7 @@ from grasp_ros.graph.health.beats import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
-from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen, seen_of
+from grasp_ros.graph.nodes.judge import Announcement, Judge
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
@@ -46,6 +46,7 @@ from grasp_ros.scene.topics import (
     WINDOW,
     Numbers,
     Topic,
+    state_of,
 )
 from grasp_ros.scene.versions import versions
 
@@ -247,19 +248,18 @@ class Monitor(PeerNode):
             return
         assert self._recorder is not None
         self._soon.cancel()
-        seen = [seen_of(tick) for _, tick, _ in due]
-        for (bag_ns, tick, beside), row, values in zip(due, seen, self._judge.judge(seen), strict=True):
+        for (bag_ns, tick, beside), values in zip(due, self._judge.judge([tick for _, tick, _ in due]), strict=True):
             self.count("ticks")
-            self._picture.show(tick.time_ns, row.state)
+            self._picture.show(tick.state)
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items()], values, tick.time_ns)
             self._values = values
             self._output.publish(self._template.fill(tick.time_ns, values))
-            self._heed(row, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
+            self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
             self.finished = bool(self.exit_code) or tick.time_ns == self._ticks.end_ns
             if self.finished:
                 return
 
-    def _heed(self, row: Seen, values: Mapping[str, float]) -> None:
+    def _heed(self, tick: Tick, values: Mapping[str, float]) -> None:
         """Say why V is not there; end where energy comes from nowhere."""
         if not values["closed"]:
             self.count("ticks without V")
@@ -271,7 +271,8 @@ class Monitor(PeerNode):
             # `grasp run` and a plant that waits for this monitor end; the bag keeps this tick
             self.fail(
                 f"V_c rose by {values['unexplained']!r} J more than the work of the held forces,"
-                f" t = {row.time_ns / NANOSECONDS} s, mode {int(values['mode'])}, state {row.state.tolist()}"
+                f" t = {tick.time_ns / NANOSECONDS} s, mode {int(values['mode'])},"
+                f" state {state_of(tick.state)[0].tolist()}"
             )
 
     def close(self) -> None:
