@@ -73,7 +73,7 @@ class Monitor(PeerNode):
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
-        self._values: list[float] = []  # of the last tick
+        self._published = b""  # of the last tick
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._leaving = 0  # after a signal: ticks to which it still records, what was on the way with them
@@ -206,7 +206,7 @@ class Monitor(PeerNode):
         elif arrival is Arrival.AGAIN:  # what was published has been lost
             self.count(arrival.value)
             self._complete()
-            self._output.publish(self._template.fill(messages.raw_stamp_ns(cdr), self._values))
+            self._output.publish(self._published)
         elif arrival is Arrival.REPEATED:
             self.count(arrival.value)
         else:
@@ -251,9 +251,9 @@ class Monitor(PeerNode):
         for (bag_ns, tick, beside), values in zip(due, self._judge.judge([tick for _, tick, _ in due]), strict=True):
             self.count("ticks")
             self._picture.show(tick.state)
-            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items()], values, tick.time_ns)
-            self._values = values
-            self._output.publish(self._template.fill(tick.time_ns, values))
+            own = self._published = self._template.fill(tick.time_ns, values)
+            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
+            self._output.publish(own)
             self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
             self.finished = bool(self.exit_code) or tick.time_ns == self._ticks.end_ns
             if self.finished:
