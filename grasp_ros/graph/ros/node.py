@@ -10,6 +10,7 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -18,7 +19,6 @@ from rclpy.subscription import Subscription
 
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.messages import Level
 from grasp_ros.graph.ros.parameter_node import ParameterNode
 from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused
@@ -180,15 +180,16 @@ class GraspNode(ParameterNode):
 
     def report(self) -> None:
         """Publish the counters."""
-        stamp = self.get_clock().now().to_msg()
         lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
         failed, doubtful = self.exit_code or self.trouble, lost or self.concern or self.strangers
-        level = Level.ERROR if failed else Level.WARN if doubtful else Level.OK
-        summary = "; ".join(words for words in (self.words, self.trouble, self.concern, self.strangers) if words)
+        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="grasp_ros")
+        status.level = status.ERROR if failed else status.WARN if doubtful else status.OK
+        status.message = "; ".join(words for words in (self.words, self.trouble, self.concern, self.strangers) if words)
         values = {"phase": self.phase.value, **self.counters}
-        self._diagnostics.publish(
-            messages.diagnostics(stamp, self.get_fully_qualified_name(), summary, level, values)
-        )
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
 
     def fail(self, reason: str) -> None:
         """End with a sentence, and with the exit status 1."""
