@@ -64,6 +64,8 @@ class GraspNode(ParameterNode):
         What it does or waits for; the message of its /diagnostics.
     counters : dict of str to number or text
         The values of its /diagnostics.
+    inputs : list of Topic
+        What it subscribes to.
     """
 
     stays = False  # whether it goes on when a run is over
@@ -73,6 +75,7 @@ class GraspNode(ParameterNode):
         self.finished = False
         self.exit_code = 0
         self.counters: dict[str, int | float | str] = {}
+        self.inputs: list[Topic] = []
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self._ended = False
         self.concern = ""  # what is not as it should be, although the node goes on
@@ -96,6 +99,7 @@ class GraspNode(ParameterNode):
 
         What cannot be decoded is refused here: the executor would raise.
         """
+        self.inputs.append(topic)
         kind = messages.TYPES[topic.type]
         read = read or partial(deserialize_message, message_type=kind)
 
