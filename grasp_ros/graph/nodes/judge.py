@@ -36,15 +36,14 @@ class Judge:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
-        self._acting = dict.fromkeys(SIDES, -1)  # time in ns of the last announcement that acts
-        self._known: set[str] = set()
+        self._acting: dict[str, int] = {}  # time in ns of the last announcement that acts, where one is known
         self._before: tuple[int, Array, Array] | None = None  # time in ns, state and external forces
 
     @property
     def unknown(self) -> list[str]:
         """Sides whose controllers have announced no law so far."""
         return [name.removesuffix("_controller") for name in self._scene.controllers
-                if name.removesuffix("_controller") not in self._known]
+                if name.removesuffix("_controller") not in self._acting]
 
     def announce(self, side: str, announcement: Announcement) -> None:
         """Take note of a law that will act.
@@ -59,7 +58,7 @@ class Judge:
             raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"
                           f" {', '.join(sorted(wanted)) or 'nothing, this scene has no such controller'}")
         self._scene.changed(announcement.numbers)
-        if self._before is None and not self._known:  # what came before is of the run before: topics keep the last one
+        if self._before is None and not self._acting:  # what came before is of the run before: topics keep the last one
             self._waiting[side].clear()
         if len(self._waiting[side]) >= MOST_WAITING:
             raise Refused(f"{side}/parameters: more than {MOST_WAITING} laws that wait; allowed: at most that")
@@ -68,12 +67,11 @@ class Judge:
     def restart(self) -> None:
         """Forget the last tick and what it was announced for: time went back."""
         self._before = None
-        self._known.clear()
-        self._acting = dict.fromkeys(self._acting, -1)
+        self._acting.clear()
 
     def _is_due(self, side: str, time_ns: int) -> bool:
         waiting = self._waiting[side]
-        return bool(waiting) and self._acting[side] < waiting[0].time_ns <= time_ns
+        return bool(waiting) and self._acting.get(side, -1) < waiting[0].time_ns <= time_ns
 
     def changes(self, time_ns: int) -> bool:
         """Whether a law begins to act at a time."""
@@ -90,7 +88,6 @@ class Judge:
             while self._is_due(side, time_ns):
                 announcement = waiting.popleft()
                 self._acting[side] = announcement.time_ns
-                self._known.add(side)
                 if dict(announcement.numbers) != self._scene.numbers_of(f"{side}_controller"):
                     self._scene = self._scene.changed(announcement.numbers)
                 begun.append((side, announcement.cdr))
