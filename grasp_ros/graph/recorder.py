@@ -11,7 +11,7 @@ import hashlib
 import os
 import resource
 import threading
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from importlib.metadata import version
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import writing
 from grasp_ros.scene.strict_yaml import dump
-from grasp_ros.scene.topics import CLOCK, LYAPUNOV, RUN, SCENE, Topic
+from grasp_ros.scene.topics import CLOCK, RUN, SCENE, Topic
 
 FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and disk have as long again
 INDEX_BYTES = 256  # at most what the index holds of one chunk
@@ -89,7 +89,7 @@ class Recorder:
         topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
         self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
         self._names = rosbag2.names_of(scene, self._custom)
-        self._lyapunov, self._clock = rosbag2.lyapunov_template(), rosbag2.clock_template()
+        self._clock = rosbag2.clock_template()
         with writing(path, BagError):
             path.mkdir(parents=True)
             self._reserve = Reserve(path / ".reserve")
@@ -130,8 +130,7 @@ class Recorder:
             os.close(directory)
 
     def write_tick(
-        self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], lyapunov: Sequence[float],
-        stamp_ns: int | None = None,
+        self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], stamp_ns: int | None = None
     ) -> None:
         """Append all of one tick, and its /clock: it is in the bag as a whole, or not at all.
 
@@ -140,9 +139,7 @@ class Recorder:
         time_ns : int, ns
             Time in the bag, not before that of the last tick; goes on where a reset puts simulated time back.
         messages : iterable of Topic and bytes
-            Serialized messages.
-        lyapunov : sequence of float
-            The monitor's own values, see `topics.LYAPUNOV_NAMES`.
+            Serialized messages, that of the monitor itself last.
         stamp_ns : int, ns, optional
             Simulated time, where it is another one.
 
@@ -151,15 +148,13 @@ class Recorder:
         BagError
             If the bag could not be written up to here, or ends with this tick.
         """
-        stamp_ns = time_ns if stamp_ns is None else stamp_ns
-        own, clock = self._lyapunov.fill(stamp_ns, lyapunov), self._clock.fill(stamp_ns, ())
+        clock = self._clock.fill(time_ns if stamp_ns is None else stamp_ns, ())
         with self._lock, writing(self._path, BagError):
             if self._closed:
                 raise BagError(self._error or f"{self._path}: is closed")
             self._add(CLOCK, time_ns, clock)
             for topic, cdr in messages:
                 self._add(topic, time_ns, cdr)
-            self._add(LYAPUNOV, time_ns, own)
             tick = time_ns // self._period_ns
             if tick > self._next:
                 self._gaps.append((self._next, tick - 1))

@@ -58,10 +58,10 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     recorder, written = Recorder(new, scene, versions, names_of(scene, custom), opening.running_of(storage)), 0
     try:
         for time_ns, tick, beside in chain([begin], ticks):
-            stamp_ns, own = _lyapunov(path, tick.pop(LYAPUNOV))
-            if stamp_ns > scene.ticks * scene.period_ns:
+            tick[LYAPUNOV] = own = tick.pop(LYAPUNOV)  # the last one
+            if (stamp_ns := _stamp_ns(path, own)) > scene.ticks * scene.period_ns:
                 continue
-            recorder.write_tick(time_ns, tick.items(), own, stamp_ns)
+            recorder.write_tick(time_ns, tick.items(), stamp_ns)
             for topic, cdr in beside:
                 recorder.write(topic, cdr)
             written += 1
@@ -71,14 +71,13 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     return Recovery(written, storage.left_out)
 
 
-def _lyapunov(path: Path, cdr: bytes) -> tuple[int, list[float]]:
-    """Time in ns and numbers of what the monitor had computed."""
+def _stamp_ns(path: Path, cdr: bytes) -> int:
+    """Time in ns of what the monitor had computed, if it is that."""
     with decoding(path, opening.KIND, BagError, (SerdeError, AttributeError)):
         own = decode(LYAPUNOV, cdr)
-        values = own.position.tolist()
-    if len(values) != len(LYAPUNOV_NAMES):
-        raise BagError(f"{path}: {LYAPUNOV.name}: {len(values)} numbers; allowed: {len(LYAPUNOV_NAMES)}")
-    return own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec, values
+    if len(own.position) != len(LYAPUNOV_NAMES):
+        raise BagError(f"{path}: {LYAPUNOV.name}: {len(own.position)} numbers; allowed: {len(LYAPUNOV_NAMES)}")
+    return int(own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec)
 
 
 def _ticks(storage: Storage, messages: Iterator[Stored], scene: scenes.Scene

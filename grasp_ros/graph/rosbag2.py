@@ -143,10 +143,7 @@ def clock_template() -> Template:
 
 def state_template(names: Sequence[str]) -> Template:
     """Of the states of some bodies: all positions, all velocities, all input forces."""
-    def serialize(numbers: list[float]) -> bytes:
-        return list_message(0, names, *np.array(numbers).reshape(3, -1))
-
-    return Template(serialize, 3 * len(names))
+    return Template(lambda numbers: list_message(0, names, *np.array(numbers).reshape(3, -1)), 3 * len(names))
 
 
 def force_template() -> Template:

@@ -16,8 +16,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.columns import alike
 from grasp_ros.graph.recorder import Recorder
 from grasp_ros.graph.rosbag2 import list_message
-from grasp_ros.graph.template import Template
-from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LEFT_COMMAND, LYAPUNOV_NAMES, Topic, state_of
+from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
 
@@ -128,11 +127,10 @@ def test_a_recording_has_the_numbers_that_another_reader_decodes(
 def test_a_list_of_another_length_is_refused(tmp_path: Path) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
     recorder = Recorder(tmp_path / "bag", run.scene, {})
-    for time_ns, messages, own in study.ticks_of(run):
+    for time_ns, messages in study.ticks_of(run):
         if time_ns == 10_000_000:
-            own, short = own[:8], LYAPUNOV_NAMES[:8]
-            recorder._lyapunov = Template(lambda numbers, names=short: list_message(0, names, np.array(numbers)), 8)  # type: ignore[misc]
-        recorder.write_tick(time_ns, messages, own)
+            messages[-1] = LYAPUNOV, list_message(time_ns, LYAPUNOV_NAMES[:8], np.zeros(8))
+        recorder.write_tick(time_ns, messages)
     recorder.close()
     with pytest.raises(bag.BagError, match="/lyapunov: 8 numbers; allowed: 9"):
         bag.read(tmp_path / "bag")
@@ -143,10 +141,10 @@ def test_ticks_that_are_none_are_refused_across_batches(
     tmp_path: Path, times: tuple[float, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    _, messages, own = next(study.ticks_of(run))
+    _, messages = next(study.ticks_of(run))
     recorder = Recorder(tmp_path / "bag", run.scene, {})
     for time in times:
-        recorder.write_tick(round(time * run.scene.period_ns), messages, own)
+        recorder.write_tick(round(time * run.scene.period_ns), messages)
     recorder.close()
     wrong = round(times[-1] * run.scene.period_ns)
     for most in (0, bag.BATCH_BYTES):

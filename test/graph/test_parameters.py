@@ -112,12 +112,12 @@ def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None
     run = simulate(scene.load("arm_alone", ["time.duration_s=0.004"]), sampled=True)
     writer = bag.Recorder(tmp_path / "bag", run.scene, {})
     numbers, types = run.scene.numbers_of("left_controller"), get_typestore(Stores.ROS2_JAZZY)
-    for tick, (time_ns, rows, own) in enumerate(recorder.ticks_of(run)):
+    for tick, (time_ns, rows) in enumerate(recorder.ticks_of(run)):
         values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
         said = types.deserialize_cdr(rosbag2.list_message(time_ns, list(numbers), values), NAMED_LIST)
         said.header.frame_id = str(1 + 2 * tick)  # its number
         beside = [(CHANGES["left"], bytes(types.serialize_cdr(said, NAMED_LIST)))] if tick < 3 else []
-        writer.write_tick(time_ns, [*beside, *rows], own)
+        writer.write_tick(time_ns, [*beside, *rows])
     writer.close()
     recording = bag.read(tmp_path / "bag")
     assert recording.unheard == {"left/parameters": 2}

@@ -267,8 +267,8 @@ def test_a_writer_of_the_library_that_has_moved_is_refused_in_a_sentence() -> No
 
 def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:
     recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
-    for time_ns, messages, own in study.ticks_of(run):
-        recorder.write_tick(time_ns, messages[:1] + messages[2:], own)
+    for time_ns, messages in study.ticks_of(run):
+        recorder.write_tick(time_ns, messages[:1] + messages[2:])
     recorder.close()
     recording = bag.read(tmp_path / "bag")
     assert np.isnan(recording.command[:, 0]).all()
@@ -332,8 +332,8 @@ def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
     try:
         recorder = Recorder(path, run.scene, {})
         for number in range(10**6):
-            _, messages, own = ticks[number % len(ticks)]
-            recorder.write_tick(number * run.scene.period_ns, messages, own)
+            _, messages = ticks[number % len(ticks)]
+            recorder.write_tick(number * run.scene.period_ns, messages)
     except bag.BagError as error:
         answers.put((number, str(error)))
 

@@ -10,8 +10,6 @@ from enum import Enum
 from functools import partial
 from typing import Any, NamedTuple
 
-from rclpy.subscription import Subscription
-
 from grasp_ros.graph.health.beats import ENDED, Beats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.processes import PEER_SECONDS
@@ -73,7 +71,6 @@ class PeerNode(GraspNode):
     """
 
     def __init__(self, name: str, **options: Any) -> None:
-        self._inputs: list[Topic] = []
         super().__init__(name, **options)
         self.patience = self.read_only("peer_timeout_s", PEER_SECONDS)
         self.start_patience = self.read_only("start_timeout_s", START_SECONDS) or math.inf
@@ -113,17 +110,9 @@ class PeerNode(GraspNode):
     def progress(self) -> object:
         """Something that changes while all is well."""
 
-    def subscribe(
-        self, topic: Topic, callback: Callable[[Any], None], raw: bool = False,
-        read: Callable[[bytes], Any] | None = None,
-    ) -> Subscription:
-        """Subscribe to a topic of the graph, see `GraspNode`."""
-        self._inputs.append(topic)
-        return super().subscribe(topic, callback, raw, read)
-
     def report(self) -> None:
         """Publish the counters, and who publishes what somebody else does."""
-        several = [topic for topic in self._inputs
+        several = [topic for topic in self.inputs
                    if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1]
         found = {topic.name: self.living(topic) for topic in several}
         self.strangers = "; ".join(f"{name} has the sources {' and '.join(names)}" for name, names in found.items()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -24,6 +25,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.rosbag2 import numbers_message
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic
 
@@ -35,20 +37,14 @@ BURST_SECONDS = 0.003  # of catching up at a time, so that commands and services
 PATIENCE_SECONDS = 0.5  # further behind than this the plant gives up wall time, never a state
 
 
+@dataclass
 class Held:
-    """The command of one controller that is held.
+    """The command of one controller that is held."""
 
-    Attributes
-    ----------
-    force : float, N
-    answers : int
-        Tick of the state that it answers, from which its age counts; that of its arrival where it carries no stamp.
-    late : bool
-        Whether it is older than the timeout.
-    """
-
-    def __init__(self) -> None:
-        self.force, self.answers, self.late = 0.0, 0, False
+    force: float = 0.0  # N
+    # Tick of the state that it answers, from which its age counts; that of its arrival where it carries no stamp.
+    answers: int = 0
+    late: bool = False  # whether it is older than the timeout
 
 
 class FreeRunning:
@@ -80,20 +76,18 @@ class FreeRunning:
         plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
                                "timeouts": 0})
         self._recorded = Recorded(plant, self.advance)
-        self._commands = [*plant.scene.controllers.values()]
-        self._sides = [topic.name.split("/")[0] for topic in self._commands]
-        self._held = {side: Held() for side in self._sides}
-        self._timing = Timing(self._sides, self._period, running.real_time_factor)
+        self._held = {NAMES[body]: Held() for body in plant.scene.system.laws}
+        self._timing = Timing([*self._held], self._period, running.real_time_factor)
         self._quality = plant.publisher(TIMING)
-        for topic, side in zip(self._commands, self._sides, strict=True):
+        for side, topic in zip(self._held, plant.scene.controllers.values(), strict=True):
             plant.subscribe(topic, partial(self._on_command, side, topic), raw=True)
         self._limits = Limits(plant, plant.scene)
         self._anchor = math.nan  # wall time of tick 0
 
     def missing(self) -> list[str]:
         """Commands that nobody sends yet, where it waits for them; else it begins without controllers."""
-        plant = self._plant
-        return [topic.name for topic in self._commands if self._awaits and not plant.count_publishers(topic.name)]
+        topics = self._plant.scene.controllers.values() if self._awaits else ()
+        return [topic.name for topic in topics if not self._plant.count_publishers(topic.name)]
 
     def needs(self) -> Iterator[Need]:
         """The monitor alone: commands have timeouts of their own."""
@@ -129,7 +123,7 @@ class FreeRunning:
         if plant.finished or math.isnan(self._anchor):
             return
         if self._steering.reset_due:
-            self._held = {side: Held() for side in self._sides}
+            self._held = {side: Held() for side in self._held}
             self._recorded.forget()
             self._steering.reset_done()
             self._set_anchor()
@@ -166,12 +160,11 @@ class FreeRunning:
 
     def _step(self) -> None:
         forces: Array = np.zeros(3)
-        for number, side in zip(self._plant.scene.system.laws, self._sides, strict=True):
-            held = self._held[side]
+        for body, (side, held) in zip(self._plant.scene.system.laws, self._held.items(), strict=True):
             before, held.late = held.late, self._plant.tick - held.answers >= self._timeouts[side]
             if held.late and not before:
                 self._time_out(side)
-            forces[number] = 0.0 if held.late and self._running.reactions[side] == "zero" else held.force
+            forces[body] = 0.0 if held.late and self._running.reactions[side] == "zero" else held.force
             self._timing.age(side, self._plant.tick - held.answers)
         if self._plant.finished:
             return

@@ -8,6 +8,7 @@ will say when it is done; and if it does nothing, with `why`.
 from __future__ import annotations
 
 import json
+from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
@@ -40,8 +41,8 @@ class Steering:
             description="control periods of one call of the service step",
             integer_range=[IntegerRange(from_value=1, to_value=MOST_STEPS, step=1)],
         ))
-        for name, action in (("pause", self._pause), ("resume", self._resume), ("step", self._step),
-                             ("reset", self._reset), ("status", self._status)):
+        for name, action in (("pause", partial(self._pause, True)), ("resume", partial(self._pause, False)),
+                             ("step", self._step), ("reset", self._reset), ("status", self._status)):
             plant.create_service(Trigger, f"~/{name}", action)
 
     def go_on(self) -> bool:
@@ -64,13 +65,7 @@ class Steering:
         self.steps = 0
         self._plant.restart()
 
-    def _pause(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._change(response, paused=True)
-
-    def _resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._change(response, paused=False)
-
-    def _change(self, response: Trigger.Response, paused: bool) -> Trigger.Response:
+    def _pause(self, paused: bool, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self._paused is paused:
             return self._answer(response, f"already {'paused' if paused else 'running'} at tick {self._plant.tick}")
         self._paused, self.steps = paused, 0

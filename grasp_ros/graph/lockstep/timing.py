@@ -80,17 +80,10 @@ class Timing:
         for side, ages in self._ages.items():
             values[f"{side}_age_p99"] = float(np.percentile(ages, PERCENTILE))
             values[f"{side}_age_max"] = float(np.max(ages))
-            values[f"{side}_age_p99_all"] = _percentile(self._all[side])
-            values[f"{side}_age_max_all"] = float(max(self._all[side]))
+            known, often = [*self._all[side]], [*self._all[side].values()]
+            values[f"{side}_age_p99_all"] = float(  # the smallest that PERCENTILE of all do not exceed
+                np.percentile(known, PERCENTILE, weights=often, method="inverted_cdf")
+            )
+            values[f"{side}_age_max_all"] = float(max(known))
         self._clear()
         return values
-
-
-def _percentile(ages: Counter[int]) -> float:
-    """The smallest age that PERCENTILE of all do not exceed."""
-    left = ages.total() * PERCENTILE / 100.0
-    for age in sorted(ages):
-        left -= ages[age]
-        if left <= 0.0:
-            return float(age)
-    return math.nan

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from functools import partial
 from typing import Any, TypeGuard
 
 from rcl_interfaces.msg import SetParametersResult
@@ -17,7 +16,6 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.ros.priority import Priority
 from grasp_ros.graph.ros.states import State, StateReader
@@ -243,8 +241,3 @@ class Controller(PeerNode):
 def _numbers(parameters: list[Parameter]) -> dict[str, Any]:
     """Those of the scene."""
     return {parameter.name: parameter.value for parameter in parameters if "." in parameter.name}
-
-
-def main(name: str, received: Sequence[int]) -> int:
-    """Run `left_controller` or `right_controller`."""
-    return run([partial(Controller, name)], received)

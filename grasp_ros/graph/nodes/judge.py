@@ -30,40 +30,20 @@ class Announcement(NamedTuple):
     cdr: bytes  # as it came
 
 
-class Seen(NamedTuple):
-    """What there is to judge of a tick.
-
-    Attributes
-    ----------
-    time_ns : int
-    state : array (6,), m and m/s
-    inputs : array (3,), N by body
-        Forces of the controllers over the last period.
-    commands : mapping of str to float, N
-        Answers to this state, by side.
-    """
-
-    time_ns: int
-    state: Array
-    inputs: Array
-    commands: Mapping[str, float]
-
-
 class Judge:
     """Knows the laws that were announced, and judges states and commands by them."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._waiting: dict[str, deque[Announcement]] = {side: deque() for side in SIDES}
-        self._acting = dict.fromkeys(SIDES, -1)  # time in ns of the last announcement that acts
-        self._known: set[str] = set()
+        self._acting: dict[str, int] = {}  # time in ns of the last announcement that acts, where one is known
         self._before: tuple[int, Array, Array] | None = None  # time in ns, state and external forces
 
     @property
     def unknown(self) -> list[str]:
         """Sides whose controllers have announced no law so far."""
         return [name.removesuffix("_controller") for name in self._scene.controllers
-                if name.removesuffix("_controller") not in self._known]
+                if name.removesuffix("_controller") not in self._acting]
 
     def announce(self, side: str, announcement: Announcement) -> None:
         """Take note of a law that will act.
@@ -78,7 +58,7 @@ class Judge:
             raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"
                           f" {', '.join(sorted(wanted)) or 'nothing, this scene has no such controller'}")
         self._scene.changed(announcement.numbers)
-        if self._before is None and not self._known:  # what came before is of the run before: topics keep the last one
+        if self._before is None and not self._acting:  # what came before is of the run before: topics keep the last one
             self._waiting[side].clear()
         if len(self._waiting[side]) >= MOST_WAITING:
             raise Refused(f"{side}/parameters: more than {MOST_WAITING} laws that wait; allowed: at most that")
@@ -87,12 +67,11 @@ class Judge:
     def restart(self) -> None:
         """Forget the last tick and what it was announced for: time went back."""
         self._before = None
-        self._known.clear()
-        self._acting = dict.fromkeys(self._acting, -1)
+        self._acting.clear()
 
     def _is_due(self, side: str, time_ns: int) -> bool:
         waiting = self._waiting[side]
-        return bool(waiting) and self._acting[side] < waiting[0].time_ns <= time_ns
+        return bool(waiting) and self._acting.get(side, -1) < waiting[0].time_ns <= time_ns
 
     def changes(self, time_ns: int) -> bool:
         """Whether a law begins to act at a time."""
@@ -109,25 +88,25 @@ class Judge:
             while self._is_due(side, time_ns):
                 announcement = waiting.popleft()
                 self._acting[side] = announcement.time_ns
-                self._known.add(side)
                 if dict(announcement.numbers) != self._scene.numbers_of(f"{side}_controller"):
                     self._scene = self._scene.changed(announcement.numbers)
                 begun.append((side, announcement.cdr))
         return begun
 
-    def judge(self, seen: Sequence[Seen]) -> list[list[float]]:
+    def judge(self, ticks: Sequence[Tick]) -> list[list[float]]:
         """What `lyapunov` publishes at some ticks in a row, see `topics.LYAPUNOV_NAMES`.
 
         The laws are the same for all of them. Many at once cost little more than one.
         """
         system, period = self._scene.system, self._scene.period_ns
-        ticks = [row.time_ns // period for row in seen]
-        states, external = np.array([row.state for row in seen]), np.array([*map(system.external_at, ticks)])
-        work, residual, alarm = self._balance(seen, states, external)
+        external = np.array([system.external_at(tick.time_ns // period) for tick in ticks])
+        states, inputs = map(np.array, zip(*(state_of(tick.state) for tick in ticks), strict=True))
+        work, residual, alarm = self._balance(np.array([tick.time_ns for tick in ticks]), states, inputs, external)
         alone = energy(system, states, external, feedback=False)
         known = not self.unknown
-        closed = np.array([known and self._explains(tick, row) for tick, row in zip(ticks, seen, strict=True)])
-        V = np.full((3, len(seen)), np.nan)
+        plain = states.tolist()  # plain floats take a third of the time, with the same bits
+        closed = np.array([known and self._explains(tick, state) for tick, state in zip(ticks, plain, strict=True)])
+        V = np.full((3, len(ticks)), np.nan)
         if closed.any():
             V[:, closed] = [part[closed] for part in energy(system, states, external)[:3]]
         rows: list[list[float]] = np.column_stack(
@@ -135,33 +114,32 @@ class Judge:
         ).tolist()
         return rows
 
-    def _balance(self, seen: Sequence[Seen], states: Array, external: Array) -> tuple[Array, Array, Array]:
-        """Work, residual and alarm of the periods before some ticks; 0 where the tick before is not known."""
-        times = np.array([row.time_ns for row in seen])
+    def _balance(
+        self, times: np.ndarray, states: Array, inputs: Array, external: Array
+    ) -> tuple[Array, Array, Array]:
+        """Work, residual and alarm of the periods before some ticks; 0 where the tick before is not known.
+
+        `inputs` (n, 3) are the forces of the controllers over these periods, N by body.
+        """
         time_ns, state, pushed = self._before or (-self._scene.period_ns - 1, states[0], external[0])
         self._before = int(times[-1]), states[-1], external[-1]
         follows = np.diff(times, prepend=time_ns) == self._scene.period_ns
-        held = np.array([row.inputs for row in seen]) + np.vstack([pushed, external[:-1]])
+        held = inputs + np.vstack([pushed, external[:-1]])
         balance = energy_balance(self._scene.system, np.vstack([state, states[:-1]]), states, held)
         return (np.where(follows, balance.work, 0.0), np.where(follows, balance.residual, 0.0),
                 np.where(follows, balance.alarm, 0.0))
 
-    def _explains(self, tick: int, seen: Seen) -> bool:
-        """Whether the commands are those of the laws that were announced, but for rounding."""
-        state = seen.state.tolist()  # plain floats take a third of the time, with the same bits
-        for side, force in seen.commands.items():
-            body = SIDES[side]
+    def _explains(self, tick: Tick, state: Sequence[float]) -> bool:
+        """Whether the commands that answer a state are those of the laws that were announced, but for rounding."""
+        for side, topic in COMMANDS.items():
+            if topic not in tick.found:
+                continue
+            body, force = SIDES[side], messages.raw_force(tick.found[topic])
             law = self._scene.system.laws[body]
             x, v = state[COLUMN[body]], state[COLUMN[body] + 1]
-            expected = law.command(tick, x, v)
+            expected = law.command(tick.time_ns // self._scene.period_ns, x, v)
             if force != expected:
                 size = abs(law.position_gain) * (abs(x) + abs(law.set_point)) + abs(law.velocity_gain * v)
                 if not abs(force - expected) <= EXPLAINED * (size + abs(law.feed_forward)):
                     return False
         return True
-
-
-def seen_of(tick: Tick) -> Seen:
-    """State, inputs and commands of a tick from its messages."""
-    forces = {side: messages.raw_force(tick.found[topic]) for side, topic in COMMANDS.items() if topic in tick.found}
-    return Seen(tick.time_ns, *state_of(tick.state), forces)

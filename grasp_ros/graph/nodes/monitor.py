@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from datetime import datetime
 from functools import partial
@@ -20,11 +20,10 @@ from grasp_ros.graph.health.beats import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
-from grasp_ros.graph.nodes.judge import Announcement, Judge, Seen, seen_of
+from grasp_ros.graph.nodes.judge import Announcement, Judge
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
 from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
 from grasp_ros.graph.running import Running
@@ -47,6 +46,7 @@ from grasp_ros.scene.topics import (
     WINDOW,
     Numbers,
     Topic,
+    state_of,
 )
 from grasp_ros.scene.versions import versions
 
@@ -73,7 +73,7 @@ class Monitor(PeerNode):
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
-        self._values: list[float] = []  # of the last tick
+        self._published = b""  # of the last tick
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._leaving = 0  # after a signal: ticks to which it still records, what was on the way with them
@@ -206,7 +206,7 @@ class Monitor(PeerNode):
         elif arrival is Arrival.AGAIN:  # what was published has been lost
             self.count(arrival.value)
             self._complete()
-            self._output.publish(self._template.fill(messages.raw_stamp_ns(cdr), self._values))
+            self._output.publish(self._published)
         elif arrival is Arrival.REPEATED:
             self.count(arrival.value)
         else:
@@ -248,19 +248,18 @@ class Monitor(PeerNode):
             return
         assert self._recorder is not None
         self._soon.cancel()
-        seen = [seen_of(tick) for _, tick, _ in due]
-        for (bag_ns, tick, beside), row, values in zip(due, seen, self._judge.judge(seen), strict=True):
+        for (bag_ns, tick, beside), values in zip(due, self._judge.judge([tick for _, tick, _ in due]), strict=True):
             self.count("ticks")
-            self._picture.show(tick.time_ns, row.state)
-            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items()], values, tick.time_ns)
-            self._values = values
-            self._output.publish(self._template.fill(tick.time_ns, values))
-            self._heed(row, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
+            self._picture.show(tick.state)
+            own = self._published = self._template.fill(tick.time_ns, values)
+            self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
+            self._output.publish(own)
+            self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
             self.finished = bool(self.exit_code) or tick.time_ns == self._ticks.end_ns
             if self.finished:
                 return
 
-    def _heed(self, row: Seen, values: Mapping[str, float]) -> None:
+    def _heed(self, tick: Tick, values: Mapping[str, float]) -> None:
         """Say why V is not there; end where energy comes from nowhere."""
         if not values["closed"]:
             self.count("ticks without V")
@@ -272,7 +271,8 @@ class Monitor(PeerNode):
             # `grasp run` and a plant that waits for this monitor end; the bag keeps this tick
             self.fail(
                 f"V_c rose by {values['unexplained']!r} J more than the work of the held forces,"
-                f" t = {row.time_ns / NANOSECONDS} s, mode {int(values['mode'])}, state {row.state.tolist()}"
+                f" t = {tick.time_ns / NANOSECONDS} s, mode {int(values['mode'])},"
+                f" state {state_of(tick.state)[0].tolist()}"
             )
 
     def close(self) -> None:
@@ -283,8 +283,3 @@ class Monitor(PeerNode):
                 self._recorder.close(self.counters)
         if self.finished:
             self.flush(self._output)
-
-
-def main(_: str, received: Sequence[int]) -> int:
-    """Run the monitor."""
-    return run([Monitor], received)

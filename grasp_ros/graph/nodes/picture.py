@@ -12,11 +12,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.graph.ros.states import State
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import CONTACTS, FRAME, MARKERS, ROBOT_DESCRIPTION
+from grasp_ros.scene.topics import CONTACTS, FRAME, MARKERS, ROBOT_DESCRIPTION, state_of
 
 FRAME_SECONDS = 1 / 30  # wall time between two pictures
 SIZE, ROD = 0.06, 0.008  # m: edge of a mass, width of a spring and of an arrow
@@ -100,10 +101,10 @@ class Picture:
         self._description = node.publisher(ROBOT_DESCRIPTION)
         self._description.publish(messages.text(robot_description(scene)))
 
-    def show(self, time_ns: int, state: Array) -> None:
+    def show(self, state: State) -> None:
         """Draw a state, if it is time and somebody looks."""
         now = time.monotonic()
         if now >= self._next:
             self._next = now + FRAME_SECONDS
             if self._markers.get_subscription_count():
-                self._markers.publish(markers(self._scene, time_ns, state))
+                self._markers.publish(markers(self._scene, state.time_ns, state_of(state)[0]))

@@ -24,7 +24,6 @@ from grasp_ros.graph.lockstep.lockstep import Lockstep
 from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.ros.priority import Priority
 from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
@@ -236,8 +235,3 @@ class Plant(SteppedNode):
         self._bar.close()
         if self.finished and not self.exit_code:
             self.flush(self._states, *(publisher for publisher, _ in self._forces))
-
-
-def main(_: str, received: Sequence[int]) -> int:
-    """Run the plant."""
-    return run([Plant], received)

@@ -10,7 +10,10 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from typing import Any
 
 from grasp_ros.graph.host import check_reach, this_host
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
@@ -22,7 +25,8 @@ from grasp_ros.physics.errors import Refused
 def main(name: str, child: bool = False) -> int:
     """Run the node of that name; returns the exit status of the process.
 
-    A child ends with the process that holds the other end of its standard input.
+    A child ends with the process that holds the other end of its standard input. "together" runs several in one thread:
+    those that stand on the command line before `--ros-args`; their parameters as `-p node:name:=value`.
     """
     words = _own_words()
     if {"-h", "--help"} & set(words):
@@ -47,12 +51,20 @@ def main(name: str, child: bool = False) -> int:
     os.environ.update(this_host(os.environ))  # before rclpy looks
     if name == "plant":
         _spare_the_plant()
-    room = "tools" if name in TOOLS else "nodes"
-    module = import_module(f"grasp_ros.graph.{room}.{'controller' if name.endswith('controller') else name}")
-    status: int = module.main(name, received)
+    names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
+    makes = [_maker(each) for each in names]
+    status: int = import_module("grasp_ros.graph.ros.life").run(makes, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)
     return status
+
+
+def _maker(name: str) -> Callable[[], Any]:
+    """What makes the node of that name: its class, that of `monitor` is `nodes.monitor.Monitor`."""
+    kind = "controller" if name.endswith("controller") else name
+    module = import_module(f"grasp_ros.graph.{'tools' if name in TOOLS else 'nodes'}.{kind}")
+    make: Callable[..., Any] = getattr(module, kind.capitalize())
+    return partial(make, name) if kind == "controller" else make
 
 
 def _own_words() -> list[str]:

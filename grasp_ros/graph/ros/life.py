@@ -23,13 +23,8 @@ BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before 
 POLL_SECONDS = 0.2
 
 
-def run(
-    makes: Sequence[Callable[[], GraspNode]], received: Sequence[int],
-    work: Callable[[Sequence[GraspNode], Sequence[int]], None] | None = None,
-) -> int:
+def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
-
-    `work` is done in place of `spin`.
 
     0 after a finished run or a signal, 2 if a node refuses its parameters, otherwise the first status of a node that is
     not 0. The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
@@ -42,7 +37,8 @@ def run(
             nodes.append(make())
         gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
         gc.enable()
-        (work or spin)(nodes, received)
+        if not nodes[0].work(received):
+            spin(nodes, received)
     except Refused as error:
         tell_parent(_names(nodes), str(error))
         with suppress(OSError):  # nobody reads it

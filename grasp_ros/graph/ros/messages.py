@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping
-from enum import Enum
 
 from builtin_interfaces.msg import Time
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -39,14 +37,6 @@ SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
 Command = tuple[int, float]  # time in ns of the state that it answers, force in N
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
-
-
-class Level(Enum):
-    """Health of a node, as `DiagnosticStatus` has it."""
-
-    OK = DiagnosticStatus.OK
-    WARN = DiagnosticStatus.WARN
-    ERROR = DiagnosticStatus.ERROR
 
 
 def qos(topic: Topic) -> QoSProfile:
@@ -115,20 +105,6 @@ def raw_command(cdr: bytes) -> Command | None:
 def text(content: str) -> String:
     """A text."""
     return String(data=content)
-
-
-def diagnostics(stamp: Time, name: str, summary: str, level: Level, values: Mapping[str, object]) -> DiagnosticArray:
-    """One node's health."""
-    status = DiagnosticStatus(
-        level=level.value,
-        name=name,
-        message=summary,
-        hardware_id="grasp_ros",
-        values=[KeyValue(key=key, value=str(value)) for key, value in values.items()],
-    )
-    message = DiagnosticArray(status=[status])
-    message.header.stamp = stamp
-    return message
 
 
 def descriptor(parameter: Parameter) -> ParameterDescriptor:

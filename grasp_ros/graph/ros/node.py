@@ -10,6 +10,7 @@ from functools import partial
 from itertools import islice
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.publisher import Publisher
@@ -18,7 +19,6 @@ from rclpy.subscription import Subscription
 
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.messages import Level
 from grasp_ros.graph.ros.parameter_node import ParameterNode
 from grasp_ros.graph.stopping import tell_parent
 from grasp_ros.physics.errors import Refused
@@ -64,6 +64,8 @@ class GraspNode(ParameterNode):
         What it does or waits for; the message of its /diagnostics.
     counters : dict of str to number or text
         The values of its /diagnostics.
+    inputs : list of Topic
+        What it subscribes to.
     """
 
     stays = False  # whether it goes on when a run is over
@@ -73,6 +75,7 @@ class GraspNode(ParameterNode):
         self.finished = False
         self.exit_code = 0
         self.counters: dict[str, int | float | str] = {}
+        self.inputs: list[Topic] = []
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self._ended = False
         self.concern = ""  # what is not as it should be, although the node goes on
@@ -96,6 +99,7 @@ class GraspNode(ParameterNode):
 
         What cannot be decoded is refused here: the executor would raise.
         """
+        self.inputs.append(topic)
         kind = messages.TYPES[topic.type]
         read = read or partial(deserialize_message, message_type=kind)
 
@@ -180,15 +184,16 @@ class GraspNode(ParameterNode):
 
     def report(self) -> None:
         """Publish the counters."""
-        stamp = self.get_clock().now().to_msg()
         lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
         failed, doubtful = self.exit_code or self.trouble, lost or self.concern or self.strangers
-        level = Level.ERROR if failed else Level.WARN if doubtful else Level.OK
-        summary = "; ".join(words for words in (self.words, self.trouble, self.concern, self.strangers) if words)
+        status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="grasp_ros")
+        status.level = status.ERROR if failed else status.WARN if doubtful else status.OK
+        status.message = "; ".join(words for words in (self.words, self.trouble, self.concern, self.strangers) if words)
         values = {"phase": self.phase.value, **self.counters}
-        self._diagnostics.publish(
-            messages.diagnostics(stamp, self.get_fully_qualified_name(), summary, level, values)
-        )
+        status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
 
     def fail(self, reason: str) -> None:
         """End with a sentence, and with the exit status 1."""
@@ -221,6 +226,10 @@ class GraspNode(ParameterNode):
                 request, header = service.handle.service_take_request(service.srv_type.Request)
             if header is not None:
                 service.send_response(service.callback(request, service.srv_type.Response()), header)
+
+    def work(self, received: Sequence[int]) -> bool:
+        """Do in place of a spin what has an order of its own, until something is received; whether there is any."""
+        return False
 
     def behind(self) -> object:
         """What changes while it takes what had arrived before a signal; None: nothing that must be taken."""

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -64,8 +62,3 @@ class Player(GraspNode):
         """Let every reader have the end."""
         if self.finished:
             self.flush(*self._outputs.values())
-
-
-def main(_: str, received: Sequence[int]) -> int:
-    """Run the player."""
-    return run([Player], received)

@@ -21,7 +21,6 @@ from std_srvs.srv import Trigger
 
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
@@ -39,24 +38,26 @@ class Stopped(Exception):  # noqa: N818 - no error
 
 
 class Remote(GraspNode):
-    """Node `remote`; parameter words, a JSON list: what to ask; empty: what the lines of the standard input say.
+    """Node `remote`; parameter words, a JSON list: what to ask; empty: what the lines of the standard input say."""
 
-    Parameters
-    ----------
-    received : sequence of int
-        Ends when something is in it, say a signal.
-    """
-
-    def __init__(self, received: Sequence[int]) -> None:
+    def __init__(self) -> None:
         super().__init__("remote")
-        self.wanted: list[str] = json.loads(self.read_only("words", "[]"))
-        self._received, self._known = received, dict[str, Any]()
+        self._wanted: list[str] = json.loads(self.read_only("words", "[]"))
+        self._received: Sequence[int] = ()
+        self._known: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
         self._actions: dict[str, Callable[..., str]] = {
             **{name: partial(self.plant, name) for name in ("pause", "resume", "reset", "status")},
             "step": self.step, "get": self.get, "set": self.put, "echo": self.echo, "help": lambda: HELP,
         }
+
+    def work(self, received: Sequence[int]) -> bool:
+        """Ask once, or be a shell; the exit code is that of the last answer."""
+        self._received = received
+        with suppress(Stopped):
+            self.exit_code = _say(self, self._wanted) if self._wanted else _shell(self)
+        return True
 
     def do(self, words: Sequence[str]) -> str:
         """Do what some words ask for; returns what there is to say.
@@ -221,16 +222,3 @@ def _say(remote: Remote, words: Sequence[str]) -> int:
         print(error, file=sys.stderr, flush=True)
         return 1
     return 0
-
-
-def _work(nodes: Sequence[GraspNode], _: Sequence[int]) -> None:
-    """Ask once, or be a shell; the exit code is that of the last answer."""
-    [remote] = nodes
-    assert isinstance(remote, Remote)
-    with suppress(Stopped):
-        remote.exit_code = _say(remote, remote.wanted) if remote.wanted else _shell(remote)
-
-
-def main(_: str, received: Sequence[int]) -> int:
-    """Ask, until a signal comes or everything is said."""
-    return run([partial(Remote, received)], received, _work)

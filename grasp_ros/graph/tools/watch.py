@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import time
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Set
 from contextlib import suppress
 from functools import partial
 from typing import Any
@@ -22,7 +22,6 @@ from grasp_ros.graph.host import place
 from grasp_ros.graph.keys import Key, Keys
 from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.life import run
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.view import Moment, View, named
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
@@ -190,8 +189,3 @@ class Watch(GraspNode):
 
 def _read(topic: Topic, found: dict[Topic, bytes]) -> Any:
     return deserialize_message(found[topic], messages.TYPES[topic.type])
-
-
-def main(_: str, received: Sequence[int]) -> int:
-    """Watch until a signal comes."""
-    return run([Watch], received)
