@@ -62,7 +62,7 @@ class View:
             *self._energy(moment.level, width), *hint,
         )
         below = f"t = {moment.time:.3f} s   {moment.words}"
-        return Panel(parts, title=self.scene.title, subtitle=below, width=width)
+        return Panel(parts, title=Text(self.scene.title), subtitle=Text(below), width=width)
 
     def _line(self, state: Array, track: int) -> Text:
         """Each body at its place; one that is behind another is moved aside by a character."""

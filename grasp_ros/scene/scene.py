@@ -34,6 +34,7 @@ from grasp_ros.scene.validation import SceneError, check_domain, check_keys, che
 
 TEXTS = ("title", "readings", "watch")
 CHANGED, FEW = " [", 2  # in a title, before what was changed; changes that are named there
+HORIZON = "time.duration_s="
 PAPER = frozenset(  # the sections of the paper's grasp
     ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")
 )
@@ -187,11 +188,8 @@ class Scene(Frozen):
                 raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(name, known)}")
             document[section][key] = number
             if self.values[section][key] != number:
-                other.append(name)
-        if other:
-            words = [f"{name}={_short(numbers[name])}" for name in other]
-            document |= {"title": _retitled(self.title, words), "watch": ""}
-        return _read(document, self.name, self.name)
+                other.append(f"{name}={_short(number)}")
+        return _read({**document, **_texts(self.title, self.watch, other)}, self.name, self.name)
 
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
@@ -259,8 +257,9 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
         raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
     before = copy.deepcopy(document) if settings else document
     apply(settings, document)
-    if document != before and is_text(document.get("title")) and is_text(document.get("watch", "")):
-        document |= {"title": _retitled(document["title"], settings), "watch": ""}
+    title, watch = document.get("title", 0), document.get("watch", "")
+    if document != before and is_text(title) and is_text(watch):
+        document |= _texts(title, watch, settings)
     return _read(document, name, source)
 
 
@@ -292,10 +291,17 @@ def compose(
     return _read({**texts, **sections}, name, name)
 
 
-def _retitled(title: str, changes: Sequence[str]) -> str:
-    """A title that says what was changed, if it is little; what to watch for was said of the numbers before."""
+def _texts(title: str, watch: str, changes: Sequence[str]) -> dict[str, str]:
+    """A title that says what was changed, if it is little; what to watch for was said of the numbers before.
+
+    A scene that lasts longer is the same one.
+    """
+    changes = [change for change in changes if not change.startswith(HORIZON)]
+    if not changes:
+        return {"title": title, "watch": watch}
     before, again, _ = title.partition(CHANGED)
-    return f"{before}{CHANGED}{', '.join(changes) if len(changes) <= FEW and not again else 'other numbers'}]"
+    words = ", ".join(changes) if len(changes) <= FEW and not again else "other numbers"
+    return {"title": f"{before}{CHANGED}{words}]", "watch": ""}
 
 
 def _short(number: Any) -> str:

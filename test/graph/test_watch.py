@@ -11,6 +11,7 @@ import re
 import select
 import signal
 import struct
+import subprocess
 import sys
 import termios
 import time
@@ -79,6 +80,14 @@ class Screen:
                 return str(pictures[-1])
         raise AssertionError(f"waited in vain for {pattern}: {self._shown[-2000:]!r}")
 
+    def wait_for_words(self, words: str) -> None:
+        """Wait for words before the first picture."""
+        def shown() -> str:
+            self._read(0.02)
+            return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self._shown)
+
+        wait_for(lambda: words in shown(), words)
+
     def kill(self, number: int) -> None:
         """Send a signal to the process."""
         children = Path(f"/proc/{self._shell.pid}/task/{self._shell.pid}/children").read_text().split()
@@ -133,6 +142,16 @@ def test_a_bag_is_shown_to_its_end(launch: Any, path: Path) -> None:
     assert f"{recording.state[-1, 0]:+.5f}" in picture
     assert f"{recording.energy.V_c[-1]:.6g} J" in picture
     assert screen.end() == 0
+
+
+def test_a_plant_that_was_paused_before_anybody_watched_is_said_to_be_and_steps(launch: Any) -> None:
+    launch(*START, "plant", "--ros-args", "-p", "scene:=friction_slide", "-p", "paused:=true")
+    ask = [sys.executable, "-m", "grasp_ros.cli", "ctl", "status"]
+    wait_for(lambda: "paused" in subprocess.run(ask, capture_output=True, text=True, check=False).stdout, "a pause")
+    screen = Screen(launch, *START, "watch")
+    screen.wait_for_words("the plant is paused at tick 0; → steps it")
+    screen.press(RIGHT)
+    screen.wait("t = 0.001 s   paused")
 
 
 @pytest.mark.parametrize(
