@@ -49,7 +49,7 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
     rows.append(("certificate", "none: V_c needs the energy of every controller" if own else known))
     if "V_c_rise_J" in found:
         rows.append(("risen by the method", f"{found['V_c_rise_J']:.3g} J of V_c"))
-    return _with_words(trajectory.scene, rows)
+    return _with_words(trajectory.scene, rows, own=bool(own))
 
 
 def _simulated(found: dict[str, Any]) -> str:
@@ -115,7 +115,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     for tick, numbers in recording.changes.items():
         values = ", ".join(f"{name} {number:g}" for name, number in numbers.items())
         rows.append((f"set at {recording.scene.time_of(tick):g} s", values))
-    return _with_words(recording.scene, rows)
+    return _with_words(recording.scene, rows, own=not recording.closed)
 
 
 def _messages(topics: dict[str, dict[str, float]]) -> str:
@@ -134,16 +134,18 @@ def _timing(found: dict[str, Any]) -> list[Row]:
         return []
     ages = "; ".join(f"{side} at most {age['max']:.0f} periods, 99 % at most {age['p99']:.0f}"
                      for side, age in found["command_age_periods"].items())
+    late = [f"{side} {count} periods" for side, count in found["timed_out_periods"].items() if count]
     return [
         ("reached", f"{found['reached_s_per_s']:.3g} s in a second, {found['overruns']} overruns,"
                     f" {found['given_up_s']:.2g} s given up"),
         ("age of commands", ages or "none came"),
+        *([("timed out", f"{', '.join(late)} without a young command")] if late else []),
     ]
 
 
-def _with_words(scene: Scene, rows: list[Row]) -> list[Row]:
-    """What to watch for, and suspicious settings."""
-    watch = [("watch for", scene.watch)] if scene.watch else []
+def _with_words(scene: Scene, rows: list[Row], own: bool) -> list[Row]:
+    """What to watch for, if no controller of one's own acted, and suspicious settings."""
+    watch = [("watch for", scene.watch)] if scene.watch and not own else []
     return [*rows, *watch, *(("warning", warning) for warning in scene.warnings)]
 
 

@@ -113,6 +113,32 @@ def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
     assert command("inspect", "run/bag", "--max-age", str(most), "--min-factor", "0.01").returncode == 0
 
 
+HANGS = """
+import time
+def law(tick, t, x, v):
+    if tick > 500 and not hung:
+        hung.append(tick)
+        time.sleep(0.5)
+    return -5.0 * x - 0.5 * v
+hung = []
+"""
+
+
+def test_a_bag_tells_for_how_long_a_command_was_missing(launch: Any, tmp_path: Path, command: Any) -> None:
+    (tmp_path / "hangs.py").write_text(HANGS)
+    run = launch(
+        sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=3", "-o", "run",
+        "--free-running", "1", "--controller", "left=hangs:law", "--no-figure", cwd=tmp_path, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    out, err = run.communicate(timeout=DEADLINE)
+    assert "no command that answers a state of the last 0.1 s" in err
+    late = bag.read(tmp_path / "run" / "bag").late["left"]
+    assert 300 < late < 2500
+    for text in (out, command("inspect", "run/bag").stdout):
+        assert re.search(rf"timed out +left {late} periods without a young command", text)
+
+
 @pytest.mark.thorough
 def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
     launch: Any, node: tuple[Any, SingleThreadedExecutor]

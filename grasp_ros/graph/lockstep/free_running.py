@@ -165,7 +165,7 @@ class FreeRunning:
             if held.late and not before:
                 self._time_out(side)
             forces[body] = 0.0 if held.late and self._running.reactions[side] == "zero" else held.force
-            self._timing.age(side, self._plant.tick - held.answers)
+            self._timing.age(side, self._plant.tick - held.answers, held.late)
         if self._plant.finished:
             return
         if self._plant.tick + 1 == self._plant.scene.ticks:

@@ -52,6 +52,7 @@ from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are judged at once, and of wall time that a tick waits for others
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
+DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
 
 class Monitor(PeerNode):
@@ -83,7 +84,7 @@ class Monitor(PeerNode):
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "lost announcements": 0,
-            "alarms": 0, "ticks without V": 0, NOT_RECORDED: 0, "restored commands": 0,
+            "alarms": 0, "ticks without V": 0, NOT_RECORDED: 0, DIAGNOSTICS_LEFT_OUT: 0, "restored commands": 0,
             **{arrival.value: 0 for arrival in Arrival if arrival is not Arrival.TAKEN},
         })
         self._output, self._template = self.publisher(LYAPUNOV), lyapunov_template()
@@ -177,7 +178,7 @@ class Monitor(PeerNode):
         if self._recorder is None or not (self._due or self.counters["ticks"]):
             return
         if len(cdr) > MOST_BYTES or self._beside[topic] > MOST_BESIDE_BYTES:
-            self.refuse(NOT_RECORDED, topic)
+            self.refuse(DIAGNOSTICS_LEFT_OUT if topic == DIAGNOSTICS else NOT_RECORDED, topic)
         elif self._due:
             self._due[-1][2].append((topic, cdr))
         else:
