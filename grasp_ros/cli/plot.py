@@ -47,7 +47,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
-    add_output(sub, "FILE", "image, .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
+    add_output(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     add_force(sub)
     sub.add_argument("--animate", action="store_true",
                      help="a moving picture of one source instead, .gif, .html or .mp4 (default: .gif beside it)")

@@ -103,7 +103,7 @@ class Answers(NamedTuple):
 
     def __str__(self) -> str:
         if self.own is None:
-            return "held, not compared"
+            return "not compared: in a free run a command acts when it comes"
         if not self.foreign:
             return "the scene's law"
         if self.lost:

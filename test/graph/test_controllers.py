@@ -175,12 +175,14 @@ def test_controllers_that_stay_work_with_the_next_scene_or_say_why_not(launch: A
         file = tmp_path / f"{name}.yaml"
         file.write_text(scene.load(name, ["time.duration_s=0.2"]).to_yaml())
         monitor = launch(*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / f'bag{number}'}",
-                         stderr=subprocess.DEVNULL)
+                         stderr=subprocess.PIPE)
         plant = launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", "-p", "wait_for_monitor:=true",
                        stderr=subprocess.PIPE)
         errors = plant.communicate(timeout=DEADLINE)[1]
         assert plant.returncode == 0, errors
-        assert monitor.wait(DEADLINE) == 0
+        said = monitor.communicate(timeout=DEADLINE)[1]
+        assert f"closed the bag {tmp_path / f'bag{number}'}: 201 ticks" in said
+        assert monitor.returncode == 0
         recording = bag.read(tmp_path / f"bag{number}")
         assert recording.scene.name != ""
         assert verify(recording).holds

@@ -282,5 +282,6 @@ class Monitor(PeerNode):
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._complete()
                 self._recorder.close(self.counters)
+                self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
         if self.finished:
             self.flush(self._output)
