@@ -15,7 +15,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, canvas, plots, simulate
 from grasp_ros.simulation.losses import losses, running_losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
-from grasp_ros.simulation.quantities import contact_intervals
+from grasp_ros.simulation.quantities import SETTLED, contact_intervals, settling_times
 from lab.paper.cases import STANDARD, Figure, Start, start_of, started
 
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
@@ -107,6 +107,11 @@ def large(each: Pictured) -> Drawing:
             draw(axes, each.run)
             axes.set_ylabel(label)
         _losses(left[4], each.run)
+        for run in filter(None, (each.run, each.beside)):
+            settled, own = float(settling_times(run).max()), run is each.run
+            if settled <= run.scene.duration:
+                left[0].axvline(settled, color="black", linestyle="-.", alpha=1.0 if own else PALE,
+                                label=f"settled, {SETTLED:.0%}" if own else "_")
         for axes in left:
             shade_contacts(axes, each.run)
             axes.grid(alpha=0.25)
