@@ -164,7 +164,7 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
     spent.note("reading")
     if stopped:
-        rows.append(("interrupted", f"not verified, not drawn; `grasp verify {graph.bag}` does the one"))
+        rows.append(("interrupted", f"not verified and not drawn; `grasp verify` and `grasp plot` {graph.bag} do that"))
     else:
         whole = whole and not recording.alarms and not any(recording.missing.values())
     if not (stopped or options.no_check):

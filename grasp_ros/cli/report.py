@@ -17,7 +17,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.quantities import SETTLED
-from grasp_ros.simulation.summary import MOTION, TICKS
+from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
 
 Row = tuple[str, str]
 
@@ -49,7 +49,7 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
     rows.append(("certificate", "none: V_c needs the energy of every controller" if own else known))
     if "V_c_rise_J" in found:
         rows.append(("risen by the method", f"{found['V_c_rise_J']:.3g} J of V_c"))
-    return _with_words(trajectory.scene, rows, own=bool(own))
+    return _with_words(trajectory.scene, rows, other=bool(own))
 
 
 def _simulated(found: dict[str, Any]) -> str:
@@ -71,8 +71,8 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
         rows.append((f"last outside {SETTLED:.0%}", f"{outside}; V_c may rise, and does not tell what follows"))
     largest = [f"{name} {value:.5g} N" for name, value in found["largest_N"].items() if value > 0.0]
     if largest:
-        exact = found["largest_of"] == MOTION
-        rows.append(("largest forces" if exact else "largest at outputs", ", ".join(largest)))
+        names = {MOTION: "largest forces", TICKS: "largest at ticks", OUTPUTS: "largest at outputs"}
+        rows.append((names[found["largest_of"]], ", ".join(largest)))
     if "lost_J" in found:
         parts = [f"{name} {value:.4g}" for name, value in found["lost_J"].items() if value != 0.0]
         how = "; trapezoidal rule at the control periods" if parts and found["lost_by"] == TICKS else ""
@@ -115,7 +115,7 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     for tick, numbers in recording.changes.items():
         values = ", ".join(f"{name} {number:g}" for name, number in numbers.items())
         rows.append((f"set at {recording.scene.time_of(tick):g} s", values))
-    return _with_words(recording.scene, rows, own=not recording.closed)
+    return _with_words(recording.scene, rows, other=not recording.closed or bool(recording.changes))
 
 
 def _messages(topics: dict[str, dict[str, float]]) -> str:
@@ -134,18 +134,18 @@ def _timing(found: dict[str, Any]) -> list[Row]:
         return []
     ages = "; ".join(f"{side} at most {age['max']:.0f} periods, 99 % at most {age['p99']:.0f}"
                      for side, age in found["command_age_periods"].items())
-    late = [f"{side} {count} periods" for side, count in found["timed_out_periods"].items() if count]
+    late = [f"{side} for {count} periods" for side, count in found["timed_out_periods"].items() if count]
     return [
         ("reached", f"{found['reached_s_per_s']:.3g} s in a second, {found['overruns']} overruns,"
                     f" {found['given_up_s']:.2g} s given up"),
         ("age of commands", ages or "none came"),
-        *([("timed out", f"{', '.join(late)} without a young command")] if late else []),
+        *([("timed out", f"{', '.join(late)}, in which its last command was older than the timeout")] if late else []),
     ]
 
 
-def _with_words(scene: Scene, rows: list[Row], own: bool) -> list[Row]:
-    """What to watch for, if no controller of one's own acted, and suspicious settings."""
-    watch = [("watch for", scene.watch)] if scene.watch and not own else []
+def _with_words(scene: Scene, rows: list[Row], other: bool) -> list[Row]:
+    """What to watch for, unless other laws or gains acted than the scene has, and suspicious settings."""
+    watch = [("watch for", scene.watch)] if scene.watch and not other else []
     return [*rows, *watch, *(("warning", warning) for warning in scene.warnings)]
 
 

@@ -229,9 +229,10 @@ class Recording(Tabular, Frozen):
         return int(np.count_nonzero(self.lyapunov[:, LYAPUNOV_NAMES.index("alarm")] > 0.0))
 
     @property
-    def late(self) -> dict[str, int]:
+    def timed_out(self) -> dict[str, int]:
         """Periods of a free run in which a side's command was older than its timeout, by side."""
-        return {side: int(self.timing[f"{side}_late_all"][-1]) for side in SIDES if f"{side}_late_all" in self.timing}
+        return {side: int(self.timing[f"{side}_timed_out_all"][-1])
+                for side in SIDES if f"{side}_timed_out_all" in self.timing}
 
     @property
     def missing(self) -> dict[str, int]:

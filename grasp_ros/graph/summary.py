@@ -40,7 +40,7 @@ def summary(recording: Recording) -> dict[str, Any]:
             "given_up_s": float(recording.timing["lost_s"][-1]),
             "command_age_periods": {side: {"p99": usual, "max": most}
                                     for side, (usual, most) in recording.ages.items()},
-            "timed_out_periods": recording.late,
+            "timed_out_periods": recording.timed_out,
         }
     return found
 

@@ -6,9 +6,9 @@ simulated. Every key carries its unit. Nothing is repaired: a file that is not e
 
 from __future__ import annotations
 
-import copy
 import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,6 +19,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, Grasp
 from grasp_ros.physics.system import System
+from grasp_ros.scene.changes import texts_of_changed
 from grasp_ros.scene.effects import BY_SECTION, build, named
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
@@ -30,11 +31,9 @@ from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, Topic
-from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, is_text, read_sections
+from grasp_ros.scene.validation import SceneError, check_domain, check_keys, check_together, read_sections, read_texts
 
 TEXTS = ("title", "readings", "watch")
-CHANGED, FEW = " [", 2  # in a title, before what was changed; changes that are named there
-HORIZON = "time.duration_s="
 PAPER = frozenset(  # the sections of the paper's grasp
     ("time", "left_arm", "object", "right_arm", "left_contact", "right_contact", "left_feedback", "right_feedback")
 )
@@ -173,23 +172,21 @@ class Scene(Frozen):
         return f"each command held for {self.period_ns / 1e6:g} ms" if sampled else "continuous feedback"
 
     def changed(self, numbers: Mapping[str, float]) -> Scene:
-        """The scene with other numbers, by "section.key"; its title says so, and it has nothing to watch for.
+        """The scene with other numbers, by "section.key"; if more than its duration differs, its texts say so.
 
         Raises
         ------
         SceneError
             If the result cannot be run.
         """
-        document, other = self._document(), []
+        document = self._document()
         for name, number in numbers.items():
             section, _, key = name.partition(".")
             if key not in self.values.get(section, {}):
                 known = [f"{own}.{key}" for own, found in self.values.items() for key in found]
                 raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(name, known)}")
             document[section][key] = number
-            if self.values[section][key] != number:
-                other.append(f"{name}={_short(number)}")
-        return _read({**document, **_texts(self.title, self.watch, other)}, self.name, self.name)
+        return _read(document, self.name, self.name, self.values)
 
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
@@ -255,12 +252,12 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
         raise SceneError(f"{source}: {error}") from None
     if not isinstance(document, dict):
         raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
-    before = copy.deepcopy(document) if settings else document
+    before: Mapping[str, Any] | None = None
+    if settings:
+        with suppress(SceneError):  # what is wrong without settings may be right with them
+            before = read_sections(source, document)
     apply(settings, document)
-    title, watch = document.get("title", 0), document.get("watch", "")
-    if document != before and is_text(title) and is_text(watch):
-        document |= _texts(title, watch, settings)
-    return _read(document, name, source)
+    return _read(document, name, source, before)
 
 
 def compose(
@@ -291,34 +288,13 @@ def compose(
     return _read({**texts, **sections}, name, name)
 
 
-def _texts(title: str, watch: str, changes: Sequence[str]) -> dict[str, str]:
-    """A title that says what was changed, if it is little; what to watch for was said of the numbers before.
-
-    A scene that lasts longer is the same one.
-    """
-    changes = [change for change in changes if not change.startswith(HORIZON)]
-    if not changes:
-        return {"title": title, "watch": watch}
-    before, again, _ = title.partition(CHANGED)
-    words = ", ".join(changes) if len(changes) <= FEW and not again else "other numbers"
-    return {"title": f"{before}{CHANGED}{words}]", "watch": ""}
-
-
-def _short(number: Any) -> str:
-    return f"{number:g}" if isinstance(number, (int, float)) else "..."
-
-
-def _read(document: Mapping[Any, Any], name: str, source: str) -> Scene:
-    """The one place where a scene is made: from a file, from sections, or from another scene."""
+def _read(document: Mapping[Any, Any], name: str, source: str, before: Mapping[str, Any] | None = None) -> Scene:
+    """The one place where a scene is made: from a file, from sections, or from a scene with the numbers `before`."""
     check_keys(source, "", document, (*TEXTS, *BY_SECTION), ("title", "readings", "time"))
-    title, readings, watch = document["title"], document["readings"], document.get("watch", "")
-    for key, value in (("title", title), ("watch", watch)):
-        if not is_text(value):
-            raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text without control characters")
-    if not isinstance(readings, (list, tuple)) or not all(is_text(reading) for reading in readings):
-        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of such texts")
-    values = read_sections(source, {key: numbers for key, numbers in document.items() if key in BY_SECTION})
+    title, readings, watch = read_texts(source, document)
+    values = read_sections(source, document)
     check_together(source, values)
-    scene = Scene(name, title, tuple(readings), watch, values)
+    title, watch = texts_of_changed(title, watch, before, values)
+    scene = Scene(name, title, readings, watch, values)
     check_domain(source, values, scene.system)
     return scene

@@ -47,15 +47,33 @@ def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequ
             raise SceneError(f"{source}: {prefix}{key}: missing; allowed: {every}")
 
 
-def read_sections(source: str, values: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Numbers of all sections, each within its range.
+def read_texts(source: str, document: Mapping[Any, Any]) -> tuple[str, tuple[str, ...], str]:
+    """Title, readings and what to watch for.
+
+    Raises
+    ------
+    SceneError
+        If one is not a text.
+    """
+    title, readings, watch = document["title"], document["readings"], document.get("watch", "")
+    for key, value in (("title", title), ("watch", watch)):
+        if not is_text(value):
+            raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: a text without control characters")
+    if not isinstance(readings, (list, tuple)) or not all(is_text(reading) for reading in readings):
+        raise SceneError(f"{source}: readings: {readings!r} is not allowed; allowed: a list of such texts")
+    return title, tuple(readings), watch
+
+
+def read_sections(source: str, document: Mapping[Any, Any]) -> dict[str, dict[str, Any]]:
+    """Numbers of all sections of a document, each within its range.
 
     Raises
     ------
     SceneError
         If a key or a value is not allowed.
     """
-    return {section: _section(source, BY_SECTION[section], found) for section, found in values.items()}
+    return {section: _section(source, BY_SECTION[section], found) for section, found in document.items()
+            if section in BY_SECTION}
 
 
 def _section(source: str, effect: Effect, found: Any) -> dict[str, Any]:

@@ -52,27 +52,33 @@ def states_at(run: Trajectory, times: Array) -> Array:
         raise Refused(f"time {float(odd)!r} is not allowed; allowed: 0 to {end!r} s")
     grid, place = np.unique(np.concatenate([wanted.ravel(), run.t]), return_inverse=True)
     states = _again(run, grid)
-    if len(states) < len(grid) or not np.array_equal(states[place[wanted.size :]], run.state, equal_nan=True):
-        raise Refused(f"{run.scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this"
-                      " machine and these versions, without `changes` between its output times")
+    _check_same(run, grid, states)
     return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
 
 
+def _check_same(run: Trajectory, grid: Array, states: Array) -> None:
+    """Refuse a repetition at times, which hold those of the run, whose states are not those of the run."""
+    if len(states) < len(grid) or not np.array_equal(states[np.searchsorted(grid, run.t)], run.state, equal_nan=True):
+        raise Refused(f"{run.scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this"
+                      " machine and these versions, without `changes` between its output times")
+
+
 def at_every_tick(run: Trajectory) -> Trajectory:
-    """A run with every control period among its output times, up to where it is known.
+    """A run with every control period among its output times, up to the last of these.
 
     Raises
     ------
     Refused
         If it has not, and cannot be repeated, see `states_at`.
     """
-    ticks = tick_times(run.scene)
-    ticks = ticks[ticks <= reached(run)]
-    if np.isin(ticks, run.t).all():
+    if not len(run.t) or _every_tick(run, run.t[-1:]):
         return run
-    grid = np.union1d(ticks, run.t)
-    states = states_at(run, grid)
-    return replace(run, t=grid, state=states, loop=solve(run.scene, grid, _how(run))[1])
+    _check_controllers(run)
+    ticks = tick_times(run.scene)
+    grid = np.union1d(ticks[ticks <= run.t[-1]], run.t)
+    found, loop = solve(run.scene, grid, _how(run))
+    _check_same(run, grid, found.state)
+    return replace(run, t=grid, state=found.state, loop=loop)
 
 
 def breaks_of(run: Trajectory) -> Array:
@@ -92,10 +98,14 @@ def _again(run: Trajectory, grid: Array) -> Array:
     """States (n, 6) at ascending times; fewer if the run stops."""
     if run.sampled and _every_tick(run, grid[-1:]):
         return _with_commands(run, grid)
+    _check_controllers(run)
+    return solve(run.scene, grid, _how(run))[0].state
+
+
+def _check_controllers(run: Trajectory) -> None:
     if run.controllers:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
                       " period, as without a grid")
-    return solve(run.scene, grid, _how(run))[0].state
 
 
 def _how(run: Trajectory) -> How:
@@ -103,7 +113,7 @@ def _how(run: Trajectory) -> How:
 
 
 def _every_tick(run: Trajectory, last: Array) -> bool:
-    """Whether the output times hold every control period up to a time."""
+    """Whether the output times hold every control period up to the last of some times."""
     ticks = tick_times(run.scene)[: int(tick_of(run.scene, last).max(initial=0)) + 1]
     return bool(np.isin(ticks, run.t).all())
 

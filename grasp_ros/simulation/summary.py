@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ from grasp_ros.simulation.repeat import UNLIMITED, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
+MOST_TICKS = 1_000_000  # that are looked at for the sake of a table
 ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
 PEAKS = find(("peak_input", "peak_impact"))  # in the order of FORCES
@@ -40,7 +42,7 @@ class _Observed(NamedTuple):
     """What was seen of a run."""
 
     settled: Array  # (3,), s: left arm, object, right arm
-    lost: Losses | None  # None: the run cannot be repeated at every control period
+    lost: Losses | None  # None: not known, or not told
     largest_of: str
     largest: list[float]  # N, see FORCES
 
@@ -74,12 +76,13 @@ def summary(run: Trajectory) -> dict[str, Any]:
 
 def _amounts(run: Trajectory) -> dict[str, Any]:
     """Energies, settling times, largest forces and losses, as far as the scene has them."""
-    system, level = run.scene.system, run.energy.V_c
+    level = run.energy.V_c
     found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
-    if not METHODS[run.method].energy_check:
-        found["V_c_rise_J"] = float((level - np.minimum.accumulate(level)).max())
     dense = _dense(run)
-    observed = _by_output_times(dense) if by_output_times(run) else _of_the_motion(run)
+    if not METHODS[run.method].energy_check:
+        V_c = dense.energy.V_c
+        found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
+    observed = _by_states(run, dense) if by_output_times(run) else _of_the_motion(run)
     distance = settled_distance(run.scene)
     if may_rise(run) and distance > 0.0:
         found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
@@ -87,18 +90,21 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
         found["settled_s"] = _by_body(run, observed.settled)
         found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
     found["largest_of"], found["largest_N"] = observed.largest_of, dict(zip(FORCES, observed.largest, strict=True))
-    if observed.lost is not None and len(dense.t) > 1 and not system.external:
+    if observed.lost is not None:
         found["lost_J"] = {cause: float(value) for cause, value in observed.lost._asdict().items()}
         found["lost_by"] = TICKS if by_output_times(run) else MOTION
     return found
 
 
 def _dense(run: Trajectory) -> Trajectory:
-    """A run that output times alone tell of, with every control period among them if it can be repeated."""
-    try:
-        return at_every_tick(run) if by_output_times(run) else run
-    except Refused:
-        return run
+    """A run that output times alone tell of, with every control period among them, if they are not too many.
+
+    The run itself if it cannot be repeated.
+    """
+    with suppress(Refused):
+        if by_output_times(run) and run.scene.ticks <= MOST_TICKS:
+            return at_every_tick(run)
+    return run
 
 
 def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
@@ -115,15 +121,19 @@ def _of_the_motion(run: Trajectory) -> _Observed:
     return _Observed(settled, Losses(*seen[CAUSES]), MOTION, largest)
 
 
-def _by_output_times(run: Trajectory) -> _Observed:
+def _by_states(run: Trajectory, dense: Trajectory) -> _Observed:
     """Of any other run; the largest forces are those of the motion where it can be watched once more."""
-    where, largest = OUTPUTS, [*np.abs(run.command).max(axis=0).tolist(), *run.impacts.max(axis=0).tolist()]
-    if run.method == EXACT and run.status is Status.DONE and not run.controllers:
+    where = OUTPUTS if dense is run else TICKS
+    largest = [*np.abs(dense.command).max(axis=0).tolist(), *dense.impacts.max(axis=0).tolist()]
+    if run.method == EXACT and run.status is Status.DONE and not run.controllers and run.t[-1] == run.scene.duration:
         setup = Setup(accuracy=run.setting, sampled=run.sampled, max_events=UNLIMITED, max_work=UNLIMITED)
-        columns = ensemble(run.scene, {}, [peak.name for peak in PEAKS], setup=setup, threads=1).columns
-        where, largest = MOTION, [float(column[0]) for column in columns.values()]
-    try:
-        lost = losses(run)
-    except Refused:
-        lost = None
-    return _Observed(settling_times(run), lost, where, largest)
+        names = [peak.name for peak in PEAKS] + [outcome.name for outcome in find(("last_state",))]
+        columns = [float(column[0]) for column in ensemble(
+            run.scene, {}, names, setup=setup, threads=1).columns.values()]
+        if np.array_equal(columns[len(PEAKS) :], run.state[-1], equal_nan=True):  # nothing was set on the way
+            where, largest = MOTION, columns[: len(PEAKS)]
+    lost = None
+    if len(dense.t) > 1 and not run.scene.system.external and run.scene.ticks <= MOST_TICKS:
+        with suppress(Refused):
+            lost = losses(dense)
+    return _Observed(settling_times(dense), lost, where, largest)

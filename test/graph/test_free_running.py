@@ -133,10 +133,10 @@ def test_a_bag_tells_for_how_long_a_command_was_missing(launch: Any, tmp_path: P
     )
     out, err = run.communicate(timeout=DEADLINE)
     assert "no command that answers a state of the last 0.1 s" in err
-    late = bag.read(tmp_path / "run" / "bag").late["left"]
+    late = bag.read(tmp_path / "run" / "bag").timed_out["left"]
     assert 300 < late < 2500
     for text in (out, command("inspect", "run/bag").stdout):
-        assert re.search(rf"timed out +left {late} periods without a young command", text)
+        assert re.search(rf"timed out +left for {late} periods, in which its last command was older than", text)
 
 
 @pytest.mark.thorough

@@ -45,7 +45,7 @@ def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signa
     assert process.returncode == (0 if moment == "recording" else 130), err
     assert "Traceback" not in err + out
     if moment == "recording":
-        assert f"not verified, not drawn; `grasp verify {recorded.parent}` does the one" in out
+        assert f"not verified and not drawn; `grasp verify` and `grasp plot` {recorded.parent}" in out
         recording = bag.read(recorded.parent)
         ticks = len(recording.tick)
         assert 100 < ticks < 20001

@@ -24,6 +24,7 @@ import pytest
 from processes import DEADLINE, START, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rich.console import Console
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
@@ -32,6 +33,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.view import View
 from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.scene.topics import JOINT_STATES
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
 
@@ -80,13 +82,10 @@ class Screen:
                 return str(pictures[-1])
         raise AssertionError(f"waited in vain for {pattern}: {self._shown[-2000:]!r}")
 
-    def wait_for_words(self, words: str) -> None:
-        """Wait for words before the first picture."""
-        def shown() -> str:
-            self._read(0.02)
-            return re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self._shown)
-
-        wait_for(lambda: words in shown(), words)
+    def shows(self, words: str) -> bool:
+        """Whether words have been shown since the last key."""
+        self._read(0.02)
+        return words in re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", self._shown)
 
     def kill(self, number: int) -> None:
         """Send a signal to the process."""
@@ -149,9 +148,27 @@ def test_a_plant_that_was_paused_before_anybody_watched_is_said_to_be_and_steps(
     ask = [sys.executable, "-m", "grasp_ros.cli", "ctl", "status"]
     wait_for(lambda: "paused" in subprocess.run(ask, capture_output=True, text=True, check=False).stdout, "a pause")
     screen = Screen(launch, *START, "watch")
-    screen.wait_for_words("the plant is paused at tick 0; → steps it")
+    wait_for(lambda: screen.shows("the plant is paused at tick 0; → steps it"), "what the plant is")
     screen.press(RIGHT)
     screen.wait("t = 0.001 s   paused")
+
+
+def test_a_plant_of_others_may_answer_whatever_it_likes(
+    launch: Any, node: tuple[Any, SingleThreadedExecutor]
+) -> None:
+    peer, executor = node
+    answers = iter(["hello", "[]", '{"a": 1}', '{"state": 1, "tick": Infinity}'])
+
+    def answer(_: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.message = next(answers, '{"state": "[/x]", "tick": 3}')
+        return response
+
+    peer.create_service(Trigger, "plant/status", answer)
+    peer.create_publisher(JointState, JOINT_STATES.name, 1)
+    screen = Screen(launch, *START, "watch")
+    wait_for(lambda: executor.spin_once(timeout_sec=0.05) or screen.shows("the plant is [/x] at tick 3"), "its words")
+    screen.press(b"q")
+    assert screen.end() == 0
 
 
 @pytest.mark.parametrize(

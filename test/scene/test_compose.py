@@ -80,7 +80,12 @@ def test_a_change_is_told_by_the_title_and_is_validated() -> None:
     assert heavy.title == f"{scene.title} [object.mass_kg=9, left_arm_table.force_N=...]"
     assert (heavy.readings, heavy.watch, bool(scene.watch)) == (scene.readings, "", True)
     assert heavy.changed({"object.mass_kg": 8}).title == f"{scene.title} [other numbers]"
-    assert load("table", ["object.mass_kg=9"]).title == f"{scene.title} [object.mass_kg=9]"
+    assert load("table", ["object.mass_kg=2", "object.mass_kg=9.0"]).title == f"{scene.title} [object.mass_kg=9]"
+    assert scene.changed({"left_arm_table.force_N": list(scene.values["left_arm_table"]["force_N"])}) == scene
+    longer = load("table", ["time.duration_s=5"])
+    assert (longer.title, longer.watch) == (scene.title, scene.watch)
+    bracketed = parse(scene.to_yaml().replace(scene.title, "X [mm] long"), "x", "file")
+    assert bracketed.changed({"object.mass_kg": 9}).title == "X [mm] long [object.mass_kg=9]"
     assert load("table", [f"object.mass_kg={scene.values['object']['mass_kg']!r}"]) == scene
     assert heavy.values["left_arm_table"]["force_N"] == (1.0, 2.0, 3.0)
     assert scene.changed({}) == scene.changed({"object.mass_kg": scene.values["object"]["mass_kg"]}) == scene

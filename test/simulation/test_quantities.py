@@ -92,6 +92,16 @@ def test_losses_do_not_depend_on_the_output_times(options: dict[str, Any], round
     assert summary(coarse)["lost_J"] == pytest.approx(summary(fine)["lost_J"], rel=rounding, abs=0.0)
 
 
+def test_forces_of_a_run_with_changes_are_its_own() -> None:
+    """Those of the scene without the changes once stood in the table, and losses of a run that went on without them."""
+    scene, stiff = scenes.load("case_01"), {100: {"left_feedback.position_gain_N_per_m": 200.0}}
+    run = simulate(scene, sampled=True, changes=stiff)
+    assert summary(run)["largest_N"]["f_l"] == np.abs(run.command[:, 0]).max() > 50.0
+    early = simulate(scene, sampled=True, changes={3000: stiff[100]}, grid=[0.0, 1.0, 2.0])
+    until = simulate(scene.changed({"time.duration_s": 2.0}), sampled=True)
+    assert float(losses(early).dampers) == pytest.approx(float(losses(until).dampers), rel=1e-12)
+
+
 def test_losses_of_a_run_that_cannot_be_repeated_are_refused() -> None:
     def rest(tick: int, t: float, x: float, v: float) -> float:
         return 0.0

@@ -37,7 +37,7 @@ class Timing:
         self._overruns = 0
         self._before = math.nan
         self._all: dict[str, Counter[int]] = {side: Counter() for side in sides}  # ages since the start
-        self._late: Counter[str] = Counter()  # periods without a young command since the start
+        self._timed_out: Counter[str] = Counter()  # periods since the start
         self._clear()
 
     def _clear(self) -> None:
@@ -58,10 +58,10 @@ class Timing:
         """The plant stands, as it was told to."""
         self._before = math.nan
 
-    def age(self, side: str, periods: int, late: bool) -> None:
-        """Age of the last command in control periods: how much older the state is that it answers, and if too old."""
+    def age(self, side: str, periods: int, timed_out: bool) -> None:
+        """Age of the last command in control periods: how much older the state is that it answers."""
         self._ages[side].append(periods)
-        self._late[side] += late
+        self._timed_out[side] += timed_out
         self._all[side][min(periods, OLDEST)] += 1
 
     def take(self) -> dict[str, float]:
@@ -70,8 +70,8 @@ class Timing:
         `reached` are the simulated seconds in a second since the start, without pauses; `period_s` is the mean
         interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were computed, `overruns` how
         many were later than a whole period since the start, and `left_age_p99` and so on the age of the commands in
-        periods; `left_age_p99_all` and `left_age_max_all` are those since the start, `left_late_all` counts the periods
-        in which it was older than the timeout.
+        periods; `left_age_p99_all` and `left_age_max_all` are those since the start, and `left_timed_out_all` in how
+        many periods it was older than the timeout.
         """
         if not self._lateness or not self._intervals:
             return {}
@@ -88,6 +88,6 @@ class Timing:
                 np.percentile(known, PERCENTILE, weights=often, method="inverted_cdf")
             )
             values[f"{side}_age_max_all"] = float(max(known))
-            values[f"{side}_late_all"] = float(self._late[side])
+            values[f"{side}_timed_out_all"] = float(self._timed_out[side])
         self._clear()
         return values

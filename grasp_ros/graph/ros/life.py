@@ -31,24 +31,26 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
     raises.
     """
     nodes: list[GraspNode] = []
+    names = "a node"  # a node that is destroyed has none
     try:
         _init()
         for make in makes:
             nodes.append(make())
+            names = _names(nodes)
         gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
         gc.enable()
         if not nodes[0].work(received):
             spin(nodes, received)
     except Refused as error:
-        tell_parent(_names(nodes), str(error))
+        tell_parent(names, str(error))
         with suppress(OSError):  # nobody reads it
             print(error, file=sys.stderr)
         return 2
     except Exception as error:  # a fault of this package: in one line, and where
         words = f"a fault of this package: {type(error).__name__}: {error}, in {place_of(error)}"
-        tell_parent(_names(nodes), words)
+        tell_parent(names, words)
         with suppress(OSError):
-            print(f"{_names(nodes)}: {words}", file=sys.stderr)
+            print(f"{names}: {words}", file=sys.stderr)
         return 1
     finally:
         for node in nodes:
@@ -90,7 +92,7 @@ def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
 
 
 def _names(nodes: Sequence[GraspNode]) -> str:
-    return ", ".join(node.get_name() for node in nodes) or "a node"
+    return ", ".join(node.get_name() for node in nodes)
 
 
 def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:

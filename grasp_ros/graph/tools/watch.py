@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import time
 from collections.abc import Callable, Set
@@ -14,6 +15,7 @@ from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from rich.live import Live
+from rich.text import Text
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
@@ -24,12 +26,13 @@ from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.view import Moment, View, named
+from grasp_ros.physics.errors import printable
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of
 
 FRAME_SECONDS = 0.1
 HINT = "Space pause   → step   q quit"
-STATUS_SECONDS = 0.5  # between questions to the plant
+STATUS_SECONDS, LOST_SECONDS = 0.5, 2.0  # between questions to the plant, and until an answer is taken to be lost
 PATIENCE_SECONDS = 10.0  # for a plant to come
 STALE_SECONDS = 1.0  # after a reset: what waits here may still be of the time before it
 MOST_OPEN = WINDOW + 500  # states of which not all has come; a monitor may be WINDOW behind
@@ -77,10 +80,11 @@ class Watch(GraspNode):
         self._view: View | None = None
         self._newest, self._lockstep = Newest(), True
         self._needed: set[Topic] = set()
-        self._created, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0
+        self._there, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0  # a plant, at the latest
         where = place(os.environ, self.get_namespace())
         self._nobody = f"no plant has come for {PATIENCE_SECONDS:g} s {where}"
-        self._live = Live(f"waiting for a plant {where}", auto_refresh=False)
+        self._waiting = f"waiting for a plant {where}"
+        self._live = Live(self._waiting, auto_refresh=False)
         self._live.start(refresh=True)
         self.subscribe(SCENE, self._on_scene)
         self.subscribe(RUN, self._on_run)
@@ -92,8 +96,8 @@ class Watch(GraspNode):
         services = ("pause", "resume", "step", "status")
         self._asks = {name: self.create_client(Trigger, f"plant/{name}") for name in services}
         self._asks["steps"] = self.create_client(SetParameters, "plant/set_parameters")
-        self._told: dict[str, Any] = {}  # what the plant says that it is
-        self._waits_for_status = False
+        self._told: tuple[str, int] | None = None  # state and tick, as the plant says
+        self._asked = -math.inf  # since when an answer is waited for
         self.wall_timer(STATUS_SECONDS, self._ask_status)
         self.wall_timer(FRAME_SECONDS, self._look)
         self._keys = Keys()
@@ -131,16 +135,21 @@ class Watch(GraspNode):
             client.call_async(request).add_done_callback(lambda future: then(future.result()))
 
     def _ask_status(self) -> None:
-        if not self._waits_for_status:
-            self._waits_for_status = self._asks["status"].service_is_ready()
+        if time.monotonic() > self._asked + LOST_SECONDS:
+            self._asked = time.monotonic()
             self._ask("status", self._on_status)
 
     def _on_status(self, answer: Any) -> None:
-        self._waits_for_status, self._told = False, json.loads(answer.message)
+        self._asked, self._told = -math.inf, None
+        with suppress(*messages.UNREADABLE, TypeError, KeyError, OverflowError):  # of a plant that is none of ours
+            found = json.loads(answer.message)
+            self._told = printable(str(found["state"])), int(found["tick"])
 
     def _words_of_status(self) -> str:
         """Why nothing is seen yet: a paused plant publishes nothing."""
-        state, tick = self._told["state"], self._told["tick"]
+        if self._told is None:
+            return self._waiting
+        state, tick = self._told
         hint = "; → steps it, Space lets it go on" if state == PAUSED and self._keys.there else ""
         return f"the plant is {state} at tick {tick}{hint}"
 
@@ -153,12 +162,14 @@ class Watch(GraspNode):
             with suppress(*messages.UNREADABLE):  # of a sender that says something else
                 moment = self._moment(self._newest.found, alone)
                 self._live.update(self._view.draw(moment, self._live.console.width), refresh=True)
-        elif alone and time.monotonic() > self._created + PATIENCE_SECONDS:
+        elif alone and time.monotonic() > self._there + PATIENCE_SECONDS:
             self.fail(self._nobody)
-        elif self._told:
-            self._live.update(self._words_of_status(), refresh=True)
+        else:
+            self._live.update(Text(self._words_of_status()), refresh=True)
         if alone:
-            self._told, self._waits_for_status = {}, False
+            self._told = None
+        else:
+            self._there = time.monotonic()
 
     def _moment(self, found: dict[Topic, bytes], alone: bool) -> Moment:
         """One state and all that belongs to it."""
@@ -176,7 +187,7 @@ class Watch(GraspNode):
             laws = self._view.scene.system.laws
             commands = {side: inputs[body] for side, body in SIDES.items() if body in laws}
         level = named(_read(LYAPUNOV, found).position) if LYAPUNOV in found else {}
-        phase = self._told.get("state", Phase.RUNNING.value)
+        phase = self._told[0] if self._told else Phase.RUNNING.value
         pace = f"{self._rate:.0f} ticks/s" if phase == Phase.RUNNING.value else phase
         words = "the plant has ended" if alone else pace
         return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)
