@@ -132,7 +132,7 @@ class Gripped(NamedTuple):
         share = sum(found.holds for found in own) / len(own)
         held = motion.holds_on(scenes.load("preload"))
         return Part(
-            "Both arms press the object in the end.",
+            "With set-points that allow it both arms press the object in the end.",
             f"both impact forces above 0 N through the last {motion.LAST:g} s",
             "Both arms are regulated to the same point, so that no deformation is left to press with; set-points that"
             " overlap leave one.",
