@@ -69,9 +69,14 @@ def running_losses(run: Trajectory) -> tuple[Array, Losses]:
         times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
         return times, observed_losses(run, times)
     run = at_every_tick(run)
+    return run.t, _sums(run)
+
+
+def _sums(run: Trajectory) -> Losses:
+    """Running sums (n,) in J of what its states tell, by the trapezoidal rule."""
     steps = np.diff(run.t)
     rates = power_lost(run.scene.system, run.state)
-    return run.t, Losses(*(np.concatenate([[0.0], np.cumsum(0.5 * steps * (r[1:] + r[:-1]))]) for r in rates))
+    return Losses(*(np.concatenate([[0.0], np.cumsum(0.5 * steps * (r[1:] + r[:-1]))]) for r in rates))
 
 
 def observed_losses(run: Trajectory, times: Array) -> Losses:
@@ -95,9 +100,11 @@ def losses(run: Trajectory) -> Losses:
     Refused
         As `running_losses`.
     """
-    exact = not by_output_times(run)
-    run = run if exact else at_every_tick(run)
-    sums = observed_losses(run, np.array([0.0, run.scene.duration])) if exact else running_losses(run)[1]
+    if by_output_times(run):
+        run = at_every_tick(run)
+        sums = _sums(run)
+    else:
+        sums = observed_losses(run, np.array([0.0, run.scene.duration]))
     found = Losses(*(np.asarray(total[-1]) for total in sums))
     if not run.sampled:
         return found

@@ -32,7 +32,7 @@ from grasp_ros.simulation.repeat import UNLIMITED, at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
-MOST_TICKS = 1_000_000  # that are looked at for the sake of a table
+MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
 ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
 PEAKS = find(("peak_input", "peak_impact"))  # in the order of FORCES
@@ -78,14 +78,16 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     """Energies, settling times, largest forces and losses, as far as the scene has them."""
     level = run.energy.V_c
     found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
-    dense = _dense(run)
+    dense = _dense(run) if by_output_times(run) else run
+    known = run if dense is None else dense
     if not METHODS[run.method].energy_check:
-        V_c = dense.energy.V_c
+        V_c = known.energy.V_c
         found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
     observed = _by_states(run, dense) if by_output_times(run) else _of_the_motion(run)
     distance = settled_distance(run.scene)
     if may_rise(run) and distance > 0.0:
-        found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
+        if dense is not None:
+            found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
     elif not np.isnan(observed.settled).any():
         found["settled_s"] = _by_body(run, observed.settled)
         found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
@@ -96,15 +98,12 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     return found
 
 
-def _dense(run: Trajectory) -> Trajectory:
-    """A run that output times alone tell of, with every control period among them, if they are not too many.
-
-    The run itself if it cannot be repeated.
-    """
+def _dense(run: Trajectory) -> Trajectory | None:
+    """The run with every control period among its output times; None if it cannot be repeated, or is too long."""
     with suppress(Refused):
-        if by_output_times(run) and run.scene.ticks <= MOST_TICKS:
+        if run.scene.ticks <= max(MOST_TICKS, len(run.t)):
             return at_every_tick(run)
-    return run
+    return None
 
 
 def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
@@ -121,10 +120,11 @@ def _of_the_motion(run: Trajectory) -> _Observed:
     return _Observed(settled, Losses(*seen[CAUSES]), MOTION, largest)
 
 
-def _by_states(run: Trajectory, dense: Trajectory) -> _Observed:
+def _by_states(run: Trajectory, dense: Trajectory | None) -> _Observed:
     """Of any other run; the largest forces are those of the motion where it can be watched once more."""
-    where = OUTPUTS if dense is run else TICKS
-    largest = [*np.abs(dense.command).max(axis=0).tolist(), *dense.impacts.max(axis=0).tolist()]
+    known = run if dense is None else dense
+    where = OUTPUTS if known is run else TICKS
+    largest = [*np.abs(known.command).max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
     if run.method == EXACT and run.status is Status.DONE and not run.controllers and run.t[-1] == run.scene.duration:
         setup = Setup(accuracy=run.setting, sampled=run.sampled, max_events=UNLIMITED, max_work=UNLIMITED)
         names = [peak.name for peak in PEAKS] + [outcome.name for outcome in find(("last_state",))]
@@ -132,8 +132,5 @@ def _by_states(run: Trajectory, dense: Trajectory) -> _Observed:
             run.scene, {}, names, setup=setup, threads=1).columns.values()]
         if np.array_equal(columns[len(PEAKS) :], run.state[-1], equal_nan=True):  # nothing was set on the way
             where, largest = MOTION, columns[: len(PEAKS)]
-    lost = None
-    if len(dense.t) > 1 and not run.scene.system.external and run.scene.ticks <= MOST_TICKS:
-        with suppress(Refused):
-            lost = losses(dense)
-    return _Observed(settling_times(dense), lost, where, largest)
+    told = dense is not None and len(dense.t) > 1 and not run.scene.system.external
+    return _Observed(settling_times(known), losses(known) if told else None, where, largest)

@@ -8,7 +8,7 @@ from itertools import islice
 from lab.paper.cases import Cases, Start
 from lab.paper.claims import Claim, Part
 from lab.paper.conclusions import conclusions
-from lab.paper.measures import Key, Known, Wish, found_of, key_of
+from lab.paper.measures import Key, Wish, key_of
 from lab.paper.observations import observations
 from lab.paper.running_text import running_text
 from lab.paper.statement import Judged, Statement
@@ -35,8 +35,8 @@ def wishes_of(cases: Cases, starts: Sequence[Start]) -> list[list[Wish]]:
     return [list(part.wishes(cases, starts)) for part in parts(statements())]
 
 
-def pieces(wishes: Iterable[Wish]) -> list[Wish]:
-    """What is measured in all, each once, in pieces for several processes."""
+def pieces(wishes: Iterable[Wish]) -> list[list[Wish]]:
+    """What is measured in all, each once, in pieces for several processes, see `found_of`."""
     first: dict[Key, Wish] = {}
     starts: dict[Key, dict[Start, None]] = {}
     for wish in wishes:
@@ -44,14 +44,9 @@ def pieces(wishes: Iterable[Wish]) -> list[Wish]:
         first.setdefault(key, wish)
         starts.setdefault(key, {}).update(dict.fromkeys(wish.starts))
     return [
-        wish._replace(starts=tuple(islice(starts[key], begin, begin + PIECE)))
+        [wish._replace(starts=tuple(islice(starts[key], begin, begin + PIECE)))]
         for key, wish in first.items() for begin in range(0, len(starts[key]), PIECE)
     ]
-
-
-def measured(wish: Wish) -> Known:
-    """What a wish finds; for a process."""
-    return found_of([wish])
 
 
 def judged(place: int, cases: Cases, starts: Sequence[Start]) -> tuple[int, Part]:

@@ -35,7 +35,7 @@ from lab.paper.compare import Comparison, Variant
 from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
-from lab.paper.judgement import claims_of, judged, measured, pieces, statements, wishes_of
+from lab.paper.judgement import claims_of, judged, pieces, statements, wishes_of
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import SHORT, Known, found_of, remember
 from lab.paper.page import Image, Picture, Report, agreement, summary
@@ -68,7 +68,7 @@ def report(graph: bool, starts: int) -> Report:
     with context.Pool(os.cpu_count() or 1) as pool, tqdm(
         total=len(wanted), desc="random starts and sweeps", file=sys.stderr
     ) as bar:
-        for found in pool.imap_unordered(measured, wanted):
+        for found in pool.imap_unordered(found_of, wanted):
             remember(found)
             bar.update()
         jobs: list[Job] = [

@@ -39,7 +39,6 @@ from grasp_ros.simulation import simulate
 pytestmark = pytest.mark.slow  # real processes
 TRACK = 72  # columns
 CONFIG = Path(__file__).parents[2] / "config"
-TERMINAL = {"TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
 
 
 def test_markers_show_the_states_and_only_where_somebody_looks(
@@ -152,7 +151,8 @@ def test_a_live_picture_is_one_state_and_no_writer_waits_for_it(
     peer, _ = node
     launch(sys.executable, "-c", LATE)
     ours, theirs = pty.openpty()
-    launch(*START, "watch", stdout=theirs, stderr=theirs, env={**os.environ, **TERMINAL})
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "90", "LINES": "30", "LC_ALL": "C.UTF-8"}
+    launch(*START, "watch", stdout=theirs, stderr=theirs, env=environment)
     shown = ""
     while len(re.findall(r"t = 1\.\d+ s", shown)) < 3:
         shown += os.read(ours, 65536).decode(errors="replace")
