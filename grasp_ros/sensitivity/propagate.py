@@ -124,9 +124,16 @@ def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
 
 @kernel
 def is_due(outputs: Outputs, time: float) -> bool:
-    """Whether an output is due up to a time."""
+    """Whether an output is due up to a time, with it."""
     row = outputs.counts[Count.FILLED]
     return bool(row < outputs.grid.shape[0] and outputs.grid[row] <= time)
+
+
+@kernel
+def is_before(outputs: Outputs, time: float) -> bool:
+    """Whether an output is due before a time."""
+    row = outputs.counts[Count.FILLED]
+    return bool(row < outputs.grid.shape[0] and outputs.grid[row] < time)
 
 
 @kernel
@@ -200,12 +207,10 @@ def fly_free(t: Tangents, presses: bool, tau: float) -> None:
 @kernel
 def pass_flight(t: Tangents, begin: float, span: float) -> None:
     """Move the tangents over a flight, and write the outputs on the way."""
-    due = True
-    while due:
-        due = is_due(t.outputs, t.outputs.numbers[Number.TIME])
-        fly_free(t, False, since(t.outputs, begin, span) if due else span)
-        if due:
-            write_output(t.motion, t.outputs, t.rates)
+    while is_before(t.outputs, t.outputs.numbers[Number.TIME]):
+        fly_free(t, False, since(t.outputs, begin, span))
+        write_output(t.motion, t.outputs, t.rates)
+    fly_free(t, False, span)
 
 
 @kernel
@@ -219,7 +224,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         part = exact_length(motion, t.table, n, left)
         ends = part == left
         reached = span if ends else time_at(motion.c, n, part)[0]
-        while is_due(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):
+        while is_before(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)
             step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, tau))
@@ -243,6 +248,8 @@ def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n:
         pass_flight(t, begin, span)
     else:
         pass_step(t, begin, span, s, n)
+    while is_due(t.outputs, t.outputs.numbers[Number.TIME]):  # events are: each ends its segment
+        write_output(t.motion, t.outputs, t.rates)
     copy_matrix(t.rates.x, t.rates.at)
     for side in (LEFT, RIGHT):
         if t.motion.mode[side] == Pair.BEGINNING or t.motion.mode[side] == Pair.LEAVING:

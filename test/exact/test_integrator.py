@@ -220,9 +220,9 @@ nothing = ("stiffness_N_per_m", "damping_Ns_per_m", "position_gain_N_per_m", "ve
 free = {f"{section}.{key}": 0.0 for section, keys in scene.values.items() for key in keys if key in nothing}
 chain = simulate(scene.changed({**free, "right_arm.velocity_m_per_s": 0.0}), grid=np.linspace(0.0, 0.02, 5))
 print(*chain.state.ravel().tolist(), *(event.time for event in chain.events))
-own = {"controllers": {"left": lambda tick, time, x, v: -x}}
+own = {"controllers": {"left": lambda tick, time, x, v: -x}, "grid": None}
 for settings in ({}, {"sampled": True}, own, {"method": "paper"}, {"method": "discrete_gradient"}):
-    run = simulate(scene, grid=np.linspace(0.0, 0.02, 5), **settings)
+    run = simulate(scene, **{"grid": np.linspace(0.0, 0.02, 5), **settings})
     print(*run.state.ravel().tolist(), *map(float, losses(run)))
 print(*np.concatenate([*ensemble(scene, {}, ("energy", "settling_time", "touches")).columns.values()]).tolist())
 """
