@@ -7,10 +7,10 @@
 What is listed in `__all__` is imported when it is first used, so that `import grasp_ros` costs nothing.
 
 Rooms, each importing only from those below it (pyproject.toml has the contract): `cli`; `identification` (numbers from
-measurements) and `optimization` (numbers chosen for an outcome); `graph` (nodes and bags), `maps` (many runs in files),
-`accuracy` (what it costs) and `sensitivity` (derivatives); `simulation` (a run without ROS); `methods` (the other
-integrators) and `observe` (what is seen of a run); `exact` (the compiled integrator) and `scene` (what a file may say);
-`physics` (equations).
+measurements) and `optimization` (numbers chosen for an outcome); `graph` (nodes and bags), `maps` (many runs in files)
+and `accuracy` (what it costs); `simulation` (a run without ROS); `sensitivity` (derivatives carried along); `methods`
+(the other integrators) and `observe` (what is seen of a run); `exact` (the compiled integrator) and `scene` (what a
+file may say); `physics` (equations).
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _PLACES = {  # module, and the name there where it is another one; their types: 
     "Scene": "scene.scene", "Status": "exact.integrator", "Trajectory": "simulation.trajectory",
     "Transition": "physics.layout", "compose": "scene.scene", "design": "optimization.search",
     "draw": "simulation.plots", "ensemble": "simulation.ensemble",
-    "ensemble_sensitivities": "sensitivity.ensemble", "fit": "identification.fit", "load": "scene.scene",
+    "ensemble_sensitivities": "simulation.sensitivities", "fit": "identification.fit", "load": "scene.scene",
     "load_run": "simulation.trajectory_file:load", "names": "scene.library", "parse": "scene.scene",
-    "read_bag": "graph.bag:read", "sensitivities": "sensitivity.sensitivities", "simulate": "simulation.simulate",
+    "read_bag": "graph.bag:read", "sensitivities": "simulation.sensitivities", "simulate": "simulation.simulate",
     "spectrum": "sensitivity.spectrum",
 }
 __all__ = sorted(_PLACES)

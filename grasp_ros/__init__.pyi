@@ -14,11 +14,11 @@ from grasp_ros.scene.scene import Scene as Scene
 from grasp_ros.scene.scene import compose as compose
 from grasp_ros.scene.scene import load as load
 from grasp_ros.scene.scene import parse as parse
-from grasp_ros.sensitivity.ensemble import ensemble_sensitivities as ensemble_sensitivities
-from grasp_ros.sensitivity.sensitivities import sensitivities as sensitivities
 from grasp_ros.sensitivity.spectrum import spectrum as spectrum
 from grasp_ros.simulation.ensemble import ensemble as ensemble
 from grasp_ros.simulation.plots import draw as draw
+from grasp_ros.simulation.sensitivities import ensemble_sensitivities as ensemble_sensitivities
+from grasp_ros.simulation.sensitivities import sensitivities as sensitivities
 from grasp_ros.simulation.simulate import simulate as simulate
 from grasp_ros.simulation.trajectory import Trajectory as Trajectory
 from grasp_ros.simulation.trajectory_file import load as load_run

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +21,8 @@ from grasp_ros.cli.arguments import (
     warn,
 )
 from grasp_ros.cli.output import STDOUT, image_format, note, write_figure
+from grasp_ros.cli.sensitivity import sensitivity_panels
 from grasp_ros.methods.registry import EXACT, METHODS
-from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
@@ -83,8 +82,8 @@ def _plot(options: argparse.Namespace) -> int:
         note(f"written to {output}")
         return 0
     panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
-    if options.sensitivity:
-        panels += _sensitivity(motions[0], options)
+    if isinstance(motions[0], Trajectory) and motions[0].sensitivity is not None:
+        panels += sensitivity_panels(motions[0].sensitivity)
     figure = plots.compose(motions, captions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
@@ -131,17 +130,8 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
     if span is not None and not (options.sampled or scene.sampled):
         first, last = min(max(span[0], 0.0), scene.duration), min(span[1], scene.duration)
         grid = np.linspace(first, last, GRID_POINTS)
-    return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step)
-
-
-def _sensitivity(motion: Motion, options: argparse.Namespace) -> Sequence[plots.Panel]:
-    """Derivatives of a scene's motion at the times that are drawn."""
-    from grasp_ros.cli.sensitivity import panels
-    from grasp_ros.sensitivity.sensitivities import sensitivities
-
-    accuracy = ACCURACY if options.step is None else options.step
-    return panels(sensitivities(motion.scene, options.sensitivity, motion.t, sampled=options.sampled,
-                                accuracy=accuracy))
+    return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step,
+                    sensitivity=options.sensitivity or None)
 
 
 def _beside(source: str, ending: str) -> Path:

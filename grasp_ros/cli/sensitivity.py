@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_ros.cli.report import Row
 from grasp_ros.physics.layout import Body, Entry, Transition
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.sensitivity.sensitivities import Sensitivity
 from grasp_ros.simulation import plots
 from grasp_ros.simulation.canvas import Axes
 from grasp_ros.simulation.tables import Motion
+
+if TYPE_CHECKING:
+    from grasp_ros.simulation.differentiate import Sensitivity
 
 LAST = 4  # events that are shown
 COLORS = {Body.LEFT: plots.LEFT_COLOR, Body.OBJECT: plots.OBJECT_COLOR, Body.RIGHT: plots.RIGHT_COLOR}
@@ -44,7 +46,7 @@ def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
     }
 
 
-def panels(found: Sensitivity) -> list[plots.Panel]:
+def sensitivity_panels(found: Sensitivity) -> list[plots.Panel]:
     """A panel for each number: derivatives of the positions by it, over time."""
     return [plots.Panel(partial(_draw, found, place), "derivative, m", 2) for place in range(len(found.keys))]
 

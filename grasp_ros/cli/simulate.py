@@ -92,15 +92,14 @@ def _simulate(options: argparse.Namespace) -> int:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,
-            progress=None if METHODS[options.method].knob == STEP else told,
+            sensitivity=options.sensitivity or None, progress=None if METHODS[options.method].knob == STEP else told,
         )
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)
-    if options.sensitivity:
+    rates = trajectory.sensitivity
+    if rates is not None:
         from grasp_ros.cli.sensitivity import describe_sensitivity, last_rates
-        from grasp_ros.sensitivity.sensitivities import sensitivities
 
-        rates = sensitivities(scene, options.sensitivity, sampled=sampled, accuracy=options.accuracy)
         rows, found = [*rows, *describe_sensitivity(rates)], {**found, "sensitivity": last_rates(rates)}
     show(options, table(rows), found)
     if options.output is not None:

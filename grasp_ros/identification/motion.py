@@ -15,7 +15,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, compose
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.sensitivity.directions import directions
-from grasp_ros.sensitivity.sensitivities import carry, complete
+from grasp_ros.simulation.differentiate import carry, complete
 from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.ticks import tick_of
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple
 
 from grasp_ros.physics.domain import SMALLEST
@@ -14,6 +15,7 @@ UNITS = {  # endings of keys; the longest that fits counts
 }
 
 
+@cache
 def ending_of(key: str) -> str:
     """The ending of a key that says its unit; empty if none does."""
     return max((ending for ending in UNITS if key.endswith(ending)), key=len, default="")

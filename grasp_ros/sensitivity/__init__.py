@@ -1,1 +1,1 @@
-"""Derivatives of a motion through its impacts, and what they are for."""
+"""Tangents of a motion through its impacts: how they are carried along a run."""

@@ -15,9 +15,9 @@ import numpy as np
 
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT
-from grasp_ros.physics.model import Array, penetration
-from grasp_ros.physics.system import System
+from grasp_ros.physics.layout import LEFT, OBJECT
+from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION, build
 from grasp_ros.scene.parameter import Parameter
@@ -54,19 +54,33 @@ def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
     Raises
     ------
     Refused
-        If the scene does not name a number, or it does not enter smoothly, or a sensor measures in steps.
+        See `check_keys`.
     """
-    if not keys:
-        raise Refused(f"{scene.name}: sensitivity: no number; allowed: one at least, such as object.position_m")
-    for side, law in scene.system.laws.items():
-        if sampled and law.row[[*STEPS]].any():
-            raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
-                          " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
+    check_keys(scene, keys, sampled)
     forced = any(key.partition(".")[0].endswith(("_pulse", "_sine", "_table")) for key in keys)
     ticks = scene.ticks if forced else 0
     here = _numbers(scene.system, ticks, sampled)
     found = [_derivative(scene, key, here, partial(_numbers, ticks=ticks, sampled=sampled)) for key in keys]
     return Directions(*(np.ascontiguousarray(np.stack(arrays, axis=-1)) for arrays in zip(*found, strict=True)))
+
+
+def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> None:
+    """Refuse numbers by which a run of a scene has no derivatives.
+
+    Raises
+    ------
+    Refused
+        If the scene does not name a number, or it does not enter smoothly, or a sensor measures in steps.
+    """
+    if not keys or isinstance(keys, str):
+        raise Refused(f"{scene.name}: sensitivity: {keys!r}; allowed: a list of numbers, such as"
+                      " [\"object.position_m\"]")
+    for side, law in scene.system.laws.items():
+        if sampled and law.row[[*STEPS]].any():
+            raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
+                          " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
+    for key in keys:
+        check_key(scene, key)
 
 
 def check_key(scene: Scene, key: str) -> Parameter:
@@ -125,5 +139,5 @@ def law_rows(system: System) -> Array:
 
 def closing(side: int, state: Array) -> tuple[Array, Array]:
     """u in m and u' in m/s of a pair, (8), from states (m, 6), or their derivatives from those of states (m, 6, n)."""
-    u_l, d_l, u_r, d_r = penetration(np.moveaxis(state, 1, -1))
-    return (u_l, d_l) if side == LEFT else (u_r, d_r)
+    front, back = (COLUMN[body] for body in ((side, OBJECT) if side == LEFT else (OBJECT, side)))
+    return state[:, front] - state[:, back], state[:, front + 1] - state[:, back + 1]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from operator import length_hint
 from types import MappingProxyType
 
@@ -21,6 +22,7 @@ from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import Changes, Progress, check_changes, foreign_controllers
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.solve import How, solve
@@ -54,6 +56,7 @@ def simulate(
     max_work: int = MAX_WORK,
     changes: Changes = MappingProxyType({}),
     controllers: Mapping[str, Law | type] = MappingProxyType({}),
+    sensitivity: Sequence[str] | None = None,
     progress: Progress | bool = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state to the end of its horizon.
@@ -87,6 +90,9 @@ def simulate(
         is sampled. Each is called once for every tick, the last one included. A function that numba has compiled and
         that asks for nothing more runs at full speed. A class is made anew for the run; of any other object `reset()`
         is called before it, if it has one.
+    sensitivity : sequence of str, optional
+        Numbers of the scene, "section.key", by which the motion is differentiated through its impacts, see
+        `Trajectory.sensitivity`. The run is made twice, because the times of events are outputs of the second one.
     progress : callable or True, optional
         True: a bar, in a terminal or in a notebook. A callable is told the time reached, in s: at the end of the
         horizon, if the run gets there, and on the way, except by methods with a fixed step.
@@ -102,6 +108,10 @@ def simulate(
     sampled = bool(sampled or scene.sampled or controllers)
     max_events, max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
     check_changes(scene, sampled, changes, controllers)
+    if sensitivity is not None:
+        check_keys(scene, sensitivity, sampled)
+        if method != EXACT or controllers or changes:
+            raise Refused(f"{scene.name}: sensitivity: allowed: the method {EXACT}, without controllers and changes")
     if setting is None and registry.find(method).knob == ACCURACY_KNOB:
         setting = accuracy
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
@@ -115,10 +125,15 @@ def simulate(
         found, loop = solve(scene, grid, How(method, setting, sampled, max_events, max_work), changes, foreign, told)
         if told is not None and found.status is Status.DONE:
             told(scene.duration)
-    return Trajectory(
+    run = Trajectory(
         scene, grid[: len(found.state)], found.state, loop, found.event_table, found.work, found.status, method,
         setting, found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()}, found.at_rest,
     )
+    if sensitivity is None:
+        return run
+    from grasp_ros.simulation.differentiate import differentiate  # whose kernels no other run loads
+
+    return replace(run, sensitivity=differentiate(run, sensitivity))
 
 
 def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,6 +30,9 @@ from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
 from grasp_ros.simulation.ticks import Loop, tick_of
+
+if TYPE_CHECKING:
+    from grasp_ros.simulation.differentiate import Sensitivity
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,9 @@ class Trajectory(Tabular, Frozen):
         Names of the controllers that acted in place of the scene's feedback, by side.
     at_rest : float or None
         Time in s since when everything is at rest for good, see `exact.driver.rest`; only `exact` tells.
+    sensitivity : Sensitivity or None
+        Derivatives of the motion, where `simulate` was asked for them; see `differentiate.Sensitivity`. They belong to
+        no file.
     """
 
     scene: Scene
@@ -73,6 +79,7 @@ class Trajectory(Tabular, Frozen):
     stop: str = ""
     controllers: Mapping[str, str] = field(default_factory=dict)
     at_rest: float | None = None
+    sensitivity: Sensitivity | None = None
 
     @property
     def sampled(self) -> bool:

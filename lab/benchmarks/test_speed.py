@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.sensitivity.sensitivities import sensitivities
 from grasp_ros.simulation import simulate
+from grasp_ros.simulation.sensitivities import sensitivities
 from lab.studies.accuracy import default_scenes
 from lab.studies.derivative_cost import NUMBERS
 

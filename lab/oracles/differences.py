@@ -18,8 +18,8 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.sensitivity.directions import check_key
-from grasp_ros.sensitivity.sensitivities import sensitivities
 from grasp_ros.simulation import simulate
+from grasp_ros.simulation.sensitivities import sensitivities
 from lab.cases.draw import Draw, draw_ordinary, inside
 
 SEED = 1990

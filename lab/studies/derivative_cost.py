@@ -13,7 +13,8 @@ from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import directions
-from grasp_ros.sensitivity.sensitivities import carry, complete, sensitivities
+from grasp_ros.simulation.differentiate import carry, complete
+from grasp_ros.simulation.sensitivities import sensitivities
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
 from lab.studies import pages
 

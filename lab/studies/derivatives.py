@@ -11,7 +11,7 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.sensitivity.sensitivities import sensitivities
+from grasp_ros.simulation.sensitivities import sensitivities
 from lab.oracles.differences import VERDICTS, WRONG, judge_draw
 from lab.reference.derivative import difference
 from lab.studies import derivative_cost, pages, peer_derivatives

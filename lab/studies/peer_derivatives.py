@@ -20,7 +20,7 @@ import numpy as np
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import compose
-from grasp_ros.sensitivity.sensitivities import sensitivities
+from grasp_ros.simulation.sensitivities import sensitivities
 from lab.studies import pages
 
 PACKAGES = "diffrax", "jax", "mujoco", "optimistix", "torch", "torchdiffeq"  # the extra `peers`

@@ -7,8 +7,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.sensitivity.ensemble import ensemble_sensitivities
-from grasp_ros.sensitivity.sensitivities import sensitivities
+from grasp_ros.simulation.sensitivities import ensemble_sensitivities, sensitivities
 
 P, GAIN = "left_contact.dissipation_s_per_m", "left_feedback.position_gain_N_per_m"
 

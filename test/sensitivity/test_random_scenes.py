@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.sensitivity.sensitivities import sensitivities
+from grasp_ros.simulation.sensitivities import sensitivities
 from lab.oracles import differences
 from lab.oracles.differences import AGREES, WRONG, judge, judge_draw
 

@@ -11,9 +11,10 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.scene import Scene, compose
-from grasp_ros.sensitivity.sensitivities import sensitivities
 from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import simulate
+from grasp_ros.simulation.differentiate import differentiate
+from grasp_ros.simulation.sensitivities import sensitivities
 from lab.reference.derivative import difference
 
 P = "left_contact.dissipation_s_per_m"
@@ -132,6 +133,33 @@ def test_the_motion_is_that_of_a_plain_run(name: str) -> None:
     found = sensitivities(scene, [P if name != "sine" else "object.mass_kg"], grid)
     assert found.state.tobytes() == plain.state.tobytes()
     assert found.event_table.tobytes() == plain.event_table.tobytes()
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_a_run_that_is_asked_has_its_derivatives(sampled: bool) -> None:
+    scene, grid = short("case_01", 2.0), np.linspace(0.5, 2.0, 4)
+    assert simulate(scene, grid=grid, sampled=sampled).sensitivity is None
+    run = simulate(scene, grid=grid, sampled=sampled, sensitivity=[P])
+    assert run.sensitivity is not None
+    found = sensitivities(scene, [P], grid, sampled=sampled)
+    assert run.sensitivity.state_rates.tobytes() == found.state_rates.tobytes()
+    assert run.state.tobytes() == run.sensitivity.state.tobytes()
+
+
+def test_a_run_of_something_else_has_no_derivatives() -> None:
+    scene = short("case_01", 2.0)
+    change = {500: {"left_feedback.velocity_gain_Ns_per_m": 5.0}}
+    for settings in ({"method": "dopri5"}, {"controllers": {"left": lambda tick, time, x, v: -x}},
+                     {"changes": change, "sampled": True}):
+        with pytest.raises(Refused, match="sensitivity: allowed: the method exact"):
+            simulate(scene, sensitivity=[P], **settings)
+    with pytest.raises(Refused, match="cannot be repeated here"):
+        differentiate(simulate(scene, sampled=True, changes=change), [P])
+    with pytest.raises(Refused, match="work"):
+        simulate(scene, sensitivity=[P], max_work=10)
+    for keys in ([], P):
+        with pytest.raises(Refused, match="a list of numbers"):
+            simulate(scene, sensitivity=keys)
 
 
 def test_directions_do_not_touch_each_other() -> None:

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics import given
-from grasp_ros.physics.accuracy import ACCURACY
+from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.impact_law import elastic_force, stored_energy
-from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
+from grasp_ros.physics.layout import LEFT, OBJECT, Entry, Law, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
@@ -21,12 +20,13 @@ from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.simulate import check_grid
+from grasp_ros.simulation.repeat import UNLIMITED
+from grasp_ros.simulation.trajectory import Trajectory
 
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """A run with its derivatives by n numbers.
+    """The derivatives of a run by n numbers.
 
     Attributes
     ----------
@@ -62,46 +62,39 @@ class Sensitivity:
     corner: float | None
 
 
-def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None, *, sampled: bool = False,
-                  accuracy: float = ACCURACY) -> Sensitivity:
-    """Simulate a scene with `exact`, and differentiate the motion through its impacts.
+def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
+    """Repeat a run of `exact`, and carry its derivatives along.
 
-    The motion is that of `simulate`, bit for bit; it runs twice, because the times of events are outputs of the second
-    run.
+    The motion is that of the run, bit for bit.
 
     Parameters
     ----------
-    scene : Scene
+    run : Trajectory
+        To the end of the horizon, with the scene's own controllers.
     keys : sequence of str
         "section.key": initial values, and any number of the scene that enters smoothly.
-    times : array (m,), s, optional
-        Ascending output times within the horizon. Default: its end.
-    sampled : bool
-        As in `simulate`.
-    accuracy : float
-        As in `simulate`.
 
     Raises
     ------
     Refused
-        If a number has no derivative, a sensor measures in steps, or the run does not reach its end.
+        If the run is none of these or cannot be repeated, a number has no derivative, or a sensor measures in steps.
     """
-    sampled = sampled or scene.sampled
-    changes = directions(scene, keys, sampled)
-    grid = given.times("times", [scene.duration] if times is None else times)
-    check_grid(scene, grid, "times")
-    first = Integrator(scene.system, continuous=not sampled, accuracy=accuracy)
-    complete(scene, first, sampled, grid[:0])
-    events = first.event_table
-    both = np.concatenate([grid, events[:, 0]])
+    scene, sampled, system = run.scene, run.sampled, run.scene.system
+    check_run(run)
+    changes, grid, events = directions(scene, keys, sampled), run.t, run.event_table
+    both = np.concatenate([grid, events[:, Entry.TIME]])
     order = np.argsort(both, kind="stable")
-    second = Integrator(scene.system, continuous=not sampled, accuracy=accuracy)
-    carrier = carry(scene, second, changes, both[order], sampled)
-    states = complete(scene, second, sampled, both[order])
+    integrator = Integrator(system, continuous=not sampled, accuracy=run.setting, max_events=UNLIMITED,
+                            max_work=UNLIMITED)
+    carrier = carry(scene, integrator, changes, both[order], sampled)
+    states = complete(scene, integrator, sampled, both[order])
     carrier.finish(scene.duration)
     back = np.argsort(order, kind="stable")
     at, late = back[: len(grid)], back[len(grid) :]
-    system, state, rates = scene.system, states[at], carrier.out[at]
+    if not np.array_equal(integrator.event_table, events):
+        raise Refused(f"{scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this machine"
+                      " and these versions, without `changes`")
+    state, rates = states[at], carrier.out[at]
     level = energy(system, state).V_c
     state[:, system.absent_columns] = np.nan
     return Sensitivity(
@@ -110,6 +103,14 @@ def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None,
         event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late])),
         carrier.corner,
     )
+
+
+def check_run(run: Trajectory) -> None:
+    """Refuse a run that has no derivatives."""
+    if run.status is not Status.DONE:
+        raise Refused(f"{run.scene.name}: no derivatives of a run that {run.stop}")
+    if run.method != EXACT or run.controllers:
+        raise Refused(f"{run.scene.name}: derivatives: allowed: a run of {EXACT} with the scene's own controllers")
 
 
 def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array, sampled: bool) -> Carrier:

@@ -1,4 +1,4 @@
-"""Derivatives of many variants of one scene, each row with the bits of `sensitivities`, on all cores."""
+"""Derivatives of a scene, and of many variants of one, each row with the same bits, on all cores."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.sensitivity.directions import directions
-from grasp_ros.sensitivity.sensitivities import Sensitivity, sensitivities
+from grasp_ros.sensitivity.directions import check_keys
+from grasp_ros.simulation.differentiate import Sensitivity
 from grasp_ros.simulation.ensemble import chunks, in_threads
 from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.simulate import simulate
 from grasp_ros.simulation.tables import frame_of
 from grasp_ros.simulation.variants import Variants
 
@@ -67,6 +68,31 @@ class SensitivityTable(Frozen):
         return frame_of({**self.changes, **dict(zip(names, columns.T, strict=True)), **by, "corner": self.corner})
 
 
+def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None, *, sampled: bool = False,
+                  accuracy: float = ACCURACY) -> Sensitivity:
+    """Simulate a scene with `exact`, and differentiate the motion through its impacts.
+
+    Parameters
+    ----------
+    scene : Scene
+    keys : sequence of str
+        "section.key": initial values, and any number of the scene that enters smoothly.
+    times : array (m,), s, optional
+        Ascending output times within the horizon. Default: its end.
+    sampled, accuracy
+        As in `simulate`.
+
+    Raises
+    ------
+    Refused
+        If a number has no derivative, a sensor measures in steps, or the run does not reach its end.
+    """
+    grid = np.array([scene.duration]) if times is None else times
+    found = simulate(scene, grid=grid, sampled=sampled, accuracy=accuracy, sensitivity=keys).sensitivity
+    assert found is not None
+    return found
+
+
 def ensemble_sensitivities(
     scene: Scene, changes: Mapping[str, ArrayLike], keys: Sequence[str], *, sampled: bool = False,
     accuracy: float = ACCURACY, threads: int | None = None,
@@ -88,7 +114,7 @@ def ensemble_sensitivities(
     Refused
         If a key is not known, or a number has no derivative.
     """
-    directions(scene, keys, sampled or scene.sampled)  # what is refused of all rows
+    check_keys(scene, keys, sampled or scene.sampled)  # what is refused of all rows
     variants = Variants(scene, changes)
 
     def row(i: int) -> Sensitivity | str:
