@@ -42,7 +42,7 @@ class Messages:
 
     def __init__(self, writer: Writer) -> None:
         if getattr(writer, _INDEXES, None) != [] or not hasattr(writer, _CHUNK) or not hasattr(writer, _STATISTICS):
-            raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.2,<1.7")
+            raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.5,<1.7")
         setattr(writer, _INDEXES, _ChunkIndexes())
         self._writer, self._chunk, self._statistics = writer, getattr(writer, _CHUNK), getattr(writer, _STATISTICS)
         self.counts: Counter[int] = Counter()

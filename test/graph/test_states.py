@@ -7,7 +7,7 @@ from array import array
 from typing import Any
 
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
@@ -34,6 +34,7 @@ def taught(names: tuple[str, ...] = NAMES) -> StateReader:
     return reader
 
 
+@settings(deadline=None)  # the first one loads the types of the messages
 @given(st.integers(0, 2**31 * 10**9 - 1), NUMBERS)
 def test_the_numbers_are_those_that_were_written(time_ns: int, numbers: list[float]) -> None:
     state = taught().read(TEMPLATE.fill(time_ns, numbers))
