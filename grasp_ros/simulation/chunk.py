@@ -86,15 +86,6 @@ class Chunk:
     stops: dict[int, str]
 
 
-class _Row(NamedTuple):
-    seen: Array
-    state: Array
-    touches: Array
-    growth: float
-    status: Status
-    stop: str
-
-
 def checked(setup: Setup) -> Setup:
     """A setup with numbers of Python's own.
 
@@ -138,10 +129,9 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
     for i in left.tolist():
         if stop[0]:
             break
-        row = _run(variants.row(i), setup, columns)
-        runs.seen[i], runs.state[i], runs.touches[i], runs.growth[i] = row[:4]
-        if row.status is not Status.DONE:
-            status[i], stops[i] = STATUSES.index(row.status.name), row.stop
+        run = _run(variants.row(i), setup, columns, runs, i)
+        if run.status is not Status.DONE:
+            status[i], stops[i] = STATUSES.index(run.status.name), run.stop
     absent = variants.scene.system.absent_columns
     runs.seen[:, [Seen.OUTSIDE + body for body in variants.scene.system.absent]] = np.nan
     runs.state[:, absent] = np.nan
@@ -181,26 +171,23 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     return np.asarray(which[~done])
 
 
-def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome]) -> _Row:
+def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int) -> Integrator:
     """One row, driven as `simulate` drives it."""
-    system, sampled = scene.system, setup.sampled or scene.sampled
-    integrator = Integrator(
+    system, sampled, seen = scene.system, setup.sampled or scene.sampled, runs.seen[i]
+    run = Integrator(
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
-    watcher, wanted = None, wanted_by(columns)
-    if wanted:
-        watcher = watch(integrator, wanted, setup.settled)
-    drive(scene, integrator, sampled, NO_GRID)
-    touched = integrator.event_table[integrator.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
-    touches = np.array([(touched == side).sum() for side in (LEFT, RIGHT)], dtype=float)
-    row = _Row(np.full(SEEN, np.nan), integrator.state, touches, np.nan, integrator.status, integrator.stop)
-    if row.status is Status.DONE and any(column.name == LYAPUNOV for column in columns):
-        row = row._replace(growth=exponent(system, scene.duration, setup.accuracy))
+    wanted = wanted_by(columns)
+    watcher = watch(run, wanted, setup.settled) if wanted else None
+    drive(scene, run, sampled, NO_GRID)
+    touched = run.event_table[run.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
+    runs.state[i], runs.touches[i] = run.state, [(touched == side).sum() for side in (LEFT, RIGHT)]
+    done = run.status is Status.DONE
+    if done and any(column.name == LYAPUNOV for column in columns):
+        runs.growth[i] = exponent(system, scene.duration, setup.accuracy)
     if watcher is not None:
         watcher.finish()
-        row.seen[:] = watcher.seen
-        if row.status is Status.DONE and wanted & Wanted.SETTLING:
-            row.seen[Seen.OUTSIDE : Seen.OUTSIDE + 3] = settle(integrator, watcher, scene.duration, setup.horizons)
-            row.seen[Seen.SETTLED] = row.seen[Seen.OUTSIDE : Seen.OUTSIDE + 3].max()
-    return row
-
-
+        seen[:] = watcher.seen
+        if done and wanted & Wanted.SETTLING:
+            seen[Seen.OUTSIDE : Seen.OUTSIDE + 3] = settle(run, watcher, scene.duration, setup.horizons)
+            seen[Seen.SETTLED] = seen[Seen.OUTSIDE : Seen.OUTSIDE + 3].max()
+    return run

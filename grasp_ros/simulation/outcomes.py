@@ -13,10 +13,11 @@ import numpy as np
 
 from grasp_ros.observe.sight import Quantity, Seen, Wanted
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import U, V, X
+from grasp_ros.physics.layout import U
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.suggestion import allowed
+from grasp_ros.simulation.tables import COLUMNS
 
 NOTHING = Wanted(0)
 
@@ -40,22 +41,15 @@ class Outcome(NamedTuple):
     read: Callable[[Runs], Array]
 
 
-def _seen(place: int, factor: float = 1.0) -> Callable[[Runs], Array]:
-    return lambda runs: factor * runs.seen[:, place]
+def _column(name: str, place: int) -> Callable[[Runs], Array]:
+    """One column of an array of `Runs`."""
+    return lambda runs: np.asarray(getattr(runs, name)[:, place])
 
 
 def _settled(body: int) -> Callable[[Runs], Array]:
     """Of one body, where it is known that all have settled."""
     return lambda runs: np.where(np.isfinite(runs.seen[:, Seen.SETTLED]), runs.seen[:, Seen.OUTSIDE + body],
                                  runs.seen[:, Seen.SETTLED])
-
-
-def _low(q: int) -> Callable[[Runs], Array]:
-    return _seen(Seen.LOW + q)
-
-
-def _high(q: int) -> Callable[[Runs], Array]:
-    return _seen(Seen.HIGH + q)
 
 
 def _largest(q: int) -> Callable[[Runs], Array]:
@@ -66,33 +60,20 @@ def _peak(q: int) -> Callable[[Runs], Array]:
     return lambda runs: np.maximum(runs.seen[:, Seen.HIGH + q], 0.0)
 
 
-def _state(place: int) -> Callable[[Runs], Array]:
-    return lambda runs: runs.state[:, place]
-
-
-def _touch(side: int) -> Callable[[Runs], Array]:
-    return lambda runs: runs.touches[:, side]
-
-
-def _growth(runs: Runs) -> Array:
-    return runs.growth
-
-
-_PLACES = {"left": (X.L, V.L), "object": (X.O, V.O), "right": (X.R, V.R)}
 _SIDES = ("left", "right")
 _GROUPS: dict[str, tuple[Outcome, ...]] = {
     "settling_time": (Outcome(
         "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, for"
         " good: V_c proves it, for which the run goes on; inf: not within so many horizons; nan: V_c proves nothing"
-        " where it can rise, or where a mass is not driven to 0", Wanted.SETTLING, _seen(Seen.SETTLED)),),
+        " where it can rise, or where a mass is not driven to 0", Wanted.SETTLING, _column("seen", Seen.SETTLED)),),
     "settling_times": tuple(
         Outcome(f"settling_time_{name}", "s", f"the same of the {name} mass alone, where all settle", Wanted.SETTLING,
                 _settled(body)) for body, name in NAMES.items()),
     "last_outside": (Outcome(
         "last_outside", "s", "last time within the run at which a mass is outside the bound, of every scene, and no"
-        " proof of what follows; inf: at its end", Wanted.BOUND, _seen(Seen.LAST_OUTSIDE)),),
+        " proof of what follows; inf: at its end", Wanted.BOUND, _column("seen", Seen.LAST_OUTSIDE)),),
     "touches": tuple(
-        Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _touch(side))
+        Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _column("touches", side))
         for side, name in enumerate(_SIDES)),
     "peak_input": tuple(
         Outcome(f"peak_input_{name}", "N", f"largest input of the {name} arm: command and external force",
@@ -105,7 +86,7 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS, _peak(q))
         for q, name in zip((U.L, U.R), _SIDES, strict=True)),
     "energy": tuple(
-        Outcome(name, "J", text, Wanted.LOSSES, _seen(place)) for name, text, place in (
+        Outcome(name, "J", text, Wanted.LOSSES, _column("seen", place)) for name, text, place in (
             ("lost_dampers", "energy that the dampers of the arms took", Seen.DAMPERS),
             ("lost_feedback", "energy that the velocity feedback took; 0 where commands are held", Seen.FEEDBACK),
             ("lost_friction", "energy that friction of the object took", Seen.FRICTION),
@@ -113,17 +94,17 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
             ("work_inputs", "work of held commands and external forces", Seen.WORK),
         )),
     "V_c_rise": (Outcome("V_c_rise", "J", "largest rise of V_c above what it was before, at events, steps and ticks",
-                         Wanted.RISE, _seen(Seen.RISE)),),
+                         Wanted.RISE, _column("seen", Seen.RISE)),),
     "extremes": tuple(
-        Outcome(f"{symbol}_{name}_{which}", unit, f"{word} {what} of the {name} mass", Wanted.MOTION, read(place))
-        for name, pair in _PLACES.items()
-        for place, symbol, unit, what in zip(pair, "xv", ("m", "m/s"), ("position", "velocity"), strict=True)
-        for which, word, read in (("min", "least", _low), ("max", "largest", _high))),
+        Outcome(f"{column.name}_{which}", column.unit, f"{word} {column.text}", Wanted.MOTION,
+                _column("seen", first + place))
+        for place, column in enumerate(COLUMNS[:6])
+        for which, word, first in (("min", "least", Seen.LOW), ("max", "largest", Seen.HIGH))),
     "last_state": tuple(
-        Outcome(f"{symbol}_{name}_end", unit, f"{what} of the {name} mass at the end", NOTHING, _state(place))
-        for name, pair in _PLACES.items()
-        for place, symbol, unit, what in zip(pair, "xv", ("m", "m/s"), ("position", "velocity"), strict=True)),
-    "lyapunov": (Outcome("lyapunov", "1/s", "largest Lyapunov exponent over the run", NOTHING, _growth),),
+        Outcome(f"{column.name}_end", column.unit, f"{column.text} at the end", NOTHING, _column("state", place))
+        for place, column in enumerate(COLUMNS[:6])),
+    "lyapunov": (Outcome("lyapunov", "1/s", "largest Lyapunov exponent over the run", NOTHING,
+                         lambda runs: runs.growth),),
 }
 GROUPS: dict[str, tuple[str, ...]] = {group: tuple(entry.name for entry in own) for group, own in _GROUPS.items()}
 OUTCOMES: dict[str, Outcome] = {entry.name: entry for own in _GROUPS.values() for entry in own}

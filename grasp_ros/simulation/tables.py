@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
 
 import numpy as np
 
 from grasp_ros.physics.energy import Energy
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import OBJECT
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.parameter import UNITS as KEYS
 
@@ -69,33 +69,19 @@ class Column(NamedTuple):
     name: str
     unit: str
     text: str
-    read: Callable[[Motion, Energy], Array]
 
 
-def _place(name: str, place: int) -> Callable[[Motion, Energy], Array]:
-    return lambda motion, _: np.asarray(getattr(motion, name))[:, place]
-
-
-def _level(name: str) -> Callable[[Motion, Energy], Array]:
-    return lambda _, level: np.asarray(getattr(level, name))
-
-
-_BODIES = {body: NAMES[body] for body in sorted(COLUMN, key=COLUMN.__getitem__)}
-_ARMS = {body: name for body, name in _BODIES.items() if body != OBJECT}
+_BODIES, _ARMS = [NAMES[body] for body in BODIES], (NAMES[LEFT], NAMES[RIGHT])
 COLUMNS: tuple[Column, ...] = (
-    *(Column(f"{symbol}_{name}", unit, f"{text} of the {name} mass", _place("state", COLUMN[body] + k))
-      for body, name in _BODIES.items()
-      for k, (symbol, unit, text) in enumerate((("x", "m", "position"), ("v", "m/s", "velocity")))),
-    *(Column(f"command_{name}", "N", f"command of the {name} controller", _place("command", body))
-      for body, name in _ARMS.items()),
-    *(Column(f"input_{name}", "N", f"force of controller and outside on the {name} mass", _place("inputs", body))
-      for body, name in _BODIES.items()),
-    *(Column(f"impact_{name}", "N", f"impact force of the {name} contact", _place("impacts", body))
-      for body, name in _ARMS.items()),
-    Column("V", "J", "the paper's Lyapunov function (16)", _level("V")),
-    Column("V_c", "J", "its continuous repair, twice the energy", _level("V_c")),
-    Column("V_rate", "W", "its rate (18)", _level("V_rate")),
-    Column("mode", "1", "contacts: 0 none, 1 left, 2 right, 3 both", _level("mode")),
+    *(Column(f"{symbol}_{name}", unit, f"{text} of the {name} mass")
+      for name in _BODIES for symbol, unit, text in (("x", "m", "position"), ("v", "m/s", "velocity"))),
+    *(Column(f"command_{name}", "N", f"command of the {name} controller") for name in _ARMS),
+    *(Column(f"input_{name}", "N", f"force of controller and outside on the {name} mass") for name in _BODIES),
+    *(Column(f"impact_{name}", "N", f"impact force of the {name} contact") for name in _ARMS),
+    Column("V", "J", "the paper's Lyapunov function (16)"),
+    Column("V_c", "J", "its continuous repair, twice the energy"),
+    Column("V_rate", "W", "its rate (18)"),
+    Column("mode", "1", "contacts: 0 none, 1 left, 2 right, 3 both"),
 )
 HEADS = {  # of a text file, by the names of the columns
     name: name + _ENDINGS[unit] for name, unit in (TIME[:2], *(column[:2] for column in COLUMNS))
@@ -155,7 +141,9 @@ class Tabular:
 def _values_of(motion: Motion) -> dict[str, Array]:
     """Values (n,) of each column."""
     level = motion.energy
-    return {column.name: column.read(motion, level) for column in COLUMNS}
+    values = (*motion.state.T, *motion.command.T, *motion.inputs[:, BODIES].T, *motion.impacts.T, level.V, level.V_c,
+              level.V_rate, level.mode)
+    return {column.name: np.asarray(own) for column, own in zip(COLUMNS, values, strict=True)}
 
 
 def _attributes_of(motion: Motion) -> dict[str, Any]:
