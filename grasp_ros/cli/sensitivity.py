@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
 
 LAST = 4  # events that are shown
-COLORS = {Body.LEFT: plots.LEFT_COLOR, Body.OBJECT: plots.OBJECT_COLOR, Body.RIGHT: plots.RIGHT_COLOR}
 WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 
@@ -58,7 +57,7 @@ def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
         axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(np.median(sizes))))
         axes.locator_params(axis="y", numticks=7)
     for body in found.scene.system.present:
-        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"$dx_{NAMES[body][0]}$", color=COLORS[Body(body)],
+        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"$dx_{NAMES[body][0]}$", color=plots.COLORS[body],
                   linewidth=1.0)
     if found.corner is not None:
         axes.axvline(found.corner, color="black", linewidth=0.8, linestyle=":", label="one-sided from here")

@@ -7,9 +7,8 @@ import numpy as np
 from grasp_ros.identification.result import Fit
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation.canvas import Figure, style, subplots
-from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside
+from grasp_ros.simulation.plots import COLORS, legend_beside
 
-COLORS = {"left": LEFT_COLOR, "object": OBJECT_COLOR, "right": RIGHT_COLOR}
 PARTS = (("position, m", 0), ("velocity, m/s", 1))
 
 
@@ -22,14 +21,13 @@ def measured_and_fitted(found: Fit) -> Figure:
                                   sharex=True)
         for axes, (label, part) in zip(panels, parts, strict=False):
             for body, place in ((body, place + part) for body, place in COLUMN.items() if seen[place + part]):
-                name = NAMES[body]
-                axes.plot(found.t, found.measured[:, place], ".", color=COLORS[name], markersize=2.5, alpha=0.4)
-                axes.plot(found.t, found.fitted[:, place], color=COLORS[name], linewidth=1.0, label=name)
+                axes.plot(found.t, found.measured[:, place], ".", color=COLORS[body], markersize=2.5, alpha=0.4)
+                axes.plot(found.t, found.fitted[:, place], color=COLORS[body], linewidth=1.0, label=NAMES[body])
             axes.set_ylabel(label)
         for body, place in COLUMN.items():
             for column in (place, place + 1):
-                axes, color = panels[-1], COLORS[NAMES[body]]
-                axes.plot(found.t, found.residuals[:, column] / found.noise[column], ".", color=color, markersize=1.5)
+                rest = found.residuals[:, column] / found.noise[column]
+                panels[-1].plot(found.t, rest, ".", color=COLORS[body], markersize=1.5)
         panels[-1].set_ylabel("residual / noise")
         panels[-1].set_xlabel("time, s")
         panels[0].set_title(f"{found.scene.name}: measured (dots) and fitted", fontsize="medium", parse_math=False)

@@ -18,10 +18,9 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.files import replaced
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
-from grasp_ros.simulation.plots import LEFT_COLOR, MM, OBJECT_COLOR, RIGHT_COLOR
+from grasp_ros.simulation.plots import COLORS, MM
 from grasp_ros.simulation.tables import Motion
 
-COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_COLOR}
 FRONTS: dict[int, float] = {LEFT: 1.5, OBJECT: 0.5, RIGHT: -0.5}  # lengths from the begin of a body to its position
 WRITERS = {".gif": "pillow", ".html": "html", ".mp4": "ffmpeg"}
 RATE = 25  # pictures in a second
@@ -119,7 +118,7 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
                 coils[body].set_xdata(np.linspace(wall, back, len(COILS)))
         if OBJECT in bodies:
             touched = any(force[k] > 0.0 for force in forces.values())
-            bodies[OBJECT].set_facecolor(PRESSED if touched else OBJECT_COLOR)
+            bodies[OBJECT].set_facecolor(PRESSED if touched else COLORS[OBJECT])
         now.set_xdata([times[k], times[k]])
         return ()
 

@@ -7,7 +7,6 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby, islice
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +23,8 @@ from grasp_ros.physics.sight import check
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
-from grasp_ros.simulation.sampled_plant import NO_INTERVAL, Outputs, Record, SampledPlant
-from grasp_ros.simulation.ticks import Loop
+from grasp_ros.simulation.sampled_plant import Outputs, SampledPlant
+from grasp_ros.simulation.ticks import Loop, new_loop
 
 Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
@@ -75,89 +74,65 @@ def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[
                 raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
-class SampledLoop:
-    """Controllers that answer at every tick, around a plant.
+def drive_sampled(
+    scene: Scene, grid: Array, loop: Loop, changes: Changes, foreign: Mapping[int, Foreign], progress: Progress,
+    integrator: Integrator,
+) -> Array:
+    """States (n, 6) under controllers that answer at every tick; only the rows reached, if the integrator stops.
 
     Parameters
     ----------
     scene : Scene
-    grid : array (n,), s
+    grid : array (m,), s
         Ascending output times within the horizon.
+    loop : Loop
+        Filled with what was answered and what acted, at the output times that are reached.
     changes : mapping of int to mapping of str to float
         Numbers of the controllers that are set while it runs, by the tick from which they act.
+    foreign : mapping of int to Foreign
+        Controllers from outside, by side.
     progress : callable or None
         Called with the time reached, in s.
-    foreign : mapping of int to Foreign, optional
-        Controllers from outside, by side.
+    integrator : Integrator
     """
-
-    def __init__(
-        self, scene: Scene, grid: Array, changes: Changes, progress: Progress,
-        foreign: Mapping[int, Foreign] = MappingProxyType({}),
-    ) -> None:
-        self._scene, self._grid, self._changes, self._progress = scene, grid, changes, progress
-        self._foreign = foreign
-        self._states, self._inputs = np.empty((len(grid), 6)), np.full((len(grid), 3), np.nan)
-        self._command = np.empty((len(grid), 2))
-        self._rows = 0  # filled
-
-    def drive(self, integrator: Integrator) -> Array:
-        """States (n, 6) at the output times; only the rows reached, if the integrator stops. To be called once."""
-        scene = self._scene
-        plant = SampledPlant(scene.system, scene.period_ns, integrator)
-        for ticks in self._blocks():
-            if plant.tick in self._changes:
-                self._scene = self._scene.changed(self._changes[plant.tick])
-            outputs, interval = outputs_within(self._grid, ticks, scene.period_ns)
-            rows = self._states[self._rows : self._rows + len(interval)]
-            record = plant.run(self._laws, outputs, self._foreign, rows)
-            self._keep(record, interval[: len(record.states)])
-            if plant.status is not Status.DONE:
-                break
-            if self._progress is not None:
-                self._progress(plant.time)
+    plant, states, done = SampledPlant(scene.system, scene.period_ns, integrator), np.empty((len(grid), 6)), 0
+    for ticks in _blocks(scene.ticks, changes):
+        if plant.tick in changes:
+            scene = scene.changed(changes[plant.tick])
+        # laws of foreign controllers measure and limit as the scene says
+        laws = {**{side: ControlLaw(0.0, 0.0) for side in foreign}, **scene.system.laws}
+        outputs, interval = outputs_within(grid, ticks, scene.period_ns)
+        record = plant.run(laws, outputs, foreign, states[done : done + len(interval)])
+        at_end = len(ticks) == 1  # the output times of the last tick and later: nothing acts there
+        if at_end:
+            states[done:], interval = plant.state, np.zeros(len(grid) - done, dtype=np.int64)
         else:
-            self._end(plant)
-        return self._states[: self._rows]
-
-    def _keep(self, record: Record, interval: NDArray[np.int64]) -> None:
-        """Keep what was answered and what acted in the intervals of the next output times."""
-        rows = slice(self._rows, self._rows + len(interval))
-        self._command[rows] = record.answers[interval, :OBJECT]
+            interval = interval[: len(record.states)]
+        rows = slice(done, done + len(interval))
+        loop.command[rows] = record.answers[interval, :OBJECT]
         if len(record.inputs):
-            self._inputs[rows] = record.inputs[interval]
-        self._rows += len(interval)
+            loop.inputs[rows] = record.inputs[interval]
+        done = rows.stop
+        if plant.status is not Status.DONE:
+            break
+        if progress is not None and not at_end:
+            progress(plant.time)
+    return states[:done]
 
-    @property
-    def _laws(self) -> dict[int, ControlLaw]:
-        """Laws as they are now; those of foreign controllers measure and limit as the scene says."""
-        return {**{side: ControlLaw(0.0, 0.0) for side in self._foreign}, **self._scene.system.laws}
 
-    def _blocks(self) -> Iterator[NDArray[np.int64]]:
-        """Ticks of the run, ascending, in blocks that end where a law changes.
+def _blocks(last: int, changes: Changes) -> Iterator[NDArray[np.int64]]:
+    """Ticks of a run, ascending, in blocks that end where a law changes, and the last one alone.
 
-        Between them the progress shows and Ctrl-C acts: a run whose ticks are slow has shorter ones.
-        """
-        last, first, size = self._scene.ticks, 0, SHORTEST
-        changes = sorted({*self._changes, last})
-        while first < last:
-            end = min(first + size, changes[bisect_right(changes, first)])
-            begin = time.monotonic()
-            yield np.arange(first, end + 1)
-            first = end
-            size = min(4 * size, LONGEST) if time.monotonic() - begin < PATIENCE else max(size // 4, 1)
-
-    def _end(self, plant: SampledPlant) -> None:
-        """The output times of the last tick and later; nothing acts there."""
-        if plant.tick in self._changes:
-            self._scene = self._scene.changed(self._changes[plant.tick])
-        record = plant.run(self._laws, NO_INTERVAL, self._foreign)
-        self._states[self._rows :] = plant.state
-        self._keep(record, np.zeros(len(self._grid) - self._rows, dtype=np.int64))
-
-    def record(self) -> Loop:
-        """What was answered and what acted, at the output times that were reached."""
-        return Loop(self._command[: self._rows], self._inputs[: self._rows])
+    Between them the progress shows and Ctrl-C acts: a run whose ticks are slow has shorter ones.
+    """
+    first, size, ends = 0, SHORTEST, sorted({*changes, last})
+    while first < last:
+        end = min(first + size, ends[bisect_right(ends, first)])
+        begin = time.monotonic()
+        yield np.arange(first, end + 1)
+        first = end
+        size = min(4 * size, LONGEST) if time.monotonic() - begin < PATIENCE else max(size // 4, 1)
+    yield np.array([last])
 
 
 def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
@@ -181,7 +156,8 @@ def drive_external(scene: Scene, grid: Array, integrator: Integrator) -> Array:
         if integrator.status is not Status.DONE:
             return np.concatenate(rows)
         block = [block[-1], *islice(following, LONGEST)]
-    return np.concatenate([*rows, _rest(grid, scene.ticks, scene.period_ns, integrator.state)])
+    later = len(grid) - sum(map(len, rows))  # the output times of the last tick and later
+    return np.concatenate([*rows, np.repeat(integrator.state[None], later, axis=0)])
 
 
 def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tuple[Outputs, NDArray[np.int64]]:
@@ -195,16 +171,10 @@ def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tup
     return Outputs(offsets, bounds - bounds[0]), interval
 
 
-def _rest(grid: Array, tick: int, period_ns: int, state: Array) -> Array:
-    """The state (n, 6) at the output times of the last tick and later."""
-    later = len(grid) - int(np.searchsorted(grid, tick * period_ns / NANOSECONDS, side="left"))
-    return np.repeat(state[None], later, axis=0)
-
-
 def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
     """States (n, 6) at the output times of a run to its end, as `simulate` drives it; fewer rows if it stops."""
     if sampled:
-        return SampledLoop(scene, grid, {}, None).drive(integrator)
+        return drive_sampled(scene, grid, new_loop(len(grid)), {}, {}, None, integrator)
     if scene.system.external:
         return drive_external(scene, grid, integrator)
     return integrator.advance(scene.duration, grid)

@@ -12,8 +12,9 @@ import numpy as np
 
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import PAPER
 from grasp_ros.scene.files import replacing
 from grasp_ros.simulation import canvas
@@ -23,6 +24,7 @@ from grasp_ros.simulation.tables import Motion
 from grasp_ros.simulation.trajectory import Trajectory
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
+COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_COLOR}
 V_COLOR = "#cc79a7"
 SIDES = ((LEFT, "l", LEFT_COLOR), (RIGHT, "r", RIGHT_COLOR))
 LONGEST_TITLE = 200  # characters
@@ -149,9 +151,10 @@ def legend_beside(axes: Axes) -> None:
 
 def displacements(axes: Axes, motion: Motion) -> None:
     """x_l, x_o, x_r, on the paper's axes for its cases."""
-    for column, label, color in ((0, "$x_l$", LEFT_COLOR), (2, "$x_o$", OBJECT_COLOR), (4, "$x_r$", RIGHT_COLOR)):
-        if not np.isnan(motion.state[:, column]).all():
-            axes.plot(motion.t, motion.state[:, column], label=label, color=color, linewidth=1.2)
+    for body, column in COLUMN.items():
+        x = motion.state[:, column]
+        if not np.isnan(x).all():
+            axes.plot(motion.t, x, label=f"$x_{NAMES[body][0]}$", color=COLORS[body], linewidth=1.2)
     if motion.scene.values.keys() == PAPER:
         _widen(axes, PAPER_DISPLACEMENT, motion.state[:, 0::2])
 

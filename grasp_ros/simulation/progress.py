@@ -11,15 +11,10 @@ Told = Callable[[float], object]
 DELAY_S = 0.5  # a computation that is over by then needs no bar
 
 
-def notebook() -> bool:
-    """Whether this is the kernel of a notebook."""
-    return "ipykernel" in sys.modules
-
-
 def anybody_looks() -> bool:
     """Whether a bar can be drawn: in a notebook, or on a terminal that can move its cursor and may."""
     moves = os.environ.get("TERM", "") != "dumb" and "NO_COLOR" not in os.environ
-    return notebook() or (sys.stderr.isatty() and moves)
+    return "ipykernel" in sys.modules or (sys.stderr.isatty() and moves)
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from grasp_ros.exact.integrator import MAX_WORK, Integrator, Status
+from grasp_ros.methods.contract import Solution
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Entry
@@ -21,7 +22,7 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.closed_loop import outputs_within
 from grasp_ros.simulation.sampled_plant import SampledPlant
 from grasp_ros.simulation.solve import How, solve
-from grasp_ros.simulation.ticks import tick_of, tick_times
+from grasp_ros.simulation.ticks import Loop, tick_of, tick_times
 
 if TYPE_CHECKING:  # it imports this file
     from grasp_ros.simulation.trajectory import Trajectory
@@ -73,10 +74,9 @@ def at_every_tick(run: Trajectory) -> Trajectory:
     """
     if not len(run.t) or _every_tick(run, run.t[-1:]):
         return run
-    _check_controllers(run)
     ticks = tick_times(run.scene)
     grid = np.union1d(ticks[ticks <= run.t[-1]], run.t)
-    found, loop = solve(run.scene, grid, _how(run))
+    found, loop = _solved(run, grid)
     _check_same(run, grid, found.state)
     return replace(run, t=grid, state=found.state, loop=loop)
 
@@ -98,18 +98,16 @@ def _again(run: Trajectory, grid: Array) -> Array:
     """States (n, 6) at ascending times; fewer if the run stops."""
     if run.sampled and _every_tick(run, grid[-1:]):
         return _with_commands(run, grid)
-    _check_controllers(run)
-    return solve(run.scene, grid, _how(run))[0].state
+    return _solved(run, grid)[0].state
 
 
-def _check_controllers(run: Trajectory) -> None:
+def _solved(run: Trajectory, grid: Array) -> tuple[Solution, Loop | None]:
+    """A run again, with the laws of its scene."""
     if run.controllers:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
                       " period, as without a grid")
-
-
-def _how(run: Trajectory) -> How:
-    return How(run.method, run.setting, run.sampled, UNLIMITED, UNLIMITED if run.method == EXACT else MAX_WORK)
+    most = UNLIMITED if run.method == EXACT else MAX_WORK
+    return solve(run.scene, grid, How(run.method, run.setting, run.sampled, UNLIMITED, most))
 
 
 def _every_tick(run: Trajectory, last: Array) -> bool:

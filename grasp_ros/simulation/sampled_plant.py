@@ -22,7 +22,6 @@ from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import NANOSECONDS
 
 NO_TIMES = np.zeros(0)
-_DEFAULT: dict[str, Array] = Loop._field_defaults
 
 
 class Outputs(NamedTuple):
@@ -35,15 +34,7 @@ class Outputs(NamedTuple):
 NO_INTERVAL = Outputs(NO_TIMES, np.zeros(1, dtype=np.int64))
 
 
-class KernelLaw(NamedTuple):
-    """What answers at the ticks of a block."""
-
-    rows: Array  # (2, k), rows of `physics.control` by side
-    callee: NDArray[np.int64]  # (2,) by side, an `Answer` or the address of a function
-    normals: Array  # (2, n, 2) standard normal numbers of each tick
-
-
-GIVEN = KernelLaw(_DEFAULT["laws"], np.zeros(2, dtype=np.int64), _DEFAULT["normals"])
+BARE = Loop(NO_TIMES, NO_TIMES, NO_INTERVAL.bounds, new_place())  # answers are given
 
 
 class Record(NamedTuple):
@@ -146,10 +137,10 @@ class SampledPlant:
     @cached_property
     def _one(self) -> Loop:
         """A period under commands from outside: a graph makes each of its steps with it."""
-        external = np.zeros((1, 3)) if self._system.external else _DEFAULT["external"]
+        external = np.zeros((1, 3)) if self._system.external else BARE.external
         return Loop(
             np.array([self._period]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place(), np.zeros((1, 3)), external,
-            np.zeros((1, 3)), GIVEN.callee, GIVEN.rows, GIVEN.normals, self._waiting,
+            np.zeros((1, 3)), waiting=self._waiting,
         )
 
     def follow(self, answers: Array, outputs: Outputs | None = None) -> Array:
@@ -194,11 +185,11 @@ class SampledPlant:
             If a controller from outside answers what is no finite number. What it raises itself passes through.
         """
         count = max(len(outputs.bounds) - 1, 1)
-        law = KernelLaw(_DEFAULT["laws"].copy(), np.zeros(2, dtype=np.int64), _DEFAULT["normals"])
+        law = BARE._replace(laws=BARE.laws.copy(), callee=BARE.callee.copy())
         for side, own in laws.items():
-            law.rows[side], law.callee[side] = own.row, Answer.LAW
+            law.laws[side], law.callee[side] = own.row, Answer.LAW
             if own.seed:
-                if law.normals is _DEFAULT["normals"]:
+                if law.normals is BARE.normals:
                     law = law._replace(normals=np.zeros((2, count, 2)))
                 law.normals[side] = normals_over(own.seed, self.tick, count)
         for side, other in (foreign or {}).items():
@@ -215,14 +206,14 @@ class SampledPlant:
         """What the controller of an arm can see; the kernels have the state of the tick in place when they ask it."""
         return Sight(self._system, laws, side, tick, self.state.tolist())
 
-    def _go(self, outputs: Outputs, answers: Array, law: KernelLaw = GIVEN, rows: Array | None = None) -> Record:
+    def _go(self, outputs: Outputs, answers: Array, law: Loop = BARE, rows: Array | None = None) -> Record:
         """Advance under answers that are given, or those of a law."""
         count = len(outputs.bounds) - 1
         ticks = np.arange(self.tick, self.tick + len(answers))
-        external = self._system.external_over(ticks) if self._system.external else _DEFAULT["external"]
+        external = self._system.external_over(ticks) if self._system.external else BARE.external
         loop = Loop(
             np.full(count, self._period), ticks * self._period_ns / NANOSECONDS, outputs.bounds, new_place(self.tick),
-            np.empty((count, 3)), external, answers, law.callee, law.rows, law.normals, self._waiting,
+            np.empty((count, 3)), external, answers, law.callee, law.laws, law.normals, self._waiting,
         )
         states = self._integrator.run(loop, outputs.offsets, rows)
         done = int(loop.place[Place.INTERVAL])

@@ -146,10 +146,10 @@ def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:
         raise Refused(f"{scene.name}: {ticks} control periods with an input each; allowed: max_work, {most}")
 
 
-def check_grid(scene: Scene, grid: Array, name: str = "grid") -> None:
+def check_grid(scene: Scene, grid: Array) -> None:
     """Refuse output times that do not ascend or lie outside the horizon."""
     first, last = (float(grid[0]), float(grid[-1])) if len(grid) else (0.0, 0.0)
     if not (math.isfinite(first) and math.isfinite(last) and (len(grid) < 2 or (grid[1:] >= grid[:-1]).all())):
-        raise Refused(f"{name}: allowed: ascending finite times")
+        raise Refused("grid: allowed: ascending finite times")
     if not 0.0 <= first <= last <= scene.duration:
-        raise Refused(f"{name}: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+        raise Refused(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")

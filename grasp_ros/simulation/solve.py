@@ -8,13 +8,12 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from grasp_ros.exact.driver.user_controller import Foreign
-from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.closed_loop import Changes, Progress, SampledLoop, drive_external
-from grasp_ros.simulation.ticks import Loop
+from grasp_ros.simulation.closed_loop import Changes, Progress, drive_external, drive_sampled
+from grasp_ros.simulation.ticks import Loop, new_loop
 
 
 class How(NamedTuple):
@@ -23,8 +22,8 @@ class How(NamedTuple):
     method: str
     setting: float
     sampled: bool
-    max_events: int = MAX_EVENTS
-    max_work: int = MAX_WORK
+    max_events: int
+    max_work: int
 
 
 def solve(
@@ -35,10 +34,13 @@ def solve(
 
     All arguments have been checked. Columns of bodies that are not there are NaN.
     """
-    loop = SampledLoop(scene, grid, changes, progress, foreign) if how.sampled else None
-    drive = loop.drive if loop else partial(drive_external, scene, grid) if scene.system.external else None
+    loop, drive = new_loop(len(grid)) if how.sampled else None, None
+    if loop is not None:
+        drive = partial(drive_sampled, scene, grid, loop, changes, foreign, progress)
+    elif scene.system.external:
+        drive = partial(drive_external, scene, grid)
     problem = Problem(scene.system, scene.duration, grid, how.setting, how.max_events, how.max_work, how.sampled, drive,
-                      None if loop else progress)
+                      None if how.sampled else progress)
     found = METHODS[how.method].solve(problem)
     found.state[:, scene.system.absent_columns] = float("nan")
-    return found, None if loop is None else loop.record()
+    return found, None if loop is None else Loop(*(rows[: len(found.state)] for rows in loop))

@@ -30,3 +30,8 @@ class Loop(NamedTuple):
 
     command: Array  # (n, 2), N
     inputs: Array  # (n, 3), N by body
+
+
+def new_loop(n: int) -> Loop:
+    """One to be filled."""
+    return Loop(np.empty((n, 2)), np.full((n, 3), np.nan))

@@ -167,9 +167,8 @@ def parameter_of(scene: Scene, name: str) -> Parameter:
     Refused
         If the scene does not name it, or if it is a list.
     """
-    section, _, key = name.partition(".")
-    known = [f"{own}.{parameter.key}" for own in scene.values for parameter in BY_SECTION[own].parameters
-             if parameter.key in scene.values[own] and not parameter.several]
+    known = {f"{own}.{parameter.key}": parameter for own in scene.values for parameter in BY_SECTION[own].parameters
+             if parameter.key in scene.values[own] and not parameter.several}
     if name not in known:
         raise Refused(f"{scene.name}: {name}: not a number of this scene; {allowed(name, known)}")
-    return next(parameter for parameter in BY_SECTION[section].parameters if parameter.key == key)
+    return known[name]
