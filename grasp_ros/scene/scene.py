@@ -138,16 +138,12 @@ class Scene(Frozen):
     @property
     def live(self) -> list[str]:
         """Numbers, as "section.key", that belong to controllers: what they may be given in place of the scene's."""
-        controllers = self.controllers
-        return [
-            f"{effect.section}.{key}" for effect in self.effects if effect.node in controllers
-            for key in self.values[effect.section]
-        ]
+        return [*self.numbers_of(*self.controllers)]
 
-    def numbers_of(self, node: str) -> dict[str, float]:
-        """Numbers by "section.key" that belong to a node."""
+    def numbers_of(self, *nodes: str) -> dict[str, float]:
+        """Numbers by "section.key" that belong to nodes."""
         return {
-            f"{effect.section}.{key}": value for effect in self.effects if effect.node == node
+            f"{effect.section}.{key}": value for effect in self.effects if effect.node in nodes
             for key, value in self.values[effect.section].items()
         }
 
@@ -256,7 +252,8 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     if settings:
         with suppress(SceneError):  # what is wrong without settings may be right with them
             before = read_sections(source, document)
-    apply(settings, document)
+    for setting in settings:
+        apply(setting, document)
     return _read(document, name, source, before)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from typing import Any
 
 from grasp_ros.physics.errors import Refused
@@ -13,12 +12,12 @@ from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.validation import SceneError
 
 
-def apply(settings: Iterable[str], document: dict[Any, Any]) -> None:
-    """Put settings into the document of a scene, before it is validated.
+def apply(setting: str, document: dict[Any, Any]) -> None:
+    """Put a setting into the document of a scene, before it is validated.
 
     Parameters
     ----------
-    settings : iterable of str
+    setting : str
         "section.key=value" gives a number; "section={}" names a section without numbers, or leaves it as it is.
     document : dict
         Changed in place.
@@ -26,13 +25,8 @@ def apply(settings: Iterable[str], document: dict[Any, Any]) -> None:
     Raises
     ------
     SceneError
-        If a setting is neither, or names what no scene has.
+        If it is neither, or names what no scene has.
     """
-    for setting in settings:
-        _apply(setting, document)
-
-
-def _apply(setting: str, document: dict[Any, Any]) -> None:
     match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
     if match is None:
         raise SceneError(f"--set {setting}: not understood; allowed: section.key=value, or section={{}}")

@@ -29,21 +29,20 @@ FORCE = "geometry_msgs/msg/WrenchStamped"
 NAMED_LIST = "sensor_msgs/msg/JointState"
 TEXT = "std_msgs/msg/String"
 
-
-def _command(side: str) -> Topic:
-    return Topic(f"{side}/effort_command", FORCE, f"{side} controller",
-                 "force.x: force on the arm in N; the stamp is that of the state that it answers.")
-
-
-def _contact(side: str) -> Topic:
-    return Topic(f"contact/{side}", FORCE, "plant", "force.x: impact force at this stamp in N.")
-
-
 JOINT_STATES = Topic(
     "joint_states", NAMED_LIST, "plant", "`left`, `object`, `right`, those in the scene: position in m, velocity in"
     " m/s; effort: the input force applied until this stamp in N.")
-LEFT_COMMAND, RIGHT_COMMAND = _command("left"), _command("right")
-LEFT_CONTACT, RIGHT_CONTACT = _contact("left"), _contact("right")
+COMMANDS = {
+    side: Topic(f"{side}/effort_command", FORCE, f"{side} controller",
+                "force.x: force on the arm in N; the stamp is that of the state that it answers.")
+    for side in ("left", "right")
+}
+CONTACTS = {
+    side: Topic(f"contact/{side}", FORCE, "plant", "force.x: impact force at this stamp in N.")
+    for side in ("left", "right")
+}
+LEFT_COMMAND, RIGHT_COMMAND = COMMANDS.values()
+LEFT_CONTACT, RIGHT_CONTACT = CONTACTS.values()
 LYAPUNOV = Topic("lyapunov", NAMED_LIST, "monitor", "position: the values below, by name.")
 SCENE = Topic("scene", TEXT, "plant", "The whole scene as YAML.", latched=True, depth=1)
 RUN = Topic("run", TEXT, "plant", "How it runs, as YAML: lockstep or free-running, accuracy, timeouts.",
@@ -58,8 +57,6 @@ CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock", "plant", "Simulated time.")
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray", "all nodes",
                     "State and counters of each node, once a second.")
 
-COMMANDS = {"left": LEFT_COMMAND, "right": RIGHT_COMMAND}
-CONTACTS = {"left": LEFT_CONTACT, "right": RIGHT_CONTACT}
 EXTERNAL_FORCES = {
     name: Topic(f"external_force/{name}", FORCE, "plant", "force.x: external force from this stamp on in N.")
     for name in ("left_arm", "object", "right_arm")

@@ -9,9 +9,8 @@ from typing import Any
 from grasp_ros.physics.domain import outside
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects import BY_SECTION, EFFECTS
+from grasp_ros.scene.effects import BY_SECTION, named
 from grasp_ros.scene.effects.base import Effect
-from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.suggestion import allowed as what_is_allowed
 
 CONTROLS = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\ud800-\udfff]")  # categories Cc, without the line break, and Cs
@@ -84,17 +83,12 @@ def _section(source: str, effect: Effect, found: Any) -> dict[str, Any]:
             f"{source}: {effect.section}: {found!r} is not allowed; allowed: a mapping with {', '.join(keys)}"
         )
     check_keys(source, f"{effect.section}.", found, keys, needed)
-    return {
-        parameter.key: _number(source, effect.section, parameter, found[parameter.key])
-        for parameter in effect.parameters
-        if parameter.key in found
-    }
-
-
-def _number(source: str, section: str, parameter: Parameter, value: Any) -> Any:
-    if not parameter.accepts(value):
-        raise SceneError(f"{source}: {section}.{parameter.key}: {value!r} is not allowed; allowed: {parameter.allowed}")
-    return parameter.read(value)
+    own = [(parameter, found[parameter.key]) for parameter in effect.parameters if parameter.key in found]
+    for parameter, value in own:
+        if not parameter.accepts(value):
+            key = f"{effect.section}.{parameter.key}"
+            raise SceneError(f"{source}: {key}: {value!r} is not allowed; allowed: {parameter.allowed}")
+    return {parameter.key: parameter.read(value) for parameter, value in own}
 
 
 def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None:
@@ -107,7 +101,7 @@ def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None
     """
     if not SOMETHING & values.keys():
         raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(sorted(SOMETHING))}")
-    effects = [effect for effect in EFFECTS if effect.section in values]
+    effects = named(values)
     for effect in effects:
         for section in effect.needs:
             if section not in values:

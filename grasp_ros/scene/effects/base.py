@@ -46,13 +46,8 @@ class Oddity(NamedTuple):
         return f"{self.key}: {value!r} {self.why}; meant: {self.meant}"
 
 
-def nothing_odd(_: Sections, __: System) -> Iterable[Oddity]:
-    """For effects that always do something."""
-    return ()
-
-
-def no_problem(_: Sections) -> Iterable[Problem]:
-    """For effects whose numbers go together in any way."""
+def nothing(*_: object) -> Iterable[Any]:
+    """For effects that always do something, and whose numbers go together in any way."""
     return ()
 
 
@@ -96,8 +91,8 @@ class Effect:
     node: str = "plant"
     commands: Topic | None = None
     outputs: tuple[Output, ...] = ()
-    problems: Callable[[Sections], Iterable[Problem]] = no_problem
-    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing_odd
+    problems: Callable[[Sections], Iterable[Problem]] = nothing
+    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing
     example: Numbers = field(default_factory=dict)
 
 

@@ -89,7 +89,7 @@ def _is_off(time: float, period: int) -> bool:
     return nanoseconds / NANOSECONDS != time or nanoseconds % period != 0
 
 
-def _off_tick(section: str, keys: tuple[str, ...], sections: Sections) -> Iterable[Problem]:
+def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[Problem]:
     """Times must be whole control periods."""
     period = period_ns(sections)
     for key in keys:
@@ -100,12 +100,8 @@ def _off_tick(section: str, keys: tuple[str, ...], sections: Sections) -> Iterab
             yield Problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
 
 
-def _pulse_problems(section: str, sections: Sections) -> Iterable[Problem]:
-    return _off_tick(section, ("start_s", "length_s"), sections)
-
-
 def _table_problems(section: str, sections: Sections) -> Iterable[Problem]:
-    yield from _off_tick(section, ("time_s",), sections)
+    yield from _off_tick(("time_s",), section, sections)
     times, forces = sections[section]["time_s"], sections[section]["force_N"]
     if any(later <= earlier for earlier, later in pairwise(times)):
         yield Problem(f"{section}.time_s", times, "ascending times")
@@ -175,7 +171,8 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
     work = "the force does work: V_c rises by 2 f times the way at most"
     for kind, parameters, build, problems, odd, example in (
-        ("pulse", PULSE, partial(_build_steps, _pulse), _pulse_problems, _odd_pulse, A_PULSE),
+        ("pulse", PULSE, partial(_build_steps, _pulse), partial(_off_tick, ("start_s", "length_s")),
+         _odd_pulse, A_PULSE),
         ("sine", SINE, _build_sine, _sine_problems, _odd_sine, A_SINE),
         ("table", TABLE, partial(_build_steps, _table), _table_problems, _odd_table, A_TABLE),
     ):
