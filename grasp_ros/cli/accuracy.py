@@ -10,16 +10,8 @@ from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check
 from grasp_ros.accuracy.contender import own_contenders
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
-from grasp_ros.cli.arguments import (
-    add_command,
-    add_force,
-    add_json,
-    add_output,
-    add_scene,
-    check_output,
-    load_scene,
-    prepare,
-)
+from grasp_ros.cli.arguments import add_command, add_file, add_json, add_scene
+from grasp_ros.cli.checks import check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, image_format, show, write_figure
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.physics.errors import Refused
@@ -36,8 +28,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--budget", type=float, metavar="S", help="longest time in s that a simulation may take")
     sub.add_argument("--seconds", type=float, default=SECONDS, metavar="S",
                      help=f"after which no measurement begins (default {SECONDS:g})")
-    add_output(sub, "FIGURE", "draw error against time, .png, .svg or .pdf; - is the standard output")
-    add_force(sub)
+    add_file(sub, "FIGURE", "draw error against time, .png, .svg or .pdf; - is the standard output")
     add_json(sub)
 
 
@@ -48,8 +39,8 @@ def _accuracy(options: argparse.Namespace) -> int:
     wished = options.error is not None or options.budget is not None
     if wished:
         check_wish(options.error, options.budget)
+    check_output(options.output, options.force, [options.scene])
     if options.output is not None:
-        check_output(options.output, options.force, [options.scene])
         image_format(options.output)
     contenders, others = own_contenders(scene)
     prepare()

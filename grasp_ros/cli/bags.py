@@ -8,7 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grasp_ros.cli.arguments import add_command, add_force, add_json, add_output, check_output, prepare, warn
+from grasp_ros.cli.arguments import add_command, add_file, add_json, add_output
+from grasp_ros.cli.checks import check_output, prepare, warn
 from grasp_ros.cli.output import destination, show
 
 if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
@@ -23,8 +24,7 @@ def add_to(commands: Any) -> None:
     sub = add_command(commands, "inspect", _inspect)
     sub.add_argument("bag", type=Path)
     add_json(sub)
-    add_output(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
-    add_force(sub)
+    add_file(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
     sub.add_argument("--replay", action="store_true", help="simulate it again without ROS, and compare every bit")
     add_limits(sub)
     sub = add_command(commands, "verify", _verify)
@@ -70,8 +70,7 @@ def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.graph.comparison import compare_recording
     from grasp_ros.graph.summary import summary, verified
 
-    if options.output is not None:
-        check_output(options.output, options.force, [options.bag])
+    check_output(options.output, options.force, [options.bag])
     recording = bag.read(options.bag)
     warn(recording.scene)
     found = summary(recording)

@@ -7,18 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from grasp_ros.cli.arguments import (
-    add_accuracy,
-    add_command,
-    add_force,
-    add_json,
-    add_output,
-    add_scene,
-    check_output,
-    load_scene,
-    prepare,
-    whole,
-)
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
+from grasp_ros.cli.checks import check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, image_format, show, write_figure, write_scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation.outcomes import GROUPS
@@ -47,8 +37,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--figure", type=Path, metavar="FIGURE",
                      help="draw the outcome along each number, or two outcomes")
     add_accuracy(sub)
-    add_output(sub, "FILE.yaml", "write the scene with the numbers chosen; - is the standard output")
-    add_force(sub)
+    add_file(sub, "FILE.yaml", "write the scene with the numbers chosen; - is the standard output")
     add_json(sub)
 
 
@@ -63,8 +52,7 @@ def _design(options: argparse.Namespace) -> int:
     problem = Problem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
                       [read_bound(text) for text in options.bounds], setup)
     for path in (options.output, options.figure):
-        if path is not None:
-            check_output(path, options.force, [options.scene])
+        check_output(path, options.force, [options.scene])
     if options.figure is not None:
         image_format(options.figure)
     several = len(options.minimise) == 2

@@ -7,18 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import (
-    add_command,
-    add_force,
-    add_json,
-    add_output,
-    add_settings,
-    check_output,
-    complete_scenes,
-    load_scene,
-    prepare,
-    warn,
-)
+from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
+from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import image_format, show, write_figure, write_scene
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
@@ -42,17 +32,15 @@ def add_to(commands: Any) -> None:
                      help="test whether the data reject this value of a number that is free; repeatable")
     sub.add_argument("--by-sensors", action="store_true",
                      help="of a bag: what the sensors of its scene have measured, in place of the exact states")
-    add_output(sub, "FILE", "the scene with the estimates, .yaml, or measured against fitted, .png, .svg or .pdf; - is"
+    add_file(sub, "FILE", "the scene with the estimates, .yaml, or measured against fitted, .png, .svg or .pdf; - is"
                " the standard output")
-    add_force(sub)
     add_json(sub)
 
 
 def _fit(options: argparse.Namespace) -> int:
-    if options.output is not None:
-        check_output(options.output, options.force, [options.source])
-        if options.output.suffix != SCENE:
-            image_format(options.output)
+    check_output(options.output, options.force, [options.source])
+    if options.output is not None and options.output.suffix != SCENE:
+        image_format(options.output)
     scene = None
     if options.scene is not None:
         scene = load_scene(options.scene, options.settings)

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, load_scene, prepare, whole
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_json, add_scene, whole
+from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
@@ -83,7 +84,8 @@ def _run(options: argparse.Namespace) -> int:
 
         run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
     data = store.read(options.output)
-    show(options, report(data), data_of(data))
+    found = data_of(data)
+    show(options, report(found), found)
     done = data["status"].values == DONE
     for outcome in find(outcomes):
         if outcome.wanted & Wanted.SETTLING and np.isnan(data[outcome.name].values[done]).any():
@@ -119,9 +121,8 @@ def data_of(data: Any) -> dict[str, Any]:
     return found
 
 
-def report(data: Any) -> str:
+def report(found: dict[str, Any]) -> str:
     """A line for each outcome, and how the runs ended."""
-    found = data_of(data)
     width = max(map(len, found))
     lines = [f"{'outcome':<{width}}" + "".join(f"{head:>12}" for head in (*HEADS, *COUNTS))]
     for name, row in found.items():

@@ -9,17 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.cli.arguments import (
-    add_command,
-    add_force,
-    add_output,
-    add_settings,
-    check_memory,
-    check_output,
-    load_scene,
-    prepare,
-    warn,
-)
+from grasp_ros.cli.arguments import add_command, add_file, add_settings
+from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import STDOUT, image_format, note, write_figure
 from grasp_ros.cli.sensitivity import sensitivity_panels
 from grasp_ros.methods.registry import EXACT, METHODS
@@ -46,8 +37,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="first time shown, in s")
     sub.add_argument("--to", dest="last", type=float, metavar="S", help="last time shown, in s")
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
-    add_output(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
-    add_force(sub)
+    add_file(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     sub.add_argument("--animate", action="store_true",
                      help="a moving picture of one source instead, .gif, .html or .mp4 (default: .gif beside it)")
     sub.add_argument("--speed", type=float, default=1.0, metavar="R", help="its seconds in a second (default 1)")

@@ -8,16 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import (
-    add_command,
-    add_force,
-    add_json,
-    add_output,
-    add_settings,
-    check_output,
-    complete_scenes,
-    load_scene,
-)
+from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
+from grasp_ros.cli.checks import check_output, load_scene
 from grasp_ros.cli.output import STDOUT, destination, show
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.commented import commented
@@ -36,8 +28,7 @@ def add_to(commands: Any) -> None:
     complete_scenes(sub.add_argument("--like", metavar="SCENE", default=DEFAULT,
                                      help=f"what it begins with (default {DEFAULT})"))
     add_settings(sub)
-    add_output(sub, "FILE.yaml", "the same as FILE.yaml; - is the standard output")
-    add_force(sub)
+    add_file(sub, "FILE.yaml", "the same as FILE.yaml; - is the standard output")
 
 
 def _scenes(options: argparse.Namespace) -> int:

@@ -8,19 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.cli.arguments import (
-    add_accuracy,
-    add_command,
-    add_force,
-    add_json,
-    add_output,
-    add_scene,
-    check_memory,
-    check_output,
-    load_scene,
-    prepare,
-    whole,
-)
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
+from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare
 from grasp_ros.cli.controllers import load_controllers
 from grasp_ros.cli.output import STDOUT, bar, destination, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
@@ -46,9 +35,8 @@ def add_to(commands: Any) -> None:
                      help="print derivatives by a number of the scene, section.key, through all impacts; repeatable;"
                           " `grasp plot --sensitivity` draws them")
     result = sub.add_argument_group("result")
-    add_output(result, "FILE", "write states, forces, V and, as .npz, events and counters; .csv, or - for the standard"
+    add_file(result, "FILE", "write states, forces, V and, as .npz, events and counters; .csv, or - for the standard"
                                " output, writes a table")
-    add_force(result)
     add_json(result)
     method = sub.add_argument_group("method")
     add_accuracy(method)
@@ -84,8 +72,7 @@ def _simulate(options: argparse.Namespace) -> int:
     check_memory(scene, sampled, options.grid)
     if options.sensitivity and (controllers or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: --method {EXACT}, without --controller")
-    if options.output is not None:
-        check_output(options.output, options.force, [options.scene])
+    check_output(options.output, options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
     with bar(scene.duration, "s", scene.name) as told:

@@ -7,15 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import (
-    add_command,
-    add_output,
-    add_scene,
-    add_settings,
-    load_scene,
-    prepare,
-    whole,
-)
+from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_settings, whole
+from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing

@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from grasp_ros.cli.arguments import (
-    add_command,
-    add_scene,
-    load_scene,
-    prepare,
-    whole,
-)
+from grasp_ros.cli.arguments import add_command, add_scene, whole
+from grasp_ros.cli.checks import load_scene, prepare
 from lab.commands.docs import add_docs, page_directory
 from lab.commands.shared import add_study_directory
 

@@ -6,7 +6,8 @@ import argparse
 import math
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_scene, load_scene, prepare, whole
+from grasp_ros.cli.arguments import add_command, add_scene, whole
+from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
 

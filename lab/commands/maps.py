@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, prepare, whole
+from grasp_ros.cli.arguments import add_command, whole
+from grasp_ros.cli.checks import prepare
 from lab.commands.docs import add_docs, page_directory
 from lab.commands.shared import add_study_directory
 

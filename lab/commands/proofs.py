@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_output, prepare, whole
+from grasp_ros.cli.arguments import add_command, add_output, whole
+from grasp_ros.cli.checks import prepare
 from grasp_ros.physics.errors import Refused
 from lab.commands.docs import add_docs, page_directory
 

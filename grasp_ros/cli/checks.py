@@ -1,0 +1,79 @@
+"""What several subcommands do before the work: load a scene, refuse what cannot be written or held, and compile."""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from grasp_ros import scene as scenes
+from grasp_ros.cli.output import STDOUT, note
+from grasp_ros.physics.errors import Refused
+from grasp_ros.scene import Scene
+from grasp_ros.scene.files import writing
+
+ROW = 16  # numbers that a run keeps for each output time: time, state, commands, energies, and copies
+
+
+def load_scene(reference: str, settings: Sequence[str] = ()) -> Scene:
+    """A scene that a command line names; its warnings go to the standard error output."""
+    scene = scenes.load(reference, settings)
+    warn(scene)
+    return scene
+
+
+def warn(scene: Scene) -> None:
+    """Print the warnings of a scene, a line each."""
+    for warning in scene.warnings:
+        note(f"grasp: warning: {scene.name}: {warning}")
+
+
+def check_output(output: Path | None, force: bool, inputs: Sequence[str] = ()) -> None:
+    """Refuse to write over what is there, or where no directory is, before the work; over an input in any case.
+
+    None: nothing is to be written.
+
+    Raises
+    ------
+    Refused
+        Names the file.
+    """
+    if output is None or output == STDOUT:
+        return
+    with writing(output):
+        if not (output.is_file() or output.is_dir()):
+            output.parent.stat()
+            return  # new, a device or a pipe
+        if output.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+        for given in map(Path, inputs):
+            if given.exists() and (given.samefile(output) or output.resolve().is_relative_to(given.resolve())):
+                raise Refused(f"-o {output}: is the input; allowed: another file")
+        if not force:
+            raise Refused(f"{output}: is there; allowed: a new file, or --force to replace it")
+
+
+def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:
+    """Refuse more output times, or ticks of a sampled run, than memory holds, before the work.
+
+    Raises
+    ------
+    Refused
+        Names them.
+    """
+    ticks = scene.ticks if sampled or scene.sampled else 0
+    for name, rows in (("--grid", grid or 0), (f"{scene.name}: control periods", ticks)):
+        try:
+            np.empty((rows, ROW))
+        except (MemoryError, ValueError):  # the second: more than any array can have
+            raise Refused(f"{name}: {rows} is not allowed; allowed: as many as fit into memory") from None
+
+
+def prepare() -> None:
+    """Compile the kernels where that has not been done, before anything shows how far it is."""
+    from grasp_ros.exact.integrator import compile_kernels
+
+    compile_kernels()
