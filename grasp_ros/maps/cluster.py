@@ -74,7 +74,7 @@ def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple
     following = iter(spans)
 
     def submit(count: int) -> list[Any]:
-        return [_submitted(client, document, span) for span in islice(following, count)]
+        return [(client.submit(work, document, span, pure=False), span) for span in islice(following, count)]
 
     threads = max(sum(client.nthreads().values()), 1)
     waiting: dict[Any, Span] = dict(submit(AHEAD * threads))
@@ -89,10 +89,6 @@ def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple
             waiting[added] = following_span
             completed.add(added)
         yield span, chunk
-
-
-def _submitted(client: Any, document: str, span: Span) -> tuple[Any, Span]:
-    return client.submit(work, document, span, pure=False), span
 
 
 def _result(future: Any, span: Span) -> tuple[dict[str, str], Chunk]:

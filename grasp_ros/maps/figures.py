@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.maps.plan import Plan
+from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.scene.parameter import UNITS, ending_of
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, LogNorm, Normalize, colormaps
@@ -39,9 +39,9 @@ def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     figure, axes = canvas.subplots(figsize=(8.0, 6.0), layout="constrained")
     figure.suptitle(plan.scene.title, fontsize="medium")
     if len(plan.axes) == 1:
-        axes.plot(plan.axes[0].values, values, ".", markersize=DOT)
-        axes.set_ylabel(label)
-        _scale(axes, plan, 0, None)
+        x = plan.axes[0]
+        axes.plot(x.values, values, ".", markersize=DOT)
+        axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label)
     else:
         heat(axes, plan, values, label)
     save(figure, path)
@@ -59,7 +59,7 @@ def heat(axes: Axes, plan: Plan, values: np.ndarray, label: str) -> None:
         mesh = axes.imshow(shown, extent=extent, origin="lower", aspect="auto", cmap=colors, norm=_norm(shown),
                            interpolation="none")
     axes.figure.colorbar(mesh, ax=axes, label=label)
-    _scale(axes, plan, 1, 0)
+    axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label_of(y.name), yscale=_scale(y))
 
 
 def _norm(shown: Any) -> Normalize:
@@ -68,14 +68,8 @@ def _norm(shown: Any) -> Normalize:
     return Normalize()
 
 
-def _scale(axes: Axes, plan: Plan, x: int, y: int | None) -> None:
-    axes.set_xlabel(label_of(plan.axes[x].name))
-    if plan.axes[x].log:
-        axes.set_xscale("log")
-    if y is not None:
-        axes.set_ylabel(label_of(plan.axes[y].name))
-        if plan.axes[y].log:
-            axes.set_yscale("log")
+def _scale(axis: Axis) -> str:
+    return "log" if axis.log else "linear"
 
 
 def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -> None:
@@ -94,8 +88,7 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
         axes.plot(data[name].values[shown], values[shown], ".", markersize=DOT, alpha=0.3, color="#333333")
         axes.set_xlabel(textwrap.fill(label_of(name), LETTERS), fontsize="small")
         axes.set_ylabel(label, fontsize="small")
-        if next(axis for axis in plan.axes if axis.name == name).log:
-            axes.set_xscale("log")
+        axes.set_xscale(_scale(next(axis for axis in plan.axes if axis.name == name)))
     save(figure, path)
 
 

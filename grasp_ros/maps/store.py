@@ -18,7 +18,7 @@ import numpy as np
 
 from grasp_ros.maps.plan import Plan
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.files import DAMAGE, writing
+from grasp_ros.scene.files import decoding, writing
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import STATUSES, Chunk
 from grasp_ros.simulation.ensemble import Span
@@ -85,7 +85,6 @@ class Store:
                 self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
             self._group[MARKS][span[0] // self.chunk] = 1
 
-
     @property
     def seconds(self) -> float:
         """Time in s that went into it so far."""
@@ -104,8 +103,7 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], rows: int) -> Any:
     lines = plan.rows // plan.shape[0]
     height = max(1, rows // lines)
     names = ("row",) if plan.sample else tuple(axis.name for axis in plan.axes)
-    parent = path.parent
-    parent.mkdir(parents=True, exist_ok=True)
+    path.parent.mkdir(parents=True, exist_ok=True)
     group = zarr.create_group(path, zarr_format=3, attributes={
         "format": FORMAT, "plan": document, "versions": versions(), "chunk_rows": height * lines,
         "statuses": list(STATUSES), "seconds": 0.0,
@@ -134,7 +132,7 @@ def open_group(path: Path, mode: str = "r") -> Any:
     """
     import zarr
 
-    try:
+    with decoding(path, "a map"):
         group = zarr.open_group(path, mode=mode, zarr_format=3)  # version 2 has arrays that are code
         if group.attrs.get("format") != FORMAT:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
@@ -143,11 +141,6 @@ def open_group(path: Path, mode: str = "r") -> Any:
         missing += [name for name in ("versions", "chunk_rows", "seconds") if name not in group.attrs]
         if missing:
             raise Refused(f"{path}: a damaged map: without {', '.join(missing)}; allowed: a whole one")
-    except Refused:
-        raise
-    except DAMAGE as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise Refused(f"{path}: not a map: {reason}") from None
     return group
 
 

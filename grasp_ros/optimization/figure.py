@@ -31,8 +31,7 @@ def around(problem: Problem, choice: Design) -> Figure:
         axes.plot(values, np.where(good, found.outcomes[name], np.nan), linewidth=1.2)
         axes.plot(choice.numbers[axis.keys[0]], choice.outcomes[name], "o", color=CHOSEN)
         axes.set_xlabel("\n".join(axis.keys), fontsize="small")
-        if axis.log:
-            axes.set_xscale("log")
+        axes.set_xscale("log" if axis.log else "linear")
     row[0][0].set_ylabel(label(problem, name))
     figure.suptitle(problem.scene.title, fontsize="medium")
     return figure

@@ -84,24 +84,17 @@ class Problem:
         """Free numbers (n,) by their keys, at parts (n, k) of the ranges in [0, 1]."""
         return {key: axis.at(parts[:, i]) for i, axis in enumerate(self.axes) for key in axis.keys}
 
-    def run(self, parts: Array) -> Found:
-        """Simulate choices, given as parts (n, k) of the ranges in [0, 1]."""
-        return self.found(self.numbers(parts))
-
     def found(self, numbers: Mapping[str, Array]) -> Found:
         """Simulate choices, given as free numbers (n,) by their keys."""
         table = ensemble(self.scene, numbers, self.names, setup=self.setup)
-        outcomes = {name: self._worst([table.columns[column.name] for column in find([name])]) for name in self.names}
+        outcomes: dict[str, Array] = {}
+        for name in self.names:
+            worst = np.max([table.columns[column.name] for column in find([name])], axis=0)
+            outcomes[name] = np.where(np.isnan(worst), np.inf, worst)  # what no run tells is as bad as can be
         excess: Array = np.zeros(len(table.status))
         for bound in self.bounds:
             excess += np.maximum(outcomes[bound.outcome] - bound.most, 0.0) / (abs(bound.most) or 1.0)
         return Found(outcomes, excess)
-
-    @staticmethod
-    def _worst(columns: Sequence[Array]) -> Array:
-        """The largest of several columns; what no run tells is as bad as can be."""
-        worst = np.max(np.stack(columns), axis=0)
-        return np.where(np.isnan(worst), np.inf, worst)
 
 
 def read_bound(text: str) -> Bound:

@@ -114,14 +114,15 @@ def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | 
         wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
                       + (f" with {wish}" if wish else "") + problem.why_unsettled())
-    outcomes = {name: float(values[0]) for name, values in problem.run(found.x[None]).outcomes.items()}
-    numbers = {key: float(values[0]) for key, values in problem.numbers(found.x[None]).items()}
+    best = problem.numbers(found.x[None])
+    outcomes = {name: float(values[0]) for name, values in problem.found(best).outcomes.items()}
+    numbers = {key: float(values[0]) for key, values in best.items()}
     return Design(problem.scene.changed(numbers), numbers, outcomes, runs)
 
 
 def costs(problem: Problem, parts: Array) -> Array:
     """What a search makes small: the outcome; above all outcomes what breaks a bound, the less the better."""
-    found = problem.run(parts)
+    found = problem.found(problem.numbers(parts))
     outcome = np.minimum(found.outcomes[problem.minimise[0]], NOTHING)
     return np.where(found.excess > 0.0, np.minimum(BROKEN * (1.0 + found.excess), NOTHING), outcome)
 
