@@ -82,13 +82,6 @@ def flight_losses(sight: Sight, seen: Array) -> None:
 
 
 @inlined
-def penetration_at(sight: Sight, at: Array, side: Body) -> float:
-    """u of a pair in contact."""
-    z = max(at[U.L + side], 0.0)
-    return z * z
-
-
-@inlined
 def pace(sight: Sight, s: float) -> float:
     """dt/ds of the variable of the polynomials, s."""
     total = 0.0
@@ -102,8 +95,8 @@ def impact_power(sight: Sight, at: Array, side: Body) -> float:
     """p H u^(3/2) u'^2 of a pair in contact, W."""
     if sight.mode[side] != Pair.CONTACT:
         return 0.0
-    pair, d = sight.pairs[side], approach(at, side)
-    return pair[Law.DISSIPATION] * elastic_force(pair[Law.HERTZIAN], penetration_at(sight, at, side)) * d * d
+    pair, d, z = sight.pairs[side], approach(at, side), max(at[U.L + side], 0.0)
+    return pair[Law.DISSIPATION] * elastic_force(pair[Law.HERTZIAN], z * z) * d * d
 
 
 @kernel

@@ -13,7 +13,6 @@ from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
 from grasp_ros.observe.observe import BEGIN, FINISH, observe, observe_losses
 from grasp_ros.observe.settling import takes_energy
 from grasp_ros.observe.sight import COUNTS, KEPT, LONGEST, LOOKS, MODES, SEEN, UNDECIDED, Context, Seen, Wanted
-from grasp_ros.physics.system import System
 
 SIGNATURE = "int64(int64, int64, float64, float64, int64)"
 
@@ -62,27 +61,9 @@ class Watcher:
             self.context[place] = table.ctypes.data
         return np.array([address_of(observe), self.context.ctypes.data])
 
-    def set_system(self, system: System, continuous: bool) -> None:
-        """Say whose energies and inputs are watched, and whether its feedback acts all the time."""
-        self.loop[:], self.own[:] = system.closed_loop, system.bodies
-        self.base[:] = self.loop if continuous else self.own
-        self.context[Context.CERTAIN] = continuous and not system.caveats
-        self.gains[:] = 0.0
-        for side, law in system.laws.items():
-            if continuous:
-                self.gains[side] = law.position_gain, law.velocity_gain
-
-    def begin(self, bound: float) -> None:
-        """Before a run: `bound` is the part of the largest displacement within which it counts as settled."""
-        observe(self.context.ctypes.data, BEGIN, bound, 0.0, 0)
-
     def finish(self) -> None:
         """After a run."""
         observe(self.context.ctypes.data, FINISH, 0.0, 0.0, 0)
-
-    def only(self, wanted: Wanted) -> None:
-        """Watch less from here on."""
-        self.context[Context.WANTED], self.context[Context.LOSSES] = wanted, 0
 
 
 def settle(integrator: Integrator, watcher: Watcher, stretch: float, horizons: int) -> Array:
@@ -95,7 +76,7 @@ def settle(integrator: Integrator, watcher: Watcher, stretch: float, horizons: i
         has not settled for good within so many horizons; nan: V_c proves nothing here.
     """
     watcher.finish()
-    watcher.only(Wanted.SETTLING)
+    watcher.context[Context.WANTED], watcher.context[Context.LOSSES] = Wanted.SETTLING, 0
     system, seen = integrator.system, watcher.seen
     losing, done = takes_energy(watcher.loop, system.pairs, system.coulomb), 1
     while seen[Seen.SETTLED] == UNDECIDED and losing and done < horizons:
@@ -111,9 +92,14 @@ def settle(integrator: Integrator, watcher: Watcher, stretch: float, horizons: i
 
 def watch(integrator: Integrator, wanted: Wanted, bound: float) -> Watcher:
     """Watch a run from here on; `bound` is the part of the largest displacement that counts as settled."""
-    watcher = Watcher(integrator.plant, integrator.records, wanted)
-    watcher.set_system(integrator.system, integrator.continuous)
-    watcher.begin(float(bound))
+    watcher, system = Watcher(integrator.plant, integrator.records, wanted), integrator.system
+    watcher.loop[:], watcher.own[:], watcher.base[:] = system.closed_loop, system.bodies, system.bodies
+    if integrator.continuous:
+        watcher.base[:] = watcher.loop
+        watcher.context[Context.CERTAIN] = not system.caveats
+        for side, law in system.laws.items():
+            watcher.gains[side] = law.position_gain, law.velocity_gain
+    observe(watcher.context.ctypes.data, BEGIN, float(bound), 0.0, 0)
     integrator.observer = watcher
     return watcher
 

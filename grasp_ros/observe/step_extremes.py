@@ -139,14 +139,10 @@ def polynomial_extremes(rows: Array, n: int, s: float, counts: Integers) -> tupl
     return min(low, value), max(high, value)
 
 
-@inlined
-def in_step(sight: Sight, q: int) -> tuple[float, float]:
-    """Least and largest value of a quantity in a step."""
-    expand_quantity(sight, q)
-    return polynomial_extremes(sight.rows, sight.degree, sight.s, sight.counts)
-
-
 @kernel
 def extremes_of(sight: Sight, q: int) -> tuple[float, float]:
     """Least and largest value of a quantity in a segment."""
-    return in_flight(sight, q) if sight.kind == Kind.FLIGHT else in_step(sight, q)
+    if sight.kind == Kind.FLIGHT:
+        return in_flight(sight, q)
+    expand_quantity(sight, q)
+    return polynomial_extremes(sight.rows, sight.degree, sight.s, sight.counts)
