@@ -9,8 +9,6 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.own_law import find_law
 
-FORM = "side=module:object"
-
 
 def sides_of(words: Sequence[str]) -> dict[str, str]:
     """Where the controllers are found, "module:object" by side.
@@ -24,7 +22,8 @@ def sides_of(words: Sequence[str]) -> dict[str, str]:
     for word in words:
         side, _, place = word.partition("=")
         if side not in SIDES or not all(place.partition(":")):
-            raise Refused(f"--controller: {word} is not allowed; allowed: {FORM}, with the side {' or '.join(SIDES)}")
+            raise Refused(f"--controller: {word} is not allowed; allowed: side=module:object, with the side"
+                          f" {' or '.join(SIDES)}")
         if side in found:
             raise Refused(f"--controller: {word} is not allowed; allowed: one for the {side} side")
         found[side] = place

@@ -176,7 +176,7 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
         from grasp_ros.simulation import plots
 
         figure = graph.directory / "figure.png"
-        plots.draw(recording, figure, graph.scene.feedback_in_words(sampled=True))
+        plots.draw(recording, figure)
         rows.append(("figure", str(figure)))
         spent.note("figure")
     print(report.table([*rows, ("wall time", spent.words)]))

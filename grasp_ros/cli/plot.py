@@ -53,11 +53,7 @@ def _plot(options: argparse.Namespace) -> int:
         raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
     if not options.animate:
         image_format(output)
-    motions, captions = [], []
-    for source in options.sources:
-        motion, sampled = _motion(source, options, span)
-        motions.append(motion)
-        captions.append(motion.scene.feedback_in_words(sampled))
+    motions = [_motion(source, options, span) for source in options.sources]
     if span is not None:
         longest = max(motion.scene.duration for motion in motions)
         if not 0.0 <= span[0] < longest:
@@ -74,7 +70,7 @@ def _plot(options: argparse.Namespace) -> int:
     panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
     if isinstance(motions[0], Trajectory) and motions[0].sensitivity is not None:
         panels += sensitivity_panels(motions[0].sensitivity)
-    figure = plots.compose(motions, captions, width_mm=options.width, span=span, panels=panels)
+    figure = plots.compose(motions, [*map(plots.caption_of, motions)], width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
 
@@ -89,8 +85,8 @@ def _span(options: argparse.Namespace) -> Span:
     return first, last
 
 
-def _motion(source: str, options: argparse.Namespace, span: Span) -> tuple[Motion, bool]:
-    """A motion, and whether its commands were held."""
+def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
+    """A motion of a bag, a file or a scene; the warnings of its scene go to the standard error output."""
     from grasp_ros.graph import bag
 
     path = Path(source)
@@ -101,14 +97,11 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> tuple[Motio
                      or options.sensitivity):
         raise Refused(f"{source}: --set, --sampled, --method, --step, --sensitivity are not allowed; allowed for"
                       " scenes")
-    if directory:
-        recording = bag.read(path)
-        warn(recording.scene)
-        return recording, True
-    motion = load(path) if recorded else _simulated(source, options, span)
-    if recorded:
-        warn(motion.scene)
-    return motion, motion.sampled
+    if not recorded:
+        return _simulated(source, options, span)
+    motion: Motion = bag.read(path) if directory else load(path)
+    warn(motion.scene)
+    return motion
 
 
 def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Trajectory:

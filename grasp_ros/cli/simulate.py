@@ -19,8 +19,6 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import GRID_POINTS, Trajectory, simulate
 
-TABLE = (".csv",)  # endings of files that are tables; any other is a .npz file
-
 
 def add_to(commands: Any) -> None:
     """Add the subcommands."""
@@ -95,9 +93,9 @@ def _simulate(options: argparse.Namespace) -> int:
 
 
 def _write(trajectory: Trajectory, path: Path) -> None:
-    """As a table, or with all that belongs to it."""
+    """As a table, .csv, or with all that belongs to it, .npz, whatever else the ending is."""
     with destination(path) as file:
-        if path == STDOUT or path.suffix in TABLE:
+        if path == STDOUT or path.suffix == ".csv":
             trajectory.to_csv(file)
         else:
             trajectory.save(file)

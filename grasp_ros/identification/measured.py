@@ -110,7 +110,7 @@ def _of_trajectory(run: Trajectory, name: str) -> Measured:
 def _of_table(path: Path, scene: Scene) -> Measured:
     """Columns as `Trajectory.to_csv` names them: the time, states, and the inputs of a scene that holds them."""
     columns = _columns(path)
-    time = HEADS[TIME[0]]
+    time = HEADS[TIME.name]
     if time not in columns or not any(name in columns for name in CHANNELS):
         raise Refused(f"{path}: columns {', '.join(columns)}; allowed: {time} and at least one of"
                       f" {', '.join(CHANNELS)}")

@@ -20,7 +20,7 @@ Try it with `grasp simulate THIS_FILE.yaml`, look at it with `grasp plot THIS_FI
 def commented(scene: Scene) -> str:
     """A scene as YAML with comments; `parse` gives the same scene."""
     text = [_comment(HEAD)]
-    for key, value in (("title", scene.title), ("readings", list(scene.readings)), ("watch", scene.watch)):
+    for key, value in (("title", scene.title), ("readings", scene.readings), ("watch", scene.watch)):
         if value or key != "watch":
             text.append(dump({key: value}))
     text += [_section(effect, scene) for effect in EFFECTS if effect.section in scene.values]
@@ -42,8 +42,7 @@ def _section(effect: Effect, scene: Scene) -> str:
     for parameter in effect.parameters:
         told = f"{parameter.text}; {parameter.allowed}"
         if parameter.key in own:
-            value = own[parameter.key]
-            line = dump({parameter.key: list(value) if isinstance(value, tuple) else value}).rstrip("\n")
+            line = dump({parameter.key: own[parameter.key]}).rstrip("\n")
             lines.append(f"{textwrap.indent(line, '  ')}  # {told}\n" if "\n" not in line else
                          f"  # {told}\n{textwrap.indent(line, '  ')}\n")
         elif own:

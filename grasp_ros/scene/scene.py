@@ -198,11 +198,8 @@ class Scene(Frozen):
     def _document(self) -> dict[str, Any]:
         """What a file with this scene holds."""
         watch = {"watch": self.watch} if self.watch else {}
-        values = {
-            section: {key: list(value) if isinstance(value, tuple) else value for key, value in numbers.items()}
-            for section, numbers in self.values.items()
-        }
-        return {"title": self.title, "readings": list(self.readings), **watch, **values}
+        values = {section: dict(numbers) for section, numbers in self.values.items()}
+        return {"title": self.title, "readings": self.readings, **watch, **values}
 
 
 def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:

@@ -26,7 +26,6 @@ from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.lyapunov import check as check_lyapunov
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED
@@ -111,8 +110,9 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
     columns = find(setup.outcomes)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
-    if any(column.name == LYAPUNOV for column in columns):
-        check_lyapunov(scene, setup.sampled or scene.sampled)
+    inputs = setup.sampled or scene.sampled or scene.system.external  # that are no law of the state
+    if inputs and any(column.name == LYAPUNOV for column in columns):
+        raise Refused(f"{scene.name}: outcome lyapunov: allowed: continuous feedback, no external force")
     return columns
 
 
@@ -154,15 +154,11 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
                stop: NDArray[np.int64]) -> NDArray[np.int64]:
     """Integrate rows in one call; returns those that are left to `_run`, because they do not just reach the end."""
     block, n = variants.block(), len(which)
-    gains = np.zeros((n, 2, 2))
-    gains[:] = block.laws[which][..., :SET_POINT]
-    loop, own, pairs, coulomb, state = map(np.ascontiguousarray, (
-        block.closed_loop[which], block.bodies[which], block.pairs[which], block.coulomb[which, 0, 0],
-        block.state[which, :, 0]))
-    rows = Rows(
-        loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
-        np.full(n, LEFT_OUT),
-    )
+    loop, own, gains, pairs, coulomb, state = map(np.ascontiguousarray, (
+        block.closed_loop[which], block.bodies[which], block.laws[which][..., :SET_POINT], block.pairs[which],
+        block.coulomb[which, 0, 0], block.state[which, :, 0]))
+    rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
+                np.full(n, LEFT_OUT))
     limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.horizons)
     integrate_rows(rows, variants.scene.duration, wanted, setup.settled, limits)
     done = rows.outcome == Ended.DONE

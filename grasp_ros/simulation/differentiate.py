@@ -20,7 +20,7 @@ from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.repeat import UNLIMITED
+from grasp_ros.simulation.repeat import integrator_of
 from grasp_ros.simulation.trajectory import Trajectory
 
 
@@ -84,8 +84,7 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     changes, grid, events = directions(scene, keys, sampled), run.t, run.event_table
     both = np.concatenate([grid, events[:, Entry.TIME]])
     order = np.argsort(both, kind="stable")
-    integrator = Integrator(system, continuous=not sampled, accuracy=run.setting, max_events=UNLIMITED,
-                            max_work=UNLIMITED)
+    integrator = integrator_of(run)
     carrier = carry(scene, integrator, changes, both[order], sampled)
     states = complete(scene, integrator, sampled, both[order])
     carrier.finish(scene.duration)

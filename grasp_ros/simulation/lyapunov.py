@@ -13,25 +13,11 @@ from dataclasses import replace
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.scene import Scene
 
 DISTANCE = 1e-8  # of the state: far above rounding, far below what a touch tells apart
 PIECE_S = 0.5
-
-
-def check(scene: Scene, sampled: bool) -> None:
-    """Refuse a scene whose inputs are not a law of its state.
-
-    Raises
-    ------
-    Refused
-        If commands are held, or external forces act.
-    """
-    if sampled or scene.system.external:
-        raise Refused(f"{scene.name}: outcome lyapunov: allowed: continuous feedback, no external force")
 
 
 def exponent(system: System, duration: float, accuracy: float) -> float:

@@ -62,8 +62,12 @@ def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = Non
     Refused
         If the motion is empty, matplotlib does not know the format, or the file cannot be written.
     """
-    sampled = getattr(motion, "sampled", True)  # a recording is
-    draw_several([motion], [motion.scene.feedback_in_words(sampled) if caption is None else caption], Path(path))
+    draw_several([motion], [caption_of(motion) if caption is None else caption], Path(path))
+
+
+def caption_of(motion: Motion) -> str:
+    """The feedback of its scene, in words."""
+    return motion.scene.feedback_in_words(getattr(motion, "sampled", True))  # a recording is
 
 
 def draw_several(

@@ -19,7 +19,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.contacts import intervals
-from grasp_ros.simulation.repeat import UNLIMITED
+from grasp_ros.simulation.repeat import integrator_of
 from grasp_ros.simulation.trajectory import Trajectory
 
 SETTLED = 0.02  # of the largest initial displacement
@@ -57,8 +57,7 @@ def by_output_times(run: Trajectory) -> bool:
 
 def watch_again(run: Trajectory, wanted: Wanted, part: float = SETTLED) -> tuple[Integrator, Watcher]:
     """An exact run from its begin, and what watches it."""
-    integrator = Integrator(
-        run.scene.system, continuous=True, accuracy=run.setting, max_events=UNLIMITED, max_work=UNLIMITED)
+    integrator = integrator_of(run)
     return integrator, watch(integrator, wanted, part)
 
 

@@ -37,6 +37,12 @@ def reached(run: Trajectory) -> float:
     return float(max([0.0, *run.t[-1:], *run.event_table[-1:, 0]]))
 
 
+def integrator_of(run: Trajectory) -> Integrator:
+    """What integrates an exact run again."""
+    return Integrator(run.scene.system, continuous=not run.sampled, accuracy=run.setting, max_events=UNLIMITED,
+                      max_work=UNLIMITED)
+
+
 def states_at(run: Trajectory, times: Array) -> Array:
     """States (..., 6) at any times (...) in s of a run: those of the run with these output times, bit for bit.
 
@@ -122,9 +128,7 @@ def _with_commands(run: Trajectory, grid: Array) -> Array:
     count = min(last + 1, scene.ticks)
     answers = np.zeros((count, 3))
     answers[:, :OBJECT] = run.command[np.searchsorted(run.t, tick_times(scene)[:count])]
-    integrator = Integrator(scene.system, continuous=False, accuracy=run.setting, max_events=UNLIMITED,
-                            max_work=UNLIMITED)
-    plant = SampledPlant(scene.system, scene.period_ns, integrator)
+    plant = SampledPlant(scene.system, scene.period_ns, integrator_of(run))
     outputs, _ = outputs_within(grid, np.arange(count + 1), scene.period_ns)
     states = plant.follow(answers, outputs)
     if plant.status is Status.DONE:

@@ -19,7 +19,6 @@ from grasp_ros.scene.parameter import UNITS as KEYS
 if TYPE_CHECKING:
     from grasp_ros.scene import Scene
 
-TIME = ("t", "s", "time")
 _ENDINGS = {unit: ending for ending, unit in reversed(KEYS.items())} | {"J": "_J", "W": "_W", "1": ""}
 
 
@@ -72,6 +71,7 @@ class Column(NamedTuple):
 
 
 _BODIES, _ARMS = [NAMES[body] for body in BODIES], (NAMES[LEFT], NAMES[RIGHT])
+TIME = Column("t", "s", "time")
 COLUMNS: tuple[Column, ...] = (
     *(Column(f"{symbol}_{name}", unit, f"{text} of the {name} mass")
       for name in _BODIES for symbol, unit, text in (("x", "m", "position"), ("v", "m/s", "velocity"))),
@@ -83,9 +83,7 @@ COLUMNS: tuple[Column, ...] = (
     Column("V_rate", "W", "its rate (18)"),
     Column("mode", "1", "contacts: 0 none, 1 left, 2 right, 3 both"),
 )
-HEADS = {  # of a text file, by the names of the columns
-    name: name + _ENDINGS[unit] for name, unit in (TIME[:2], *(column[:2] for column in COLUMNS))
-}
+HEADS = {own.name: own.name + _ENDINGS[own.unit] for own in (TIME, *COLUMNS)}  # of a text file, by columns
 
 
 class Tabular:
@@ -103,13 +101,9 @@ class Tabular:
             import xarray
         except ModuleNotFoundError as error:
             raise Refused(f"dataset() needs {error.name}; pip install '.[data]' in the checkout") from None
-        name, unit, text = TIME
-        values = _values_of(self)
-        return xarray.Dataset(
-            {column.name: (name, values[column.name], {"units": column.unit, "long_name": column.text})
-             for column in COLUMNS},
-            {name: (name, self.t, {"units": unit, "long_name": text})}, _attributes_of(self),
-        )
+        values = {TIME.name: self.t, **_values_of(self)}
+        return xarray.Dataset({own.name: (TIME.name, values[own.name], {"units": own.unit, "long_name": own.text})
+                                for own in (TIME, *COLUMNS)}, attrs=_attributes_of(self))
 
     def dataframe(self: Motion) -> Any:
         """The same as a `pandas.DataFrame`; units by column in its `attrs["units"]`.
@@ -119,9 +113,8 @@ class Tabular:
         Refused
             If pandas is not installed.
         """
-        frame = frame_of({TIME[0]: self.t, **_values_of(self)}).set_index(TIME[0])
-        units = {TIME[0]: TIME[1], **{column.name: column.unit for column in COLUMNS}}
-        frame.attrs = {**_attributes_of(self), "units": units}
+        frame = frame_of({TIME.name: self.t, **_values_of(self)}).set_index(TIME.name)
+        frame.attrs = {**_attributes_of(self), "units": {own.name: own.unit for own in (TIME, *COLUMNS)}}
         return frame
 
     def to_csv(self: Motion, path: str | os.PathLike[str] | BinaryIO) -> None:
