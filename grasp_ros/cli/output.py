@@ -53,12 +53,10 @@ def plain(data: Any) -> Any:
     """Data as JSON has it: numbers that are not finite are null."""
     if isinstance(data, Mapping):
         return {str(key): plain(value) for key, value in data.items()}
-    if isinstance(data, np.ndarray):
+    if isinstance(data, (np.ndarray, np.generic)):
         return plain(data.tolist())
     if isinstance(data, Sequence) and not isinstance(data, str):
         return [plain(value) for value in data]
-    if isinstance(data, np.generic):
-        return plain(data.item())
     if isinstance(data, float) and not math.isfinite(data):
         return None
     return data if isinstance(data, (str, int, float, bool, type(None))) else str(data)

@@ -18,12 +18,10 @@ from grasp_ros.maps.store import Store
 from grasp_ros.simulation.chunk import Chunk, check, compute
 from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
 
-Progress = Callable[[int, int], object]
-
 
 def run(
     plan: Plan, path: str | os.PathLike[str], *, workers: int = 0, scheduler: str = "",
-    progress: Progress = lambda _, __: None,
+    progress: Callable[[int, int], object] = lambda _, __: None,
 ) -> Store:
     """Compute what a file does not have yet.
 

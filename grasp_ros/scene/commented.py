@@ -53,11 +53,6 @@ def _section(effect: Effect, scene: Scene) -> str:
 def _offer(effect: Effect) -> str:
     """One section that the scene does not have, as a comment."""
     needs = f" Needs {', '.join(effect.needs)}." if effect.needs else ""
-    keys = "".join(f"#   {parameter.key}: {_example(effect, parameter.key)}  # {parameter.text}\n"
+    keys = "".join(f"#   {parameter.key}: {effect.example.get(parameter.key, '...')}  # {parameter.text}\n"
                    for parameter in effect.parameters)
     return _comment(f"{effect.text}.{needs}") + f"# {effect.section}:{'' if keys else ' {}'}\n{keys}"
-
-
-def _example(effect: Effect, key: str) -> str:
-    value = effect.example.get(key, "...")
-    return str(list(value) if isinstance(value, tuple) else value)

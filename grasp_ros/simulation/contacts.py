@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.impact_law import elastic_slope
 from grasp_ros.physics.layout import EPS, Entry, Transition
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.smooth import Quantity, States, expand
 
 UNITS = {
@@ -34,19 +32,6 @@ def intervals(event_table: Array, side: int, end: float) -> Array:
         ends.append([end, np.nan])
     rows = [(a[0], b[0], a[1], b[1]) for a, b in zip(begins, ends, strict=True)]
     return np.reshape(rows, (-1, 4))
-
-
-def side_of(name: str) -> int:
-    """The side of that name.
-
-    Raises
-    ------
-    Refused
-        If there is none.
-    """
-    if name not in SIDES:
-        raise Refused(f"side {name!r} is not allowed; allowed: {' or '.join(SIDES)}")
-    return int(SIDES[name])
 
 
 def contact_table(system: System, event_table: Array, side: int, breaks: Array, states: States) -> np.ndarray:

@@ -11,12 +11,6 @@ Told = Callable[[float], object]
 DELAY_S = 0.5  # a computation that is over by then needs no bar
 
 
-def anybody_looks() -> bool:
-    """Whether a bar can be drawn: in a notebook, or on a terminal that can move its cursor and may."""
-    moves = os.environ.get("TERM", "") != "dumb" and "NO_COLOR" not in os.environ
-    return "ipykernel" in sys.modules or (sys.stderr.isatty() and moves)
-
-
 @contextmanager
 def showing(progress: Told | bool | None, total: float | None, unit: str, name: str) -> Iterator[Told | None]:
     """What is to be told how far a computation is: what a caller gave, a bar in place of True, or nothing.
@@ -33,7 +27,9 @@ def showing(progress: Told | bool | None, total: float | None, unit: str, name: 
     if not isinstance(progress, bool):
         yield progress
         return
-    if not (progress and anybody_looks()):
+    moves = os.environ.get("TERM", "") != "dumb" and "NO_COLOR" not in os.environ  # it may move the cursor
+    looked_at = "ipykernel" in sys.modules or (sys.stderr.isatty() and moves)  # in a notebook, or on a terminal
+    if not (progress and looked_at):
         yield None
         return
     from tqdm.auto import tqdm

@@ -16,6 +16,7 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy, pairs_of
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
@@ -24,7 +25,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.npz import signed
-from grasp_ros.simulation.contacts import contact_table, side_of
+from grasp_ros.simulation.contacts import contact_table
 from grasp_ros.simulation.html import html_of_run
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
@@ -196,7 +197,9 @@ class Trajectory(Tabular, Frozen):
         Refused
             If there is no such side, or the run cannot be repeated, see `at`.
         """
-        return contact_table(self.scene.system, self.event_table, side_of(side), breaks_of(self), self.at)
+        if side not in SIDES:
+            raise Refused(f"side {side!r} is not allowed; allowed: {' or '.join(SIDES)}")
+        return contact_table(self.scene.system, self.event_table, SIDES[side], breaks_of(self), self.at)
 
     def section(self, function: Function | ArrayLike, level: float = 0.0, direction: int = 0) -> Section:
         """Where a function of the motion crosses a level: times, states and directions.

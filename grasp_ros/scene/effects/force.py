@@ -20,9 +20,8 @@ from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
 SECTIONS = {"left_arm": LEFT, "object": OBJECT, "right_arm": RIGHT}
-FORCE = Parameter("force_N", *RANGES["force"].bounds, "force, positive to the right")
 PULSE = (
-    FORCE,
+    Parameter("force_N", *RANGES["force"].bounds, "force, positive to the right"),
     Parameter("start_s", *RANGES["duration"].bounds, "begin of the pulse"),
     Parameter("length_s", *RANGES["duration"].bounds, "length of the pulse", open_low=True),
 )
@@ -40,10 +39,6 @@ TABLE = (
 NO_EFFECT = "has no effect"
 ROUNDING = 1e-9  # of the amplitude
 NEVER = "comes when the run has ended: nothing ever acts"
-
-A_PULSE = {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}
-A_SINE = {"amplitude_N": 1.0, "frequency_Hz": 2.0}
-A_TABLE = {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}
 
 
 def _pulse(section: str, sections: Sections) -> tuple[Callable[[int], float], list[int]]:
@@ -172,9 +167,10 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
     work = "the force does work: V_c rises by 2 f times the way at most"
     for kind, parameters, build, problems, odd, example in (
         ("pulse", PULSE, partial(_build_steps, _pulse), partial(_off_tick, ("start_s", "length_s")),
-         _odd_pulse, A_PULSE),
-        ("sine", SINE, _build_sine, _sine_problems, _odd_sine, A_SINE),
-        ("table", TABLE, partial(_build_steps, _table), _table_problems, _odd_table, A_TABLE),
+         _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
+        ("sine", SINE, _build_sine, _sine_problems, _odd_sine, {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
+        ("table", TABLE, partial(_build_steps, _table), _table_problems, _odd_table,
+         {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}),
     ):
         section = f"{name}_{kind}"
         yield Effect(
