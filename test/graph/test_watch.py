@@ -151,6 +151,8 @@ def test_a_plant_that_was_paused_before_anybody_watched_is_said_to_be_and_steps(
     wait_for(lambda: screen.shows("the plant is paused at tick 0; → steps it"), "what the plant is")
     screen.press(RIGHT)
     screen.wait("t = 0.001 s   paused")
+    screen.press(b"q")
+    assert screen.end() == 0
 
 
 def test_a_plant_of_others_may_answer_whatever_it_likes(
