@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import signal
 import sys
 import time
@@ -43,7 +44,7 @@ def add_to(commands: Any) -> None:
         "--free-running", type=float, nargs="?", const=1.0, metavar="FACTOR",
         help="follow the wall clock, FACTOR simulated seconds in a second (default 1), instead of lockstep",
     )
-    sub.add_argument("--namespace", default="/", metavar="NS", help="of all names, /clock too; for several graphs")
+    _add_namespace(sub, "of all names, /clock too; for several graphs")
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub.add_argument(
@@ -65,13 +66,23 @@ def add_to(commands: Any) -> None:
     sub.add_argument("bag", type=Path, nargs="?", help="a bag; default: the graph that runs")
     sub.add_argument("--rate", type=float, default=1.0, metavar="R", help="seconds of the bag in a second (default 1)")
     sub.add_argument("--from", dest="first", type=float, metavar="S", help="time in the bag to begin at, in s")
-    sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
+    _add_namespace(sub, "of the graph")
     _add_network(sub)
     sub = add_command(commands, "ctl", _ctl)
     sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N]; none: a shell that stays connected")
-    sub.add_argument("--namespace", default="/", metavar="NS", help="of the graph")
+    _add_namespace(sub, "of the graph")
     _add_network(sub)
+
+
+def _add_namespace(sub: argparse.ArgumentParser, text: str) -> None:
+    sub.add_argument("--namespace", type=_namespace, default="/", metavar="NS", help=text)
+
+
+def _namespace(word: str) -> str:
+    if re.fullmatch(r"/|(/[A-Za-z](_?[A-Za-z0-9])*_?)+", word) is None:
+        raise argparse.ArgumentTypeError(f"{word!r} is not allowed; allowed: / and names of ROS such as /lab/one")
+    return word
 
 
 def _add_network(sub: argparse.ArgumentParser) -> None:

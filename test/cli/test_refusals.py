@@ -98,6 +98,8 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
          "left_controller: a law of its own, and without it: allowed: one of the two"),
         ("run case_01 -o file/x", "file/x: cannot be written: Not a directory"),
         ("run case_01 --accuracy 2", "accuracy: 2.0"),
+        ("ctl --namespace lab status", "'lab' is not allowed; allowed: / and names of ROS such as /lab/one"),
+        ("watch --namespace /1a", "'/1a' is not allowed"),
         ("inspect nothing", "nothing: not a bag of this package"),
         ("inspect file", "file: not a bag of this package"),
         ("inspect bag", "bag: not a bag of this package"),

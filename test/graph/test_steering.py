@@ -142,6 +142,13 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     assert shell.returncode == 1
 
 
+@pytest.mark.parametrize("words", ["yes help | head -n 5000 | {} | head -n 1", "{} <&-"])
+def test_a_shell_ends_with_its_reader_and_without_an_input(words: str) -> None:
+    command = "set -o pipefail; " + words.format(f"{sys.executable} -m grasp_ros.cli ctl")
+    found = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert (found.returncode in (0, 141), found.stderr) == (True, "")  # 141: `yes`, which nobody reads any more
+
+
 def test_without_a_plant_ctl_says_so(tmp_path: Path) -> None:
     found = grasp("ctl", "status", "--namespace", "/nobody", cwd=tmp_path)
     assert (found.returncode, found.stdout) == (1, "")

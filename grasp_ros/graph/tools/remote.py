@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from inspect import signature
+from io import StringIO
 from itertools import islice
 from typing import Any
 
@@ -204,10 +205,11 @@ def _plain(value: Any) -> Any:
 
 def _shell(remote: Remote) -> int:
     """Do what the lines of the standard input ask for, until it ends; the status of the last one."""
-    status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
+    status, given = 0, sys.stdin or StringIO()  # it was closed before we began
+    prompt = "grasp> " if given.isatty() else ""
     while True:
         print(prompt, end="", flush=True)
-        words = sys.stdin.readline()
+        words = given.readline()
         if not words or words.strip() in FAREWELL:
             return status
         if words.strip():
