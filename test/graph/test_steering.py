@@ -149,6 +149,12 @@ def test_a_shell_ends_with_its_reader_and_without_an_input(words: str) -> None:
     assert (found.returncode in (0, 141), found.stderr) == (True, "")  # 141: `yes`, which nobody reads any more
 
 
+def test_a_graph_runs_without_any_standard_stream(tmp_path: Path) -> None:
+    command = f"{sys.executable} -m grasp_ros.cli run case_02 --set time.duration_s=0.2 --no-figure -o run <&- >&- 2>&-"
+    subprocess.run(["bash", "-c", command], cwd=tmp_path, timeout=2 * DEADLINE, check=True)
+    assert len(bag.read(tmp_path / "run" / "bag").t) == 201
+
+
 def test_without_a_plant_ctl_says_so(tmp_path: Path) -> None:
     found = grasp("ctl", "status", "--namespace", "/nobody", cwd=tmp_path)
     assert (found.returncode, found.stdout) == (1, "")

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import partial
 from inspect import signature
-from io import StringIO
 from itertools import islice
 from typing import Any
 
@@ -205,11 +204,10 @@ def _plain(value: Any) -> Any:
 
 def _shell(remote: Remote) -> int:
     """Do what the lines of the standard input ask for, until it ends; the status of the last one."""
-    status, given = 0, sys.stdin or StringIO()  # it was closed before we began
-    prompt = "grasp> " if given.isatty() else ""
+    status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
     while True:
         print(prompt, end="", flush=True)
-        words = given.readline()
+        words = sys.stdin.readline()
         if not words or words.strip() in FAREWELL:
             return status
         if words.strip():
