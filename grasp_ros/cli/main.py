@@ -42,11 +42,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> int:
     """Run the command that the words name; returns the exit status."""
-    for number, (name, mode) in enumerate((("stdin", "r"), ("stdout", "w"), ("stderr", "w"))):
-        if getattr(sys, name) is None:  # it was closed before we began: for us, and for the nodes that we start
-            os.dup2(os.open(os.devnull, os.O_RDWR), number)
-            os.set_inheritable(number, True)  # which `dup2` leaves out where it has nothing to do
-            setattr(sys, name, open(number, mode, encoding="utf-8"))  # noqa: SIM115 - for as long as we live
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # it was closed before we began
+            stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115 - for as long as we live
+            os.set_inheritable(stream.fileno(), True)  # the number that was free: for the nodes that we start as well
+            setattr(sys, name, stream)
     try:
         status = _status(parser, words)
         sys.stdout.flush()  # here, where it can still be said that it failed

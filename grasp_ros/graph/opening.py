@@ -31,7 +31,9 @@ def open_storage(path: Path, salvage: bool = False) -> Storage:
     """
     path = Path(path)
     with decoding(path, KIND, BagError):
-        files = [file for file in sorted(path.glob("*.mcap")) if file.is_file()] if path.is_dir() else [path]
+        files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
+        if files and files[0].is_fifo():
+            raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
         if len(files) == 1 and files[0].suffix != ".db3":
             return Storage(files[0], salvage)
         if any((path / "bag").glob("*.mcap")):

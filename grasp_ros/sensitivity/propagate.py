@@ -123,23 +123,16 @@ def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
 
 
 @kernel
-def is_due(outputs: Outputs, time: float) -> bool:
-    """Whether an output is due up to a time, with it."""
+def next_output(outputs: Outputs) -> float:
+    """Time of the next output, s; inf: there is none."""
     row = outputs.counts[Count.FILLED]
-    return bool(row < outputs.grid.shape[0] and outputs.grid[row] <= time)
-
-
-@kernel
-def is_before(outputs: Outputs, time: float) -> bool:
-    """Whether an output is due before a time."""
-    row = outputs.counts[Count.FILLED]
-    return bool(row < outputs.grid.shape[0] and outputs.grid[row] < time)
+    return outputs.grid[row] if row < outputs.grid.shape[0] else math.inf
 
 
 @kernel
 def since(outputs: Outputs, begin: float, span: float) -> float:
     """Time from a begin to the next output, within a span."""
-    return min(max(outputs.grid[outputs.counts[Count.FILLED]] - begin, 0.0), span)
+    return min(max(next_output(outputs) - begin, 0.0), span)
 
 
 @kernel
@@ -153,7 +146,7 @@ def rest_until(t: Tangents, time: float) -> None:
     act(t.motion.mode, t.rates, t.inputs)
     due = True
     while due:
-        due = is_due(t.outputs, time)
+        due = next_output(t.outputs) <= time
         rest_tangent(t.motion, t.rates, t.matrices, since(t.outputs, now, time - now) if due else time - now)
         if due:
             write_output(t.motion, t.outputs, t.rates)
@@ -207,7 +200,7 @@ def fly_free(t: Tangents, presses: bool, tau: float) -> None:
 @kernel
 def pass_flight(t: Tangents, begin: float, span: float) -> None:
     """Move the tangents over a flight, and write the outputs on the way."""
-    while is_before(t.outputs, t.outputs.numbers[Number.TIME]):
+    while next_output(t.outputs) < t.outputs.numbers[Number.TIME]:
         fly_free(t, False, since(t.outputs, begin, span))
         write_output(t.motion, t.outputs, t.rates)
     fly_free(t, False, span)
@@ -224,7 +217,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         part = exact_length(motion, t.table, n, left)
         ends = part == left
         reached = span if ends else time_at(motion.c, n, part)[0]
-        while is_before(t.outputs, t.outputs.numbers[Number.TIME] if ends else begin + reached):
+        while next_output(t.outputs) < (t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)
             step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, tau))
@@ -248,7 +241,7 @@ def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n:
         pass_flight(t, begin, span)
     else:
         pass_step(t, begin, span, s, n)
-    while is_due(t.outputs, t.outputs.numbers[Number.TIME]):  # events are: each ends its segment
+    while next_output(t.outputs) <= t.outputs.numbers[Number.TIME]:  # events are: each ends its segment
         write_output(t.motion, t.outputs, t.rates)
     copy_matrix(t.rates.x, t.rates.at)
     for side in (LEFT, RIGHT):
@@ -284,7 +277,7 @@ def propagate(address: int, kind: int, span: float, s: float, degree: int) -> in
     arrive(t, span * (1.0 - GAP) if ends else clock[2], begin)
     if ends:
         copy_matrix(t.rates.at, t.rates.x)
-        while is_due(t.outputs, math.inf):
+        while next_output(t.outputs) < math.inf:
             write_output(t.motion, t.outputs, t.rates)
         return 0
     t.outputs.numbers[Number.TIME] = (clock[0] + clock[1]) + clock[2]

@@ -20,7 +20,7 @@ from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.repeat import integrator_of
+from grasp_ros.simulation.repeat import check_same, integrator_of
 from grasp_ros.simulation.trajectory import Trajectory
 
 
@@ -90,12 +90,10 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     carrier.finish(scene.duration)
     back = np.argsort(order, kind="stable")
     at, late = back[: len(grid)], back[len(grid) :]
-    if not np.array_equal(integrator.event_table, events):
-        raise Refused(f"{scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this machine"
-                      " and these versions, without `changes`")
     state, rates = states[at], carrier.out[at]
     level = energy(system, state).V_c
     state[:, system.absent_columns] = np.nan
+    check_same(run, grid, state, integrator.event_table)
     return Sensitivity(
         scene, tuple(keys), grid, state, level, events, rates,
         level_rates(system, directions(scene, keys, False) if sampled else changes, states[at], rates),

@@ -59,13 +59,14 @@ def states_at(run: Trajectory, times: Array) -> Array:
         raise Refused(f"time {float(odd)!r} is not allowed; allowed: 0 to {end!r} s")
     grid, place = np.unique(np.concatenate([wanted.ravel(), run.t]), return_inverse=True)
     states = _again(run, grid)
-    _check_same(run, grid, states)
+    check_same(run, grid, states)
     return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
 
 
-def _check_same(run: Trajectory, grid: Array, states: Array) -> None:
-    """Refuse a repetition at times, which hold those of the run, whose states are not those of the run."""
-    if len(states) < len(grid) or not np.array_equal(states[np.searchsorted(grid, run.t)], run.state, equal_nan=True):
+def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None = None) -> None:
+    """Refuse a repetition that is not the run: by its states at times, which hold those of the run, and its events."""
+    same = len(states) == len(grid) and (events is None or np.array_equal(events, run.event_table))
+    if not same or not np.array_equal(states[np.searchsorted(grid, run.t)], run.state, equal_nan=True):
         raise Refused(f"{run.scene.name}: the run cannot be repeated here to the last bit; allowed: a run of this"
                       " machine and these versions, without `changes` between its output times")
 
@@ -83,7 +84,7 @@ def at_every_tick(run: Trajectory) -> Trajectory:
     ticks = tick_times(run.scene)
     grid = np.union1d(ticks[ticks <= run.t[-1]], run.t)
     found, loop = _solved(run, grid)
-    _check_same(run, grid, found.state)
+    check_same(run, grid, found.state)
     return replace(run, t=grid, state=found.state, loop=loop)
 
 

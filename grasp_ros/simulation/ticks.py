@@ -33,5 +33,5 @@ class Loop(NamedTuple):
 
 
 def new_loop(n: int) -> Loop:
-    """One to be filled."""
+    """A record of n output times, to be filled."""
     return Loop(np.empty((n, 2)), np.full((n, 3), np.nan))

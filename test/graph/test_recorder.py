@@ -252,6 +252,13 @@ def test_the_library_would_write_the_same_bytes(
     assert record(tmp_path / "library") == own
 
 
+def test_a_pipe_in_place_of_a_bag_is_refused_and_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "bag.mcap")
+    for path in (tmp_path, tmp_path / "bag.mcap"):
+        with pytest.raises(bag.BagError, match="a pipe; allowed: a file"):
+            bag.read(path)
+
+
 def test_a_writer_of_the_library_that_has_moved_is_refused_in_a_sentence() -> None:
     """And that of this library has not: what the recorder takes of it is where it was."""
     Messages(LibraryWriter(io.BytesIO()))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import signal
 import sys
 import time
@@ -47,8 +46,6 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
         with suppress(OSError):  # nobody reads it
             print(error, file=sys.stderr)
         return 2
-    except BrokenPipeError:  # the reader of our output, `head` say, has had it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except Exception as error:  # a fault of this package: in one line, and where
         words = f"a fault of this package: {type(error).__name__}: {error}, in {place_of(error)}"
         tell_parent(names, words)

@@ -8,7 +8,6 @@ import sys
 import time
 from array import array
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from functools import partial
 from inspect import signature
 from itertools import islice
@@ -55,8 +54,12 @@ class Remote(GraspNode):
     def work(self, received: Sequence[int]) -> bool:
         """Ask once, or be a shell; the exit code is that of the last answer."""
         self._received = received
-        with suppress(Stopped):
+        try:
             self.exit_code = _say(self, self._wanted) if self._wanted else _shell(self)
+        except Stopped:
+            pass
+        except BrokenPipeError:  # the reader of our output, `head` say, has had it
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return True
 
     def do(self, words: Sequence[str]) -> str:
