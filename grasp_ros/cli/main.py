@@ -19,7 +19,7 @@ from importlib import import_module
 from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
 from grasp_ros.graph.disk import FULL
-from grasp_ros.graph.stopping import raise_on_signals
+from grasp_ros.graph.stopping import raise_on_signals, stop_if_signalled
 from grasp_ros.physics.errors import Refused
 
 HELP = f"""\
@@ -53,7 +53,8 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
         return status
     except OSError as error:
         enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
-        if not enough and error.errno not in (*FULL, errno.EIO, errno.EBADF):  # EIO: the terminal is gone
+        of_output = enough or error.errno in (*FULL, errno.EIO, errno.EBADF)  # EIO: the terminal is gone
+        if not of_output or hasattr(error, "__notes__"):  # which an error of a user's controller has
             raise
         if error.errno in FULL:
             with suppress(OSError):
@@ -69,13 +70,17 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
     try:
         raise_on_signals()
         begin = time.monotonic()
-        options = parser().parse_args(words)
+        try:
+            options = parser().parse_args(words)
+        except SystemExit as stop:  # of argparse, which has said why
+            return stop.code if isinstance(stop.code, int) else 0
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
         if hasattr(options, "quiet"):
             import_module("grasp_ros.cli.output").set_level(options)
         status = command(options)
+        stop_if_signalled()
         if getattr(options, "verbose", False):
             _say_more(time.monotonic() - begin)
         return status
@@ -85,8 +90,6 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
     except KeyboardInterrupt:
         print("grasp: interrupted", file=sys.stderr)
         return 130
-    except SystemExit as stop:  # of argparse, which has said why
-        return stop.code if isinstance(stop.code, int) else 0
 
 
 def complete(parser: Callable[[Sequence[str]], argparse.ArgumentParser]) -> None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from grasp_ros.graph.stopping import stop_if_signalled
 from grasp_ros.scene.files import replacing, writing
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ def bar(total: float | None, unit: str, name: str) -> AbstractContextManager[Tol
 
 def show(options: argparse.Namespace, text: str, data: Any) -> None:
     """Print a result: its text, or with `--json` its data; on the standard error if a file goes to the output."""
+    stop_if_signalled()
     shown = json.dumps(plain(data), indent=1, ensure_ascii=False) if options.json else text
     print(shown, file=sys.stderr if getattr(options, "output", None) == STDOUT else sys.stdout)
 
@@ -65,6 +67,7 @@ def plain(data: Any) -> Any:
 @contextmanager
 def destination(path: Path) -> Iterator[BinaryIO]:
     """The file of `-o`, see `scene.files.replacing`, or the standard output for `-`."""
+    stop_if_signalled()
     if path != STDOUT:
         with replacing(path) as file:
             yield file

@@ -20,6 +20,7 @@ STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 GRACE_SECONDS = 10.0  # to end cleanly after a signal, or after the process that started this one has ended
 MOST_WORDS = 4000  # characters
 PR_SET_PDEATHSIG = 1  # of prctl(2)
+_raised: list[int] = []  # signals that `raise_on_signals` has turned into an exception
 _parent: list[int] = []  # file descriptor of the way to the process that started this one, if it is one of ours
 
 
@@ -61,18 +62,32 @@ def _end_late(name: str) -> None:
 def raise_on_signals() -> None:
     """Let every signal that ends a process be a KeyboardInterrupt, so that files are closed and parts removed.
 
-    Processes that are forked from this one have the system's own reactions again.
+    Where Python cannot let an exception pass, in the end of an object or in a callback of C, it prints and drops it:
+    `stop_if_signalled` raises it again. Processes that are forked from this one have the system's own reactions again.
     """
-    changed = [number for number in STOP_SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
+    before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
+    changed = [number for number in before if before[number] in (signal.SIG_DFL, signal.default_int_handler)]
     for number in changed:
-        signal.signal(number, signal.default_int_handler)
+        signal.signal(number, _interrupt)
 
     def give_back() -> None:
         for number in changed:
-            signal.signal(number, signal.SIG_DFL)
+            signal.signal(number, before[number])
 
+    _raised.clear()
     if changed:
         os.register_at_fork(after_in_child=give_back)
+
+
+def _interrupt(number: int, _: object) -> None:
+    _raised.append(number)
+    raise KeyboardInterrupt
+
+
+def stop_if_signalled() -> None:
+    """Raise the KeyboardInterrupt of a signal that came, if it has been dropped; before results are written, say."""
+    if _raised:
+        raise KeyboardInterrupt
 
 
 def tell_parent(node: str, why: str) -> None:

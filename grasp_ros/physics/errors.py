@@ -18,6 +18,11 @@ def place_of(error: BaseException) -> str:
     return f"{place.filename}, line {place.lineno}"
 
 
+def described(error: BaseException) -> str:
+    """What went wrong in somebody else's code, and where: "ValueError: words, file, line n"."""
+    return ": ".join(filter(None, [type(error).__name__, str(error)])) + f", {place_of(error)}"
+
+
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package
     """Input that is refused: names what, its value and what is allowed.
 

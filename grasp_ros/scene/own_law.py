@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros.physics.control import Law
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.sight import CALLABLE, asked
 
 
@@ -30,7 +30,7 @@ def find_law(place: str, what: str) -> Law | type:
         If the words have another form, the module cannot be imported, or what they name is not there or cannot be
         called.
     """
-    if not all(place.partition(":")):
+    if not all(place.partition(":")) or place.startswith("."):
         raise Refused(f"{what} is not allowed; allowed: module:object")
     module, _, name = place.partition(":")
     if (here := str(Path.cwd())) not in sys.path:
@@ -44,6 +44,8 @@ def find_law(place: str, what: str) -> Law | type:
                       " installed") from None
     except (ImportError, SyntaxError) as error:
         raise Refused(f"{what}: {module} cannot be imported: {error}") from None
+    except (Exception, SystemExit) as error:
+        raise Refused(f"{what}: {module} cannot be imported: {described(error)}") from error
     try:
         law: Any = reduce(getattr, name.split("."), holder)
     except AttributeError:
@@ -66,7 +68,8 @@ def begin(law: Law | type, what: str) -> Law:
     Raises
     ------
     Refused
-        If it cannot be called with what `physics.sight.asked` says, or is a class that cannot be called without.
+        If it cannot be called with what `physics.sight.asked` says, is a class that cannot be called without, or does
+        not begin.
     """
     begun: Any = law
     if isinstance(law, type):
@@ -75,9 +78,13 @@ def begin(law: Law | type, what: str) -> Law:
         except (TypeError, ValueError) as error:
             raise Refused(f"{what}: {law.__name__}: {error}; allowed: a class that is called without arguments, or an"
                           " object") from None
-        begun = law()
-    elif hasattr(law, "reset"):
-        law.reset()
+    try:
+        if isinstance(law, type):
+            begun = law()
+        elif hasattr(law, "reset"):
+            law.reset()
+    except (Exception, SystemExit) as error:
+        raise Refused(f"{what}: {law!r} does not begin: {described(error)}") from error
     if not callable(begun):
         raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")
     try:

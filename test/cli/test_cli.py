@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from grasp_ros import scene, simulation
 from grasp_ros.cli.commands import COMMANDS
@@ -44,6 +45,78 @@ def test_simulate_with_a_controller_of_a_module_here(command: Any, tmp_path: Pat
     assert loaded.controllers == {"left": "laws:soft"}
     expected = simulation.simulate(scene.load("case_01", ["time.duration_s=1"]), sampled=True)
     assert loaded.state.tobytes() == expected.state.tobytes()
+
+
+BROKEN = """
+import sys
+def end(tick, time, x, v): sys.exit()
+def close(tick, time, x, v): raise GeneratorExit
+def write(tick, time, x, v): raise BrokenPipeError
+def fill(tick, time, x, v): raise OSError(28, "No space left")
+class Fails:
+    def __init__(self): raise ValueError("words")
+class Ends:
+    def reset(self): sys.exit()
+    def __call__(self, tick, time, x, v): return 0.0
+again = Ends()
+"""
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        ("broken_laws:end", "left controller broken_laws:end: SystemExit, .*line 3, tick 0"),
+        ("broken_laws:close", "left controller broken_laws:close: GeneratorExit, .*line 4, tick 0"),
+        ("broken_laws:Fails", "Fails'> does not begin: ValueError: words, .*line 8"),
+        ("broken_laws:again", "does not begin: SystemExit, .*line 10"),
+        ("divides_by_0:law", "divides_by_0 cannot be imported: ZeroDivisionError: division by zero, .*line 1"),
+        ("ends_at_once:law", "ends_at_once cannot be imported: SystemExit: 0, .*line 1"),
+        ("./broken_laws:end", "left=./broken_laws:end is not allowed; allowed: module:object"),
+    ],
+)
+def test_a_controller_that_ends_or_does_not_begin_is_refused(
+    law: str, words: str, command: Any, tmp_path: Path
+) -> None:
+    _write_modules(tmp_path)
+    result = command("simulate", "arm_alone", "--controller", f"left={law}", "-o", "o.npz")
+    assert (result.returncode, result.stdout) == (2, "")
+    assert re.search(words, result.stderr), result.stderr
+    assert not (tmp_path / "o.npz").exists()
+
+
+@pytest.mark.parametrize("law", ["write", "fill"])
+def test_what_a_controller_raises_is_no_error_of_the_output(law: str, command: Any, tmp_path: Path) -> None:
+    _write_modules(tmp_path)
+    with pytest.raises(OSError, match="laws:") as raised:
+        command("simulate", "arm_alone", "--controller", f"left=broken_laws:{law}", "-o", "o.npz")
+    assert raised.value.__notes__ == [f"left controller broken_laws:{law}, tick 0, t = 0.0 s"]
+    assert not (tmp_path / "o.npz").exists()
+
+
+def _write_modules(folder: Path) -> None:
+    for name, text in (("broken_laws", BROKEN), ("divides_by_0", "1 / 0"), ("ends_at_once", "raise SystemExit(0)")):
+        (folder / f"{name}.py").write_text(text)
+
+
+DROPPED = """
+import os, signal, sys
+from grasp_ros.cli import simulate
+from grasp_ros.cli.main import main
+class Last:
+    def __del__(self): os.kill(os.getpid(), signal.{signal})
+prepare = simulate.prepare
+simulate.prepare = lambda: (Last(), prepare())
+sys.exit(main(["simulate", "arm_alone", "-o", "o.npz"]))
+"""
+
+
+@pytest.mark.parametrize("signal", ["SIGINT", "SIGTERM"])
+def test_a_signal_whose_exception_python_drops_stops_the_command_all_the_same(signal: str, tmp_path: Path) -> None:
+    result = subprocess.run([sys.executable, "-c", DROPPED.format(signal=signal)], cwd=tmp_path, capture_output=True,
+                            text=True, timeout=60, check=False)
+    assert (result.returncode, result.stdout) == (130, "")
+    assert result.stderr.endswith("grasp: interrupted\n")
+    assert not (tmp_path / "o.npz").exists()
 
 
 def test_an_interrupt_within_exec_is_an_exit_status_too(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from numba.core.types import float64, int64
 from numba.extending import intrinsic, is_jitted
 
 from grasp_ros.physics.control import Law
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.sight import Sight, asked
 
 SIGNATURE = float64(int64, float64, float64, float64)
@@ -136,6 +136,8 @@ class Foreign:
                 error = again
         if error is None:
             return Refused(f"{self._side} controller {self.name}: no finite command at tick {tick}, t = {time!r} s")
-        if not isinstance(error, Refused):
+        if isinstance(error, (SystemExit, GeneratorExit)):  # which would end who called us, as if all were done
+            error = Refused(f"{self._side} controller {self.name}: {described(error)}, tick {tick}, t = {time!r} s")
+        elif not isinstance(error, Refused):
             error.add_note(f"{self._side} controller {self.name}, tick {tick}, t = {time!r} s")
         return error
