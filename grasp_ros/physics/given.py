@@ -22,6 +22,8 @@ SECOND = np.timedelta64(1, "s")
 
 def plain(value: Any) -> int | float | None:
     """A real number as int or float; None for anything else."""
+    if type(value) in (int, float):  # most are: the abstract classes of numbers are slow
+        return value  # type: ignore[no-any-return]
     if isinstance(value, (bool, np.bool_, np.timedelta64)):
         return None
     if isinstance(value, Integral):
