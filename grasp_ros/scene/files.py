@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
+from tokenize import TokenError
 from typing import BinaryIO
 from zipfile import BadZipFile
 
@@ -16,7 +17,8 @@ from grasp_ros.physics.errors import Refused
 TEXT_BYTES = 2**20  # of a scene or of the metadata of a bag
 DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that were damaged at random
     OSError, EOFError, MemoryError, ValueError, TypeError, LookupError, OverflowError, RuntimeError, struct.error,
-    zlib.error, BadZipFile,
+    zlib.error, BadZipFile, SystemError,  # the last one for a text beyond Unicode
+    SyntaxError, TokenError,  # headers of numpy are literals of Python
 )
 
 
