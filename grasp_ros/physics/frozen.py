@@ -16,7 +16,7 @@ def frozen(value: Any) -> Any:
         view = value.view()
         view.setflags(write=False)
         return view
-    if hasattr(value, "keys"):  # a mapping; to ask for its abstract class would cost a run a tenth of its time
+    if hasattr(value, "items"):  # a mapping; to ask for its abstract class would cost a short run a tenth
         return MappingProxyType({key: frozen(entry) for key, entry in value.items()})
     if isinstance(value, tuple) and hasattr(value, "_fields"):
         return type(value)(*map(frozen, value))
