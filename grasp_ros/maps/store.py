@@ -1,8 +1,8 @@
 """The file of a map: a Zarr group, which xarray opens, and which a computation fills chunk by chunk.
 
-Each chunk of each column is a file of its own, which appears under its name when it is whole. The mark of a chunk is
-written last, so that a computation that was killed, or whose disk is full, has lost at most the chunks that nobody
-had marked; the same command goes on with the rest. A NetCDF file would be damaged as a whole.
+Each chunk of each column is a file of its own, which appears under its name when it is whole. A chunk is done when all
+of its files are there, so that a computation that was killed, or whose disk is full, has lost at most the chunk that it
+was writing; the same command goes on with the rest. A NetCDF file would be damaged as a whole.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ import numpy as np
 
 from grasp_ros.maps.plan import Plan
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.files import decoding, writing
+from grasp_ros.scene.files import decoding, replaced, writing
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import STATUSES, Chunk
 from grasp_ros.simulation.ensemble import Span
 from grasp_ros.simulation.outcomes import find
 
-FORMAT, MARKS, STATUS = "grasp_ros map", "done", "status"
+FORMAT, STATUS, NOT_DONE = "grasp_ros map", "status", -1
+ALL_FILES = {"array.write_empty_chunks": True}  # of zarr: by itself it leaves out chunks of which all is nan
 AGAIN = "what is done is kept: the same command goes on"
 
 
@@ -48,13 +49,12 @@ class Store:
     def __init__(self, path: Path, plan: Plan, rows: int) -> None:
         self.path, self.plan = path, plan
         wanted = json.loads(json.dumps(plan.to_document()))
-        if path.exists():
-            self._group = open_group(path, "r+")
-            self._check(wanted)
-        else:
-            with _writing(path):
-                self._group = _create(path, plan, wanted, rows)
-        self.chunk = int(self._group.attrs["chunk_rows"])
+        self._lines = plan.rows // plan.shape[0]
+        if not path.exists():
+            _create(path, plan, wanted, max(1, rows // self._lines))
+        self._group = open_group(path, "r+")
+        self._check(wanted)
+        self.chunk = self._group[STATUS].chunks[0] * self._lines
 
     def _check(self, wanted: dict[str, Any]) -> None:
         for what, own in (("plan", wanted), ("versions", versions())):
@@ -67,23 +67,23 @@ class Store:
     @property
     def spans(self) -> list[Span]:
         """Chunks that are still to be done, as their first row and the one behind their last."""
-        first: list[int] = (np.flatnonzero(self._group[MARKS][:] == 0) * self.chunk).tolist()
+        first = [i * self.chunk for i in _undone(self._group, self.path)]
         return [(row, min(row + self.chunk, self.plan.rows)) for row in first]
 
     def write(self, span: Span, chunk: Chunk) -> None:
-        """Write a chunk, and then its mark.
+        """Write a chunk.
 
         Raises
         ------
         Refused
             If it cannot be written; the chunk counts as not done.
         """
-        lines = self.plan.rows // self.plan.shape[0]
-        part = slice(span[0] // lines, span[1] // lines)
-        with _writing(self.path):
+        import zarr
+
+        part = slice(span[0] // self._lines, span[1] // self._lines)
+        with _writing(self.path), zarr.config.set(ALL_FILES):
             for name, values in {**chunk.columns, STATUS: chunk.status}.items():
                 self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
-            self._group[MARKS][span[0] // self.chunk] = 1
 
     @property
     def seconds(self) -> float:
@@ -96,30 +96,27 @@ class Store:
             self._group.attrs["seconds"] = self.seconds + seconds
 
 
-def _create(path: Path, plan: Plan, document: dict[str, Any], rows: int) -> Any:
+def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> None:
     """A new file: columns without values, coordinates, and all that the values depend on."""
     import zarr
 
-    lines = plan.rows // plan.shape[0]
-    height = max(1, rows // lines)
     names = ("row",) if plan.sample else tuple(axis.name for axis in plan.axes)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    group = zarr.create_group(path, zarr_format=3, attributes={
-        "format": FORMAT, "plan": document, "versions": versions(), "chunk_rows": height * lines,
-        "statuses": list(STATUSES), "seconds": 0.0,
-    })
-    chunks = (height, *plan.shape[1:])
-    for column in find(plan.setup.outcomes):
-        group.create_array(column.name, shape=plan.shape, chunks=chunks, dtype="f8", fill_value=np.nan,
-                           dimension_names=names, attributes={"units": column.unit, "long_name": column.text})
-    group.create_array(STATUS, shape=plan.shape, chunks=chunks, dtype="i1", fill_value=-1, dimension_names=names,
-                       attributes={"long_name": "-1: not done; otherwise a place in `statuses`"})
-    count = -(-plan.shape[0] // height)
-    group.create_array(MARKS, shape=(count,), chunks=(1,), dtype="u1", fill_value=0, dimension_names=("chunk",))
-    for i, axis in enumerate(plan.axes):
-        values = plan.variants(0, plan.rows).changes[axis.keys[0]] if plan.sample else axis.values
-        group.create_array(axis.name, data=values, dimension_names=(names[0] if plan.sample else names[i],))
-    return group
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    with replaced(path) as part, zarr.config.set(ALL_FILES):
+        group = zarr.create_group(part, zarr_format=3, attributes={
+            "format": FORMAT, "plan": document, "versions": versions(), "statuses": list(STATUSES), "seconds": 0.0})
+        packed = {"compressors": zarr.codecs.ZstdCodec(checksum=True)}
+        grid = {"shape": plan.shape, "chunks": (height, *plan.shape[1:]), "dimension_names": names, **packed}
+        for column in find(plan.setup.outcomes):
+            group.create_array(column.name, **grid, dtype="f8", fill_value=np.nan,
+                               attributes={"units": column.unit, "long_name": column.text})
+        group.create_array(STATUS, **grid, dtype="i1", fill_value=NOT_DONE,
+                           attributes={"long_name": f"{NOT_DONE}: not done; otherwise a place in `statuses`"})
+        for i, axis in enumerate(plan.axes):
+            values = plan.variants(0, plan.rows).changes[axis.keys[0]] if plan.sample else axis.values
+            name = names[0] if plan.sample else names[i]
+            group.create_array(axis.name, data=values, dimension_names=(name,), **packed)
 
 
 def open_group(path: Path, mode: str = "r") -> Any:
@@ -132,33 +129,57 @@ def open_group(path: Path, mode: str = "r") -> Any:
     """
     import zarr
 
-    with decoding(path, "a map"):
+    with decoding(path, "a map", also=(AttributeError,)):
         group = zarr.open_group(path, mode=mode, zarr_format=3)  # version 2 has arrays that are code
         if group.attrs.get("format") != FORMAT:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
-        parts = (MARKS, STATUS, *(axis["name"] for axis in group.attrs["plan"]["axes"]))
-        missing = [name for name in parts if not (path / name / "zarr.json").is_file()]
-        missing += [name for name in ("versions", "chunk_rows", "seconds") if name not in group.attrs]
+        missing = [name for name in (*_columns(group), *_axes(group)) if not (path / name / "zarr.json").is_file()]
+        missing += [name for name in ("versions", "seconds") if name not in group.attrs]
+        missing = missing or [name for name in _axes(group) if group[name].nchunks_initialized < group[name].nchunks]
         if missing:
             raise Refused(f"{path}: a damaged map: without {', '.join(missing)}; allowed: a whole one")
     return group
 
 
+def _columns(group: Any) -> list[str]:
+    return [*(column.name for column in find(group.attrs["plan"]["setup"]["outcomes"])), STATUS]
+
+
+def _axes(group: Any) -> list[str]:
+    return [axis["name"] for axis in group.attrs["plan"]["axes"]]
+
+
+def _undone(group: Any, path: Path) -> list[int]:
+    """Chunks that lack a file, by their number."""
+    status, names = group[STATUS], _columns(group)
+    keys = [status.metadata.encode_chunk_key((i, *[0] * (status.ndim - 1))) for i in range(status.cdata_shape[0])]
+    return [i for i, key in enumerate(keys) if not all((path / name / key).is_file() for name in names)]
+
+
 def read(path: str | os.PathLike[str]) -> Any:
-    """A map as an `xarray.Dataset`, with what is not done as nan.
+    """A map as an `xarray.Dataset`; a chunk that is not done, or lacks a file, is nan and has the status -1.
 
     Raises
     ------
     Refused
-        If it is no map.
+        If it is no map, or damaged.
     """
     import xarray
 
     path = Path(path)
     group = open_group(path)
-    data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)
-    data = data.drop_vars(MARKS)
-    return data.set_coords([axis["name"] for axis in group.attrs["plan"]["axes"]])
+    height, names = group[STATUS].chunks[0], _columns(group)
+    with decoding(path, "a map"):
+        data = xarray.open_zarr(path, consolidated=False, chunks=None, zarr_format=3)[[*names, *_axes(group)]]
+        for name in _axes(group):
+            data[name].load()
+    for name in names:
+        with decoding(path / name, "a whole column; delete its `c`, and the same command computes it again"):
+            data[name].load()
+    for i in _undone(group, path):
+        for name in names:
+            data[name].values[i * height : (i + 1) * height] = NOT_DONE if name == STATUS else np.nan
+    return data.set_coords(_axes(group))
 
 
 def columns_of(data: Any) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import struct
 import zlib
 from collections.abc import Iterator
@@ -97,7 +98,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """The name of a file, with the same ending, that takes the place of another one when it is whole.
+    """The name of a file or a directory, with the same ending, that takes the place of another when it is whole.
 
     Raises
     ------
@@ -110,7 +111,7 @@ def replaced(path: Path) -> Iterator[Path]:
             yield part
             part.replace(path.resolve())
         finally:
-            part.unlink(missing_ok=True)
+            shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
 
 
 def opened(target: str | os.PathLike[str] | BinaryIO) -> AbstractContextManager[BinaryIO]:

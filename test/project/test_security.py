@@ -111,16 +111,16 @@ def test_a_map_of_another_version_is_not_opened(tmp_path: Path) -> None:
     """Its arrays may name any codec, pickle among them."""
     zarr = pytest.importorskip("zarr")
     path = tmp_path / "a.zarr"
-    attributes = {"format": store.FORMAT, "plan": {"axes": []}, "versions": {}, "chunk_rows": 1, "seconds": 0.0}
+    attributes = {"format": store.FORMAT, "plan": {"axes": [], "setup": {"outcomes": []}}, "versions": {},
+                  "seconds": 0.0}
     zarr.create_group(path, zarr_format=2, attributes=attributes)
-    for name in (store.MARKS, store.STATUS):
-        (path / name).mkdir()
-        (path / name / "zarr.json").write_text("{}")
-        (path / name / ".zarray").write_text(json.dumps({
-            "chunks": [1], "compressor": {"id": "pickle"}, "dtype": "<f8", "fill_value": 0, "filters": None,
-            "order": "C", "shape": [1], "zarr_format": 2,
-        }))
-        (path / name / "0").write_bytes(pickle.dumps(Owner()))
+    (path / store.STATUS).mkdir()
+    (path / store.STATUS / "zarr.json").write_text("{}")
+    (path / store.STATUS / ".zarray").write_text(json.dumps({
+        "chunks": [1], "compressor": {"id": "pickle"}, "dtype": "<f8", "fill_value": 0, "filters": None,
+        "order": "C", "shape": [1], "zarr_format": 2,
+    }))
+    (path / store.STATUS / "0").write_bytes(pickle.dumps(Owner()))
     for door in (store.read, store.open_group):
         with pytest.raises(Refused, match=r"a\.zarr: not a map"):
             door(path)
