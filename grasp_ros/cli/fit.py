@@ -14,6 +14,7 @@ from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
 from grasp_ros.physics.errors import Refused, printable
+from grasp_ros.physics.given import read_number
 
 SCENE = ".yaml"
 
@@ -69,7 +70,7 @@ def _write(found: Fit, path: Path) -> None:
 def _value(text: str) -> tuple[str, float]:
     key, _, word = text.partition("=")
     try:
-        return key, float(word)
+        return key, read_number(word)
     except ValueError:
         raise Refused(f"--against {text}: allowed: KEY=VALUE, with a number") from None
 

@@ -25,6 +25,10 @@ def shortened(line: str, most: int = LONGEST) -> str:
 class Parser(argparse.ArgumentParser):
     """A parser of one command, or of `grasp` itself."""
 
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.register("type", float, _number)
+
     def error(self, message: str) -> NoReturn:
         """Print the usage of this command and one short line."""
         choice = re.fullmatch(r"argument (.*): invalid choice: '(.*?)' \(choose from (.*)\)", message, re.S)
@@ -44,6 +48,12 @@ class Parser(argparse.ArgumentParser):
             meant = f"; {_allowed(word, known)}" if word.startswith("-") else ""
             parser.error(f"unrecognized arguments: {' '.join(rest)}{meant}")
         return options
+
+
+def _number(word: str) -> float:
+    from grasp_ros.physics.given import read_number
+
+    return read_number(word)
 
 
 def _allowed(word: str, known: list[str]) -> str:

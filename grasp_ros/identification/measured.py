@@ -18,6 +18,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import reading
+from grasp_ros.scene.suggestion import allowed
 from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
 from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
@@ -114,6 +115,9 @@ def _of_table(path: Path, scene: Scene) -> Measured:
     if time not in columns or not any(name in columns for name in CHANNELS):
         raise Refused(f"{path}: columns {', '.join(columns)}; allowed: {time} and at least one of"
                       f" {', '.join(CHANNELS)}")
+    for name in columns:
+        if name not in HEADS.values():
+            raise Refused(f"{path}: column {name!r}: not known; {allowed(name, [*HEADS.values()])}")
     t = columns[time]
     missing = np.full(len(t), np.nan)
     state = np.stack([columns.get(name, missing) for name in CHANNELS], axis=1)
@@ -128,7 +132,7 @@ def _of_table(path: Path, scene: Scene) -> Measured:
 def _columns(path: Path) -> Mapping[str, Array]:
     """Numbers (n,) by the names in the first line; NaN where nothing stands."""
     with reading(path):
-        names, *lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines()] or [[""]]
+        names, *lines = [line.split(",") for line in path.read_text(encoding="utf-8-sig").splitlines()] or [[""]]
     if len({*names}) < len(names):
         raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
     rows = []
@@ -136,7 +140,7 @@ def _columns(path: Path) -> Mapping[str, Array]:
         if len(line) != len(names):
             raise Refused(f"{path}: line {number}: {len(line)} entries; allowed: {len(names)}")
         try:
-            rows.append([float(word.strip() or "nan") for word in line])
+            rows.append([given.read_number(word.strip() or "nan") for word in line])
         except ValueError as error:
             raise Refused(f"{path}: line {number}: {error}; allowed: numbers") from None
     return dict(zip(map(str.strip, names), np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
@@ -160,6 +164,10 @@ def _checked(found: Measured) -> Measured:
             raise Refused(f"{name}: {channel}: {found.scene.name} has no such body")
     if not found.channels:
         raise Refused(f"{name}: no state is measured")
+    for kind, part in (("positions", 0), ("velocities", 1)):
+        places = [place for place in found.channels if place % 2 == part]
+        if places and not np.ptp(found.state[:, places], axis=0).any():
+            raise Refused(f"{name}: {kind} do not change; allowed: a motion, or no such columns")
     if found.inputs is not None and not np.isfinite(found.inputs).all():
         raise Refused(f"{name}: inputs are missing; allowed: a number for every control period")
     return found

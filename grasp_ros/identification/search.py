@@ -28,7 +28,7 @@ GOOD = 4.0  # mean square of residuals, in those of the noise, above which a sea
 ROUGH, FINE = 1e-3, 1e-6  # relative change of the sum of squares at which a search ends, on the way and at last
 SHORTEST = 1e-10  # step of y, relative
 MOST = 30  # motions of one horizon
-FLOOR = 1e-9  # of the spread of a channel: the least noise
+FLOOR = 1e-9  # of the largest spread of the positions, or of the velocities: the least noise
 
 
 class Problem(NamedTuple):
@@ -181,8 +181,8 @@ def residual_noise(data: Measured, fitted: Array) -> Array:
 
 
 def _at_least(noise: Array, data: Measured) -> Array:
-    least: Array = np.maximum(FLOOR * np.ptp(data.state, axis=0), np.finfo(float).tiny)
-    return np.asarray(np.maximum(noise, least))
+    spread = np.fmax.reduce(np.ptp(data.state, axis=0).reshape(3, 2))
+    return np.asarray(np.maximum(noise, FLOOR * np.tile(spread, 3)))
 
 
 def fitted(problem: Problem) -> tuple[Problem, Array]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import number, whole
+from grasp_ros.physics.given import number, read_number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup, checked
@@ -70,7 +70,7 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
     if points and not grid:
         raise Refused(f"{option} {text}: there is no grid of {points} values; allowed: low:high, and ::log behind it")
     try:
-        axis = Axis(name, float(low), float(high), int(points or POINTS), log == LOG)
+        axis = Axis(name, read_number(low), read_number(high), int(points or POINTS), log == LOG)
     except ValueError:
         raise Refused(f"{option} {text}: not understood; {allowed}") from None
     finite = math.isfinite(axis.low) and math.isfinite(axis.high)

@@ -14,6 +14,7 @@ from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.plan import check as check_plan
 from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import read_number
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup, check
@@ -107,7 +108,7 @@ def read_bound(text: str) -> Bound:
     """
     name, sign, most = re.sub(r"\s", "", text).partition("<=")
     try:
-        bound = Bound(name, float(most))
+        bound = Bound(name, read_number(most))
     except ValueError:
         bound = Bound(name, math.nan)
     if not sign or not math.isfinite(bound.most):

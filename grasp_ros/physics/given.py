@@ -49,6 +49,19 @@ def number(name: str, value: Any) -> float:
     return float(found)
 
 
+def read_number(text: str) -> float:
+    """A number from a text.
+
+    Raises
+    ------
+    ValueError
+        If it is none, 1_0 among them, which Python takes.
+    """
+    if "_" in text:
+        raise Refused(f"could not convert string to float: {text!r}")
+    return float(text)
+
+
 def whole(name: str, value: Any, low: int) -> int:
     """A whole number >= low; 1e7 is one.
 

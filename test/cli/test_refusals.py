@@ -59,6 +59,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate arm_alone --controller right=math:hypot", "'right' is not allowed; allowed: left"),
         ("simulate case_01 --method rk4 --controller left=math:hypot", "rk4: "),
         ("accuracy case_01 --error x", "argument --error: invalid float value: 'x'"),
+        ("accuracy case_01 --error 1_0", "argument --error: invalid float value: '1_0'"),
         ("simulate nowhere", "nowhere: no such scene; allowed: a path that ends in .yaml, or one of case_01"),
         ("simulate nowhere.yaml", "nowhere.yaml: no such file"),
         (f"simulate {LONG}.yaml", "cannot be read: File name too long"),

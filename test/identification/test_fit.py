@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -102,6 +103,13 @@ def test_what_the_data_do_not_show_is_named(command: Any) -> None:
     assert data["numbers"][P_LEFT]["low"] < 0.1 < data["numbers"][P_LEFT]["high"]
     assert data["numbers"][gain]["high"] is None
     assert f"{fit('run.csv', [stiffness, gain, P_LEFT], load('case_01'))}\n" == result.stdout
+
+
+def test_a_sensor_that_stands_still_beside_others_is_no_fault(tmp_path: Path, command: Any) -> None:
+    """As a spreadsheet writes it, with the mark of its encoding."""
+    (tmp_path / "data.csv").write_text(ROWS, encoding="utf-8-sig")
+    result = command("fit", "data.csv", "--scene", "case_01", "--free", "object.position_m")
+    assert (result.returncode, result.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("loop", [(), ("loop={}",)])
@@ -208,9 +216,14 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     (ROWS.replace("0.02,", "0.2,"), ("--scene", "case_01", "--free", P_LEFT), "allowed: ascending from 0 to 20 s"),
     ("\n".join(ROWS.splitlines()[:10]), ("--scene", "case_01", "--free", P_LEFT), "samples; allowed: at least 10"),
     ("", ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
+    (ROWS.replace("x_object_m", "x_objekt_m"), ("--scene", "case_01", "--free", P_LEFT),
+     "column 'x_objekt_m': not known; did you mean x_object_m?"),
+    (ROWS.replace("-0.298,", "1_0.0,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
+    (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=1_0"), "allowed: KEY=VALUE, with a number"),
+    (re.sub(r"-0\.\d+", "0", ROWS), ("--scene", "case_01", "--free", P_LEFT), "positions do not change; allowed: a"),
     (ROWS, ("--scene", "arm_alone", "--free", "left_arm.mass_kg"), "x_object_m: arm_alone has no such body"),
     (HELD, ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "not the ticks of case_01, every 0.001 s"),
-], ids=range(20))
+], ids=range(24))
 def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
     (tmp_path / "data.csv").write_text(content)
     result = command("fit", "data.csv", *words)
