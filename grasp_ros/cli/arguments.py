@@ -63,14 +63,22 @@ def add_accuracy(sub: Options) -> None:
     )
 
 
-def add_output(sub: Options, metavar: str, text: str, default: Path | None = None) -> None:
+def named(word: str) -> Path:
+    """A path that is no standard output."""
+    if word in ("", "-"):
+        raise argparse.ArgumentTypeError(f"{word!r} is not allowed; allowed: a name")
+    return Path(word)
+
+
+def add_output(sub: Options, metavar: str, text: str, default: Path | None = None,
+               kind: Callable[[str], Path] = named) -> None:
     """A file or a directory to write."""
-    sub.add_argument("-o", "--output", type=Path, default=default, metavar=metavar, help=text)
+    sub.add_argument("-o", "--output", type=kind, default=default, metavar=metavar, help=text)
 
 
 def add_file(sub: Options, metavar: str, text: str) -> None:
-    """A file to write, and whether one that is there may be replaced."""
-    add_output(sub, metavar, text)
+    """A file to write, or - for the standard output, and whether one that is there may be replaced."""
+    add_output(sub, metavar, text, kind=Path)
     sub.add_argument("--force", action="store_true", help="replace the output file if it is there")
 
 

@@ -70,7 +70,7 @@ def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.graph.comparison import compare_recording
     from grasp_ros.graph.summary import summary, verified
 
-    check_output(options.output, options.force, [options.bag])
+    check_output(options.output, (".csv",), options.force, [options.bag])
     recording = bag.read(options.bag)
     warn(recording.scene)
     found = summary(recording)

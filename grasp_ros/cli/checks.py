@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.output import STDOUT, note
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import writing
+from grasp_ros.scene.files import format_of, writing
 
 ROW = 16  # numbers that a run keeps for each output time: time, state, commands, energies, and copies
 
@@ -31,8 +31,10 @@ def warn(scene: Scene) -> None:
         note(f"grasp: warning: {scene.name}: {warning}")
 
 
-def check_output(output: Path | None, force: bool, inputs: Sequence[str] = ()) -> None:
-    """Refuse to write over what is there, or where no directory is, before the work; over an input in any case.
+def check_output(output: Path | None, endings: Collection[str], force: bool, inputs: Sequence[str] = ()) -> None:
+    """Refuse another format, to write over what is there, or where no directory is, before the work.
+
+    An input is not written over in any case.
 
     None: nothing is to be written.
 
@@ -43,6 +45,7 @@ def check_output(output: Path | None, force: bool, inputs: Sequence[str] = ()) -
     """
     if output is None or output == STDOUT:
         return
+    format_of(output, endings)
     with writing(output):
         if not (output.is_file() or output.is_dir()):
             output.parent.stat()

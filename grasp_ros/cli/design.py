@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
-from grasp_ros.cli.output import bar, image_format, show, write_figure, write_scene
+from grasp_ros.cli.output import bar, images, show, write_figure, write_scene
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS
 
 if TYPE_CHECKING:
@@ -51,10 +52,8 @@ def _design(options: argparse.Namespace) -> int:
     setup = Setup(accuracy=options.accuracy, sampled=options.sampled)
     problem = Problem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
                       [read_bound(text) for text in options.bounds], setup)
-    for path in (options.output, options.figure):
-        check_output(path, options.force, [options.scene])
-    if options.figure is not None:
-        image_format(options.figure)
+    check_output(options.output, YAML, options.force, [options.scene])
+    check_output(options.figure, images(), options.force, [options.scene])
     several = len(options.minimise) == 2
     if several and options.output is not None:
         raise Refused("-o: allowed: with one --minimise, which has one best choice; the table has the numbers of all")

@@ -9,14 +9,13 @@ from typing import Any
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
 from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
-from grasp_ros.cli.output import image_format, show, write_figure, write_scene
+from grasp_ros.cli.output import images, show, write_figure, write_scene
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
 from grasp_ros.physics.errors import Refused, printable
 from grasp_ros.physics.given import read_number
-
-SCENE = ".yaml"
+from grasp_ros.scene.files import YAML
 
 
 def add_to(commands: Any) -> None:
@@ -39,9 +38,7 @@ def add_to(commands: Any) -> None:
 
 
 def _fit(options: argparse.Namespace) -> int:
-    check_output(options.output, options.force, [options.source])
-    if options.output is not None and options.output.suffix != SCENE:
-        image_format(options.output)
+    check_output(options.output, (*YAML, *images()), options.force, [options.source])
     scene = None
     if options.scene is not None:
         scene = load_scene(options.scene, options.settings)
@@ -59,7 +56,7 @@ def _fit(options: argparse.Namespace) -> int:
 
 
 def _write(found: Fit, path: Path) -> None:
-    if path.suffix == SCENE:
+    if path.suffix.lower() in YAML:
         write_scene(found.scene, path)
         return
     from grasp_ros.identification.figure import measured_and_fitted

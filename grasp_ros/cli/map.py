@@ -15,6 +15,7 @@ from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import format_of
 from grasp_ros.simulation.chunk import STATUSES, Setup
 from grasp_ros.simulation.outcomes import GROUPS, find
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED
@@ -68,6 +69,7 @@ def _run(options: argparse.Namespace) -> int:
     from grasp_ros.maps.run import run
 
     scene = load_scene(options.scene, options.settings)
+    format_of(options.output, [".zarr"])
     given = [("--y", options.y), ("--x", options.x), *(("--vary", text) for text in options.vary)]
     axes = tuple(read_axis(option, text, grid=not options.sample) for option, text in given if text is not None)
     if options.vary and not options.sample:

@@ -85,22 +85,16 @@ def write_scene(scene: Scene, path: Path) -> None:
         file.write(scene.to_yaml().encode())
 
 
-def image_format(path: Path) -> str:
-    """Format of the figure of `-o`, before the work; PNG on the standard output.
+def images() -> list[str]:
+    """Endings of figures."""
+    from grasp_ros.simulation.canvas import formats
 
-    Raises
-    ------
-    Refused
-        See `simulation.plots.format_of`.
-    """
-    from grasp_ros.simulation.plots import format_of
-
-    return "png" if path == STDOUT else format_of(path)
+    return formats()
 
 
 def write_figure(figure: Any, path: Path) -> None:
-    """A figure into the file of `-o`."""
+    """A figure into the file of `-o`; PNG on the standard output."""
     from grasp_ros.simulation.plots import write
 
     with destination(path) as file:
-        write(figure, file, image_format(path))
+        write(figure, file, ".png" if path == STDOUT else path.suffix.lower())

@@ -11,12 +11,13 @@ import numpy as np
 
 from grasp_ros.cli.arguments import add_command, add_file, add_settings
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
-from grasp_ros.cli.output import STDOUT, image_format, note, write_figure
+from grasp_ros.cli.output import STDOUT, images, note, write_figure
 from grasp_ros.cli.sensitivity import sensitivity_panels
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
+from grasp_ros.simulation.animation import WRITERS, animate
 from grasp_ros.simulation.tables import Motion
 
 Span = tuple[float, float] | None
@@ -48,11 +49,9 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
-    check_output(output, options.force, options.sources)
+    check_output(output, WRITERS if options.animate else images(), options.force, options.sources)
     if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
-    if not options.animate:
-        image_format(output)
     motions = [_motion(source, options, span) for source in options.sources]
     if span is not None:
         longest = max(motion.scene.duration for motion in motions)
@@ -62,8 +61,6 @@ def _plot(options: argparse.Namespace) -> int:
             raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
         span = span[0], min(span[1], longest)
     if options.animate:
-        from grasp_ros.simulation.animation import animate
-
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")
         return 0

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
 from grasp_ros.cli.checks import check_output, load_scene
-from grasp_ros.cli.output import STDOUT, destination, show
+from grasp_ros.cli.output import destination, show
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.commented import commented
+from grasp_ros.scene.files import YAML
 from grasp_ros.scene.library import text_of
 
 DEFAULT = "case_01"
@@ -50,9 +50,7 @@ def _new(options: argparse.Namespace) -> int:
     if (options.file is None) == (options.output is None):
         raise Refused("new: allowed: one FILE.yaml to write, or -o - for the standard output")
     output: Path = options.file or options.output
-    if output != STDOUT and not re.fullmatch(r".+\.ya?ml", output.name):
-        raise Refused(f"{output}: is not allowed; allowed: a name that ends in .yaml")
-    check_output(output, options.force)
+    check_output(output, YAML, options.force)
     text = commented(load_scene(options.like, options.settings))
     with destination(output) as file:
         file.write(text.encode())

@@ -70,7 +70,7 @@ def _simulate(options: argparse.Namespace) -> int:
     check_memory(scene, sampled, options.grid)
     if options.sensitivity and (controllers or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: --method {EXACT}, without --controller")
-    check_output(options.output, options.force, [options.scene])
+    check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
     with bar(scene.duration, "s", scene.name) as told:
@@ -93,9 +93,9 @@ def _simulate(options: argparse.Namespace) -> int:
 
 
 def _write(trajectory: Trajectory, path: Path) -> None:
-    """As a table, .csv, or with all that belongs to it, .npz, whatever else the ending is."""
+    """As a table, .csv, or with all that belongs to it, .npz."""
     with destination(path) as file:
-        if path == STDOUT or path.suffix == ".csv":
+        if path == STDOUT or path.suffix.lower() == ".csv":
             trajectory.to_csv(file)
         else:
             trajectory.save(file)

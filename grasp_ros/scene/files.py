@@ -6,7 +6,7 @@ import os
 import shutil
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tokenize import TokenError
@@ -15,6 +15,7 @@ from zipfile import BadZipFile
 
 from grasp_ros.physics.errors import Refused
 
+YAML = (".yaml", ".yml")  # endings of scenes
 TEXT_BYTES = 2**20  # of a scene or of the metadata of a bag
 DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that were damaged at random
     OSError, EOFError, MemoryError, ValueError, TypeError, LookupError, OverflowError, RuntimeError, struct.error,
@@ -75,6 +76,20 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
         raise refusal(f"{path}: is there; allowed: a new directory") from None
     except OSError as error:
         raise refusal(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
+    """The ending of a file that is to be written, in small letters: it decides the format.
+
+    Raises
+    ------
+    Refused
+        If it is none of those that are allowed.
+    """
+    ending = Path(path).suffix.lower()
+    if ending not in allowed:
+        raise Refused(f"{path}: {ending or 'no ending'} is not allowed; allowed: {', '.join(allowed)}")
+    return ending
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from grasp_ros.scene.changes import texts_of_changed
 from grasp_ros.scene.effects import BY_SECTION, build, named
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
-from grasp_ros.scene.files import read_text, reading
+from grasp_ros.scene.files import YAML, read_text, reading
 from grasp_ros.scene.html import numbers_of, table
 from grasp_ros.scene.library import names, text_of
 from grasp_ros.scene.settings import apply
@@ -219,7 +219,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
     """
     reference, settings = os.fspath(reference), [settings] if isinstance(settings, str) else settings
     path = Path(reference)
-    if path.suffix in (".yaml", ".yml"):
+    if path.suffix in YAML:
         with reading(reference, SceneError):
             if not path.is_file():
                 raise SceneError(f"{reference}: no such file")

@@ -15,7 +15,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.physics.system import COLUMN
-from grasp_ros.scene.files import replaced
+from grasp_ros.scene.files import format_of, replaced
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.plots import COLORS, MM
@@ -81,9 +81,7 @@ def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Ar
 
 def _writer(path: Path) -> str:
     """The writer of matplotlib for a file."""
-    name = WRITERS.get(path.suffix.lower())
-    if name is None:
-        raise Refused(f"{path}: {path.suffix or 'no ending'} is not allowed; allowed: {', '.join(WRITERS)}")
+    name = WRITERS[format_of(path, WRITERS)]
     if not writers.is_available(name):
         raise Refused(f"{path}: needs the program {name}, which is not installed; allowed without: .gif, .html")
     return name

@@ -47,7 +47,7 @@ def style(own: Mapping[str, Any] | None = None) -> Iterator[None]:
 
 def formats() -> list[str]:
     """Endings of the files that can be written."""
-    return sorted(FigureCanvasAgg.get_supported_filetypes())
+    return sorted(f".{name}" for name in FigureCanvasAgg.get_supported_filetypes())
 
 
 def figure(**settings: Any) -> Figure:

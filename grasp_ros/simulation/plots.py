@@ -16,7 +16,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import PAPER
-from grasp_ros.scene.files import replacing
+from grasp_ros.scene.files import format_of, replacing
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.quantities import contact_intervals
@@ -229,27 +229,11 @@ def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> None:
     Raises
     ------
     Refused
-        If the path has no ending, matplotlib does not know the format, or the file cannot be written.
+        If matplotlib does not know the format, or the file cannot be written.
     """
-    ending = format_of(path)
+    ending = format_of(path, canvas.formats())
     with replacing(path) as file:
         write(figure, file, ending, dpi)
-
-
-def format_of(path: str | os.PathLike[str]) -> str:
-    """Format of an image file, by its ending.
-
-    Raises
-    ------
-    Refused
-        If the path has no ending, or matplotlib does not know the format.
-    """
-    known, ending = canvas.formats(), Path(path).suffix.removeprefix(".").lower()
-    if not ending:
-        raise Refused(f"{path}: no ending; allowed: one of {', '.join(known)}")
-    if ending not in known:
-        raise Refused(f"{path}: {ending} is not allowed; allowed: {', '.join(known)}")
-    return ending
 
 
 def write(figure: Figure, file: BinaryIO, ending: str, dpi: int = 150) -> None:
@@ -262,7 +246,7 @@ def write(figure: Figure, file: BinaryIO, ending: str, dpi: int = 150) -> None:
     """
     try:
         with canvas.style():
-            figure.savefig(file, format=ending, dpi=dpi)
+            figure.savefig(file, format=ending[1:], dpi=dpi)
     except RuntimeError as error:  # a .pgf where there is no TeX
         raise Refused(f"{ending}: {error}") from None
 

@@ -72,7 +72,7 @@ def test_help_is_there_at_once() -> None:
         ("simulate case_01 --set zzz.qqq=1", "no such key; allowed: time.duration_s, "),
         ("map case_01 --x left_arm.mass=1:2 -o m.zarr", "did you mean left_arm.mass_kg?"),
         ("new", "new: allowed: one FILE.yaml to write"),
-        ("new mine.txt", "mine.txt: is not allowed; allowed: a name that ends in .yaml"),
+        ("new mine.txt", "mine.txt: .txt is not allowed; allowed: .yaml, .yml"),
     ],
 )
 def test_a_refusal_is_short_and_says_what_was_meant(command: Any, words: str, complaint: str) -> None:

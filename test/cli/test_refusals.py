@@ -28,11 +28,12 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "merge.yaml": b"<<: {title: x}\n", "date.yaml": b"title: 2001-13-45\n",
         "digits.yaml": b"title: x\nreadings: " + b"1" * 5000, "empty.npz": b"", "nomarks.md": b"x", "bytes.md": b"\xff",
         "keys/journal.jsonl": b'{"a": 1}\n', "list/journal.jsonl": b"[]\n", "bytes/journal.jsonl": b"\xff\n",
-        "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
+        "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000, "there.npz/x": b"",
     }.items():
         Path(name).parent.mkdir(exist_ok=True)
         Path(name).write_bytes(content)
     np.savez("other.npz", a=1)
+    Path("full.npz").symlink_to("/dev/full")
     Path("circle.yaml").symlink_to("circle.yaml")
     return tmp_path
 
@@ -89,11 +90,21 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 --method paper --tolerance 1", "--tolerance is not allowed; allowed for paper: --step"),
         ("simulate case_01 --method rk4 --accuracy 1e-8", "--accuracy is not allowed; allowed for rk4: --step"),
         ("simulate hammer --method rk4", "hammer: lacks right_arm, right_contact, right_feedback: rk4 knows"),
-        ("simulate case_01 -o .", ".: cannot be written: Is a directory"),
+        ("simulate case_01 -o there.npz", "there.npz: cannot be written: Is a directory"),
+        ("simulate case_01 -o a.txt", "a.txt: .txt is not allowed; allowed: .npz, .csv"),
+        ("simulate case_01 -o ", ".: no ending is not allowed; allowed: .npz, .csv"),
+        ("inspect bag -o x.npz", "x.npz: .npz is not allowed; allowed: .csv"),
+        ("accuracy case_01 -o x.csv", "x.csv: .csv is not allowed; allowed: ."),
+        ("design case_01 --free object.mass_kg=1:2 --minimise touches -o x.png", "x.png: .png is not allowed; allowed"),
+        ("fit other.npz --free object.mass_kg -o x.txt", "x.txt: .txt is not allowed; allowed: .yaml, .yml, ."),
+        ("map case_01 --x object.mass_kg=1:2:2 -o -", "-: no ending is not allowed; allowed: .zarr"),
+        ("plot arm_alone --animate -o x.png", "x.png: .png is not allowed; allowed: .gif, .html, .mp4"),
+        ("run case_01 -o -", "argument -o/--output: '-' is not allowed; allowed: a name"),
+        ("recover bag -o ", "argument -o/--output: '' is not allowed; allowed: a name"),
         ("simulate case_01 -o file/x.npz", "file/x.npz: cannot be written: Not a directory"),
         ("simulate case_01 --set time.duration_s=1e9 -o no/x.npz", "no/x.npz: cannot be written: No such file"),
-        ("simulate case_01 -o /dev/full", "/dev/full: cannot be written: No space left on device"),
-        (f"simulate case_01 -o {LONG}", "cannot be written: File name too long"),
+        ("simulate case_01 -o full.npz", "full.npz: cannot be written: No space left on device"),
+        (f"simulate case_01 -o {LONG}.npz", "cannot be written: File name too long"),
         ("run case_01 -o .", ".: is there; allowed: a new directory"),
         ("run case_01 --controller left=math:sin --without left_controller -o z",
          "left_controller: a law of its own, and without it: allowed: one of the two"),
@@ -110,9 +121,9 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("plot nothing.npz", "nothing.npz: not a file of `grasp simulate`"),
         ("plot empty.npz", "empty.npz: not a file of `grasp simulate`"),
         ("plot other.npz", "other.npz: not a file of `grasp simulate`"),
-        ("plot arm_alone -o x.nonsense", "x.nonsense: nonsense is not allowed; allowed: "),
-        ("plot arm_alone -o figure", "figure: no ending; allowed: one of "),
-        ("plot arm_alone -o .png", ".png: no ending; allowed: "),
+        ("plot arm_alone -o x.nonsense", "x.nonsense: .nonsense is not allowed; allowed: ."),
+        ("plot arm_alone -o figure", "figure: no ending is not allowed; allowed: ."),
+        ("plot arm_alone -o .png", ".png: no ending is not allowed; allowed: "),
         ("plot arm_alone -o no/x.png", "no/x.png: cannot be written: No such file or directory"),
         ("lab accuracy --set time.duration_s=1", "--set: allowed: with a SCENE"),
         ("lab accuracy hammer", "hammer: lacks right_arm, right_contact, right_feedback: paper knows"),

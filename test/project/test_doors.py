@@ -202,8 +202,9 @@ def test_an_output_is_never_the_input_and_replaces_nothing_unasked(command: Any,
     (tmp_path / "mine.yaml").write_text(scenes.load("arm_alone").to_yaml())
     (tmp_path / "link.npz").symlink_to("mine.yaml")
     before = (tmp_path / "mine.yaml").read_bytes()
-    for output in ("mine.yaml", "link.npz"):
-        result = command("simulate", "mine.yaml", "-o", output, "--force")
+    choice = "design", "mine.yaml", "--free", "left_arm.position_m=-1:1", "--minimise", "touches_left"
+    for words, output in ((choice, "mine.yaml"), (("simulate", "mine.yaml"), "link.npz")):
+        result = command(*words, "-o", output, "--force")
         assert result.returncode == 2
         assert f"-o {output}: is the input; allowed: another file" in result.stderr
     assert (tmp_path / "mine.yaml").read_bytes() == before
