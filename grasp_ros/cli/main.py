@@ -71,7 +71,10 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         raise_on_signals()
         begin = time.monotonic()
         try:
+            os.getcwd()
             options = parser().parse_args(words)
+        except FileNotFoundError:
+            raise Refused("the working directory is gone; allowed: one that is there") from None
         except SystemExit as stop:  # of argparse, which has said why
             return stop.code if isinstance(stop.code, int) else 0
         command: Command = options.command

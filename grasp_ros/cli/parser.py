@@ -30,13 +30,15 @@ class Parser(argparse.ArgumentParser):
         self.register("type", float, _number)
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage of this command and one short line."""
+        """Print one short line."""
         choice = re.fullmatch(r"argument (.*): invalid choice: '(.*?)' \(choose from (.*)\)", message, re.S)
         if choice is not None:
             known = re.findall(r"[\w-]+", choice[3])
             message = f"argument {choice[1]}: {choice[2]} is not allowed; {_allowed(choice[2], known)}"
-        self.print_usage(sys.stderr)
         self.exit(2, shortened(f"{self.prog}: error: {message}") + "\n")
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        (file or sys.stderr).write(message)  # argparse keeps to itself that this failed
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Arguments; what nobody knows is an error of the command, and not of `grasp`."""

@@ -89,14 +89,14 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
     path = Path(source)
     with reading(path):
         directory = path.is_dir()
-    recorded = directory or path.suffix == ".npz"
+    recorded = directory or path.suffix in (".npz", ".mcap")
     if recorded and (options.settings or options.sampled or options.method != EXACT or options.step is not None
                      or options.sensitivity):
         raise Refused(f"{source}: --set, --sampled, --method, --step, --sensitivity are not allowed; allowed for"
                       " scenes")
     if not recorded:
         return _simulated(source, options, span)
-    motion: Motion = bag.read(path) if directory else load(path)
+    motion: Motion = load(path) if path.suffix == ".npz" else bag.read(path)
     warn(motion.scene)
     return motion
 

@@ -71,7 +71,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         path = Path(source)
         with reading(path):
             directory = path.is_dir()
-        source = bag.read(path) if directory else path
+        source = bag.read(path) if directory or path.suffix == ".mcap" else path
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")
     if isinstance(source, Recording):

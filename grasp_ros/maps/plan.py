@@ -60,8 +60,8 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
         If it is written otherwise.
     """
     allowed = (
-        "allowed: section.key=low:high, keys of one value joined by +, :n behind it for n >= 2 values, and :log behind"
-        " that for a scale > 0"
+        "allowed: section.key=low:high, keys of one value joined by +, :n behind it for 2 to"
+        f" {MOST:,} values, and :log behind that for a scale > 0"
     )
     match = re.fullmatch(r"([\w.+]+)=([^:]+):([^:]+)(?::(\d*)(?::(log))?)?", text)
     if match is None:
@@ -75,7 +75,7 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
         raise Refused(f"{option} {text}: not understood; {allowed}") from None
     finite = math.isfinite(axis.low) and math.isfinite(axis.high)
     if not (finite and axis.low < axis.high and 2 <= axis.points <= MOST) or (axis.log and axis.low <= 0.0):
-        raise Refused(f"{option} {text}: not a range; {allowed}")
+        raise Refused(f"{option} {text}: is not allowed; {allowed}")
     return axis
 
 

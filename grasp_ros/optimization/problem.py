@@ -30,10 +30,11 @@ class Bound(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Of n choices of the free numbers: outcomes by name, and by how much, relative, they break the bounds."""
+    """Of n choices of the free numbers: outcomes by name, and what is wrong with them."""
 
     outcomes: dict[str, Array]  # (n,) each; inf where a run has none
-    excess: Array  # (n,) 0: all bounds are kept
+    excess: Array  # (n,) by how much, relative, they break the bounds
+    stops: list[str]  # why choices were refused or stopped
 
 
 class Problem:
@@ -95,7 +96,7 @@ class Problem:
         excess: Array = np.zeros(len(table.status))
         for bound in self.bounds:
             excess += np.maximum(outcomes[bound.outcome] - bound.most, 0.0) / (abs(bound.most) or 1.0)
-        return Found(outcomes, excess)
+        return Found(outcomes, excess, [*table.stops.values()])
 
 
 def read_bound(text: str) -> Bound:

@@ -112,8 +112,9 @@ def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | 
         polish=False, init="sobol", updating="deferred", vectorized=True)
     if found.fun >= BROKEN:
         wish = " and ".join(f"{bound.outcome} <= {bound.most:g}" for bound in problem.bounds)
+        stops = problem.found(problem.numbers(found.x[None])).stops
         raise Refused(f"{problem.scene.name}: none of {runs} choices has a finite {problem.minimise[0]}"
-                      + (f" with {wish}" if wish else "") + problem.why_unsettled())
+                      + (f" with {wish}" if wish else "") + (f"; {stops[0]}" if stops else problem.why_unsettled()))
     best = problem.numbers(found.x[None])
     outcomes = {name: float(values[0]) for name, values in problem.found(best).outcomes.items()}
     numbers = {key: float(values[0]) for key, values in best.items()}

@@ -222,7 +222,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
     if path.suffix in YAML:
         with reading(reference, SceneError):
             if not path.is_file():
-                raise SceneError(f"{reference}: no such file")
+                raise SceneError(f"{reference}: {'is no file' if path.exists() else 'no such file'}")
         text = read_text(path, SceneError)
         return parse(text, path.stem, str(path), settings)
     if reference not in names():

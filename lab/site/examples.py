@@ -137,7 +137,7 @@ def _command(line: str) -> str:
     }
     result = subprocess.run(
         ["bash", "-c", line], env=environment, capture_output=True, text=True, timeout=SECONDS, check=False)
-    if result.returncode and not result.stderr.startswith(("grasp: ", "usage: ")):
+    if result.returncode and not result.stderr.startswith("grasp"):
         raise RuntimeError(f"{line.strip()}: {result.stdout}{result.stderr}")
     return result.stderr if result.returncode else result.stdout
 

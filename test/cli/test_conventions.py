@@ -83,10 +83,11 @@ def test_a_refusal_is_short_and_says_what_was_meant(command: Any, words: str, co
     assert len(last) <= LONGEST
 
 
-def test_usage_is_that_of_the_command_that_was_wrong(command: Any) -> None:
-    assert command("simulate", "case_01", "--nonsense").stderr.startswith("usage: grasp simulate ")
-    assert command("simulate", "--grid", "x", "case_01").stderr.startswith("usage: grasp simulate ")
-    assert command("nothing").stderr.startswith("usage: grasp [")
+@pytest.mark.parametrize(("words", "name"), [("simulate case_01 --nonsense", "grasp simulate"), ("nothing", "grasp"),
+                                             ("simulate --grid x case_01", "grasp simulate")])
+def test_arguments_are_refused_in_one_line_that_names_the_command(command: Any, words: str, name: str) -> None:
+    (line,) = command(*words.split()).stderr.splitlines()
+    assert line.startswith(f"{name}: error: ")
 
 
 def test_an_endless_key_is_refused_in_a_line(command: Any, tmp_path: Path) -> None:
@@ -151,6 +152,19 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
     assert result.returncode == 0
     assert "Traceback" not in result.stderr
     assert "Exception" not in result.stderr
+
+
+@pytest.mark.parametrize("words", ["--help", "simulate --help", "scenes"])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_an_output_that_cannot_be_written_is_no_success(words: str, unbuffered: str) -> None:
+    result = shell(f"$GRASP {words} > /dev/full", PYTHONUNBUFFERED=unbuffered)
+    assert (result.returncode, result.stderr) == (1, "grasp: the output cannot be written: No space left on device\n")
+
+
+def test_a_working_directory_that_is_gone_is_refused_in_a_line(tmp_path: Path) -> None:
+    result = shell(f"cd {tmp_path} && rmdir {tmp_path} && $GRASP simulate case_01")
+    assert result.returncode == 2
+    assert result.stderr == "grasp: the working directory is gone; allowed: one that is there\n"
 
 
 @pytest.mark.parametrize("name", scene.names())

@@ -260,7 +260,7 @@ def test_a_settling_time_that_nothing_proves_is_counted_and_explained(
 def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words, answer in (
         ([], "axes: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
-        (["--x", f"{GAIN}=9:1:4"], "not a range"), (["--x", f"{GAIN}=-1:1:4:log"], "not a range"),
+        (["--x", f"{GAIN}=9:1:4"], "9:1:4: is not allowed"), (["--x", f"{GAIN}=-1:1:4:log"], "is not allowed"),
         (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
         (["--x", "object.weight=1:2"], "object.weight: not a number of this scene"),
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
