@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from grasp_ros.accuracy.contender import Contender
 from grasp_ros.accuracy.measure import NOT_INSTALLED, Effort, Record, attempt
@@ -61,7 +61,8 @@ def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort:
             del climbing[contender]
         if progress is not None:
             progress(min(time.monotonic() - begin, seconds))
-    return _in_order(records, contenders)
+    names = [contender.name for contender in contenders]
+    return sorted(records, key=lambda record: names.index(record.method))
 
 
 def unfinished(records: Iterable[Record], contenders: Sequence[Contender], effort: Effort = QUICK) -> list[str]:
@@ -81,12 +82,6 @@ def _given_up(record: Record, effort: Effort) -> bool:
     return record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience
 
 
-def _in_order(records: list[Record], contenders: Sequence[Contender]) -> list[Record]:
-    """By solver, each from loose to tight."""
-    names = [contender.name for contender in contenders]
-    return sorted(records, key=lambda record: names.index(record.method))
-
-
 def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
     """Records of each method, in the order of their settings."""
     groups: dict[str, list[Record]] = {}
@@ -97,14 +92,7 @@ def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
 
 def fastest(records: Iterable[Record], error: float) -> Record | None:
     """The sound record that reaches an error in the least time."""
-    reached = [record for record in records if record.sound and record.error is not None and record.error <= error]
-    return min(reached, key=_time, default=None)
-
-
-def within(records: Iterable[Record], budget: float) -> Record | None:
-    """The sound record with the least error of those that take no longer than a budget in s."""
-    affordable = [record for record in records if record.sound and record.time <= budget]
-    return min(affordable, key=_error_then_time, default=None)
+    return min((record for record in records if record.sound and _error(record) <= error), key=_time, default=None)
 
 
 def advise(records: Iterable[Record], error: float | None = None, budget: float | None = None) -> Advice:
@@ -126,17 +114,17 @@ def advise(records: Iterable[Record], error: float | None = None, budget: float 
         If it is not so, or nothing has a result.
     """
     check_wish(error, budget)
-    groups = by_method(record for record in records if record.sound)
-    if not groups:
+    sound = [record for record in records if record.sound]
+    if not sound:
         raise Refused("no method has a result on this scene")
-    sound = [record for group in groups.values() for record in group]
+    best: Callable[[Record], Any] = _time
     if error is not None:
-        found, closest = [fastest(group, error) for group in groups.values()], min(sound, key=_error)
-        best = sorted(filter(None, found), key=_time)
+        fit, closest = [record for record in sound if _error(record) <= error], min(sound, key=_error)
     else:
-        found, closest = [within(group, budget or 0.0) for group in groups.values()], min(sound, key=_time)
-        best = sorted(filter(None, found), key=_error_then_time)
-    return Advice(best[0] if best else None, best[1 : 1 + OTHERS], closest)
+        fit, closest = [record for record in sound if record.time <= (budget or 0.0)], min(sound, key=_time)
+        best = _error_then_time
+    found = sorted((min(group, key=best) for group in by_method(fit).values()), key=best)
+    return Advice(found[0] if found else None, found[1 : 1 + OTHERS], closest)
 
 
 def _time(record: Record) -> float:
@@ -152,12 +140,7 @@ def _error_then_time(record: Record) -> tuple[float, float]:
 
 
 def check_wish(error: float | None, budget: float | None) -> None:
-    """Refuse a wish that is not one positive number.
-
-    Raises
-    ------
-    Refused
-    """
+    """Refuse a wish that is not one positive number."""
     for name, wish in (("--error", error), ("--budget", budget)):
         if wish is not None and not wish > 0.0:
             raise Refused(f"{name} {wish!r} is not allowed; allowed: a number > 0")
