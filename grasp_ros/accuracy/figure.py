@@ -27,7 +27,7 @@ def error_against_time(scene: Scene, truth: Truth, records: Sequence[Record], ad
             axes.axhline(1e3 * budget, color=CHOSEN, linewidth=0.8, linestyle="--")
         if advice is not None and advice.choice is not None:
             choice = advice.choice
-            axes.plot(max(choice.error or 0.0, truth.uncertainty), 1e3 * choice.time, "o", markersize=13,
+            axes.plot(choice.error, 1e3 * choice.time, "o", markersize=13,
                       fillstyle="none", color=CHOSEN, label=f"take {choice.method}, {choice.knob} {choice.setting:g}")
         axes.set_xlabel("largest error of all states and output times, m and m/s")
         axes.set_ylabel("time of a run, ms")
@@ -41,9 +41,8 @@ def _draw_methods(axes: Axes, truth: Truth, records: Sequence[Record]) -> None:
     """A line for each method, and where nothing can be known."""
     colors = colormaps[COLORS]
     for place, (name, group) in enumerate(by_method(record for record in records if record.sound).items()):
-        errors = [max(record.error or 0.0, truth.uncertainty) for record in group]
-        axes.loglog(errors, [1e3 * record.time for record in group], color=colors(place % 20),
-                    marker=MARKS[place % len(MARKS)], markersize=5, linewidth=1.0, label=name)
+        axes.loglog([record.error for record in group], [1e3 * record.time for record in group], label=name,
+                    color=colors(place % 20), marker=MARKS[place % len(MARKS)], markersize=5, linewidth=1.0)
     axes.axvspan(axes.get_xlim()[0], truth.uncertainty, color="0.9", zorder=0)
     axes.axvline(truth.uncertainty, color="0.5", linewidth=0.8)
     axes.annotate(" not known better\n in double precision", (truth.uncertainty, 1.0), va="top", fontsize="x-small",

@@ -50,7 +50,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     late = unfinished(records, contenders)
     more = [f"after {options.seconds:g} s not all settings were measured, --seconds allows more: {', '.join(late)}"]
     text = [*_table(truth, records), *(more if late else []), *(f"not here: {reason}" for reason in others.values()),
-            *([] if advice is None else _advice(again, _wish(options), truth, advice))]
+            *([] if advice is None else _advice(again, options, advice))]
     show(options, "\n".join(text), {
         "scene": scene.name, "uncertainty": truth.uncertainty, "touches": truth.touches, "not_here": others,
         "unfinished": late, "records": [record._asdict() for record in records],
@@ -74,30 +74,25 @@ def _table(truth: Truth, records: Sequence[Record]) -> list[str]:
         cells = "".join(f"{'-' if record is None else f'{1e3 * record.time:.3g}':>11}" for record in found)
         best = min((record for record in group if record.sound), key=lambda record: record.error or 0.0, default=None)
         end = f"{'-':>12}  {group[-1].status}" if best is None else (
-            f"{max(best.error or 0.0, truth.uncertainty):>12.1e}  {best.knob} {best.setting:g}{UNITS[best.knob]}")
+            f"{best.error:>12.1e}  {best.knob} {best.setting:g}{UNITS[best.knob]}")
         unsound = sum(not record.sound for record in group)
         lines.append(f"{name:<20}{cells}{end}" + (f"; {unsound} of {len(group)} runs stop or miss touches" if unsound
                                                   else ""))
     return lines
 
 
-def _wish(options: argparse.Namespace) -> str:
-    """What is wanted, as it follows "no method reaches"."""
-    return f"a time of {options.budget:g} s" if options.error is None else f"an error of {options.error:g}"
-
-
-def _advice(scene: str, wish: str, truth: Truth, advice: Advice) -> list[str]:
+def _advice(scene: str, options: argparse.Namespace, advice: Advice) -> list[str]:
     """What to take."""
-    if advice.choice is None:
-        return [f"no method reaches {wish}; closest: {_in_words(advice.closest, truth)}"]
     choice = advice.choice
+    if choice is None:
+        wish = f"a time of {options.budget:g} s" if options.error is None else f"an error of {options.error:g}"
+        return [f"no method reaches {wish}; closest: {_in_words(advice.closest)}"]
     return [
-        f"take: {_in_words(choice, truth)}", *(f"or:   {_in_words(record, truth)}" for record in advice.others),
+        f"take: {_in_words(choice)}", *(f"or:   {_in_words(record)}" for record in advice.others),
         f"grasp simulate {scene} --method {choice.method} --{choice.knob} {choice.setting:g}",
     ]
 
 
-def _in_words(record: Record, truth: Truth) -> str:
-    reached = max(record.error or 0.0, truth.uncertainty)
+def _in_words(record: Record) -> str:
     setting = f"{record.knob} {record.setting:g}{UNITS[record.knob]}"
-    return f"{record.method}, {setting}: error {reached:.1e} in {1e3 * record.time:.3g} ms"
+    return f"{record.method}, {setting}: error {record.error:.1e} in {1e3 * record.time:.3g} ms"

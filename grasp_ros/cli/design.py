@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
@@ -13,9 +13,6 @@ from grasp_ros.cli.output import bar, images, show, write_figure, write_scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS
-
-if TYPE_CHECKING:
-    from grasp_ros.maps.plan import Axis
 
 END = "  an end of its range: a wider one may have a better choice"
 NEAR = 1e-6  # of a range
@@ -77,8 +74,10 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     """A column for each free number and outcome, a row for each choice; of one choice a line for each of them."""
     units = problem.units
     if len(found) == 1:
-        ends = {key for axis in problem.axes for key in axis.keys if _at_an_end(axis, found[0].numbers[key])}
-        rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in found[0].numbers.items()),
+        numbers = found[0].numbers
+        ends = {key for axis in problem.axes for key in axis.keys
+                if min(numbers[key] - axis.low, axis.high - numbers[key]) <= NEAR * (axis.high - axis.low)}
+        rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in numbers.items()),
                 *((name, f"{value:.10g} {units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]
         width = max(len(name) for name, _ in rows)
@@ -88,8 +87,3 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
               *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]
     widths = [max(map(len, column)) for column in zip(heads, *lines, strict=True)]
     return ["  ".join(f"{cell:>{width}}" for cell, width in zip(line, widths, strict=True)) for line in [heads, *lines]]
-
-
-def _at_an_end(axis: Axis, value: float) -> bool:
-    """Whether a choice is an end of its range."""
-    return min(value - axis.low, axis.high - value) <= NEAR * (axis.high - axis.low)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
@@ -50,18 +49,13 @@ def _fit(options: argparse.Namespace) -> int:
     prepare()
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
     show(options, printable(str(found)), _data(found))
-    if options.output is not None:
-        _write(found, options.output)
+    if options.output is not None and options.output.suffix.lower() in YAML:
+        write_scene(found.scene, options.output)
+    elif options.output is not None:
+        from grasp_ros.identification.figure import measured_and_fitted
+
+        write_figure(measured_and_fitted(found), options.output)
     return 1 if found.not_identifiable else 0
-
-
-def _write(found: Fit, path: Path) -> None:
-    if path.suffix.lower() in YAML:
-        write_scene(found.scene, path)
-        return
-    from grasp_ros.identification.figure import measured_and_fitted
-
-    write_figure(measured_and_fitted(found), path)
 
 
 def _value(text: str) -> tuple[str, float]:

@@ -80,11 +80,7 @@ def _run(options: argparse.Namespace) -> int:
     plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
     prepare()
     with bar(plan.rows, "run", scene.name) as told:
-        def progress(done: int, _: int) -> None:
-            if told is not None:
-                told(done)
-
-        run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
+        run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=told)
     data = store.read(options.output)
     found = data_of(data)
     show(options, report(found), found)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,13 @@ import numpy as np
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare
 from grasp_ros.cli.controllers import load_controllers
-from grasp_ros.cli.output import STDOUT, bar, destination, show
+from grasp_ros.cli.output import bar, destination, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods.contract import ACCURACY_KNOB, STEP, TOLERANCE, UNITS
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation import GRID_POINTS, Trajectory, simulate
+from grasp_ros.simulation import GRID_POINTS, simulate
 
 
 def add_to(commands: Any) -> None:
@@ -88,17 +87,9 @@ def _simulate(options: argparse.Namespace) -> int:
         rows, found = [*rows, *describe_sensitivity(rates)], {**found, "sensitivity": last_rates(rates)}
     show(options, table(rows), found)
     if options.output is not None:
-        _write(trajectory, options.output)
+        with destination(options.output) as file:
+            (trajectory.save if options.output.suffix.lower() == ".npz" else trajectory.to_csv)(file)
     return 0 if trajectory.status is Status.DONE else 1
-
-
-def _write(trajectory: Trajectory, path: Path) -> None:
-    """As a table, .csv, or with all that belongs to it, .npz."""
-    with destination(path) as file:
-        if path == STDOUT or path.suffix.lower() == ".csv":
-            trajectory.to_csv(file)
-        else:
-            trajectory.save(file)
 
 
 def _setting(options: argparse.Namespace) -> float | None:

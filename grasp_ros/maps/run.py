@@ -21,7 +21,7 @@ from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
 
 def run(
     plan: Plan, path: str | os.PathLike[str], *, workers: int = 0, scheduler: str = "",
-    progress: Callable[[int, int], object] = lambda _, __: None,
+    progress: Callable[[int], object] | None = None,
 ) -> Store:
     """Compute what a file does not have yet.
 
@@ -34,8 +34,8 @@ def run(
         Processes of a Dask cluster that is started for it; 0: threads of this process.
     scheduler : str
         Address of a Dask scheduler that exists.
-    progress : callable
-        Called with the number of rows that are done and that of all.
+    progress : callable, optional
+        Called with the number of rows that are done.
 
     Raises
     ------
@@ -46,18 +46,17 @@ def run(
     check(plan.scene, plan.setup)
     check_plan(plan)
     store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
-    spans = store.spans
-    done = plan.rows - sum(last - first for first, last in spans)
-    progress(done, plan.rows)
+    spans, begin = store.spans, time.monotonic()
+    done, told = plan.rows - sum(last - first for first, last in spans), progress or (lambda _: None)
+    told(done)
     if not spans:
         return store
-    begin = time.monotonic()
     try:
         with _source(plan, spans, workers, scheduler) as found:
             for span, chunk in found:
                 store.write(span, chunk)
                 done += span[1] - span[0]
-                progress(done, plan.rows)
+                told(done)
     finally:
         store.add_seconds(time.monotonic() - begin)
     return store

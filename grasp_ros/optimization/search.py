@@ -159,19 +159,14 @@ def front(problem: Problem, seed: int = 0, points: int = FRONT, progress: Callab
     def add(name: str, bounds: Sequence[Bound]) -> Design:
         before = sum(own.runs for own in choices)
         told = None if progress is None else lambda runs: progress(before + runs)
-        choices.append(search(_with(problem, name, bounds), seed, told))
+        names = (name, *(other for other in problem.minimise if other != name))  # one to make small, both to look at
+        choices.append(search(Problem(problem.scene, problem.axes, names, bounds, problem.setup), seed, told))
         return choices[-1]
 
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
     for level in np.linspace(most, least, points)[1:]:
         add(first, (*problem.bounds, Bound(second, max(float(level), least))))
     return sorted(_undominated(choices, first, second), key=lambda own: own.outcomes[first])
-
-
-def _with(problem: Problem, name: str, bounds: Sequence[Bound]) -> Problem:
-    """The same with one outcome to make small, and all outcomes to look at."""
-    names = (name, *(other for other in problem.minimise if other != name))
-    return Problem(problem.scene, problem.axes, names, bounds, problem.setup)
 
 
 def _undominated(choices: Sequence[Design], first: str, second: str) -> list[Design]:

@@ -86,7 +86,7 @@ def settling(directory: Path, pixels: int = PIXELS) -> Settling:
 def _computed(plan: Plan, path: Path) -> tuple[Any, float]:
     """The outcomes of a plan, and the time that they took in s."""
     with tqdm(total=plan.rows, unit="run", desc=path.stem, file=sys.stderr, smoothing=0.05) as bar:
-        seconds = run(plan, path, progress=lambda done, _: bar.update(done - bar.n)).seconds
+        seconds = run(plan, path, progress=lambda done: bar.update(done - bar.n)).seconds
     return store.read(path), seconds
 
 

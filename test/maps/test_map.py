@@ -217,7 +217,7 @@ def test_a_worker_that_dies_takes_no_row_with_it(tmp_path: Path, tiny_chunks: No
         workers = client.run(os.getpid)
         reached: list[int] = []
 
-        def kill_one(done: int, _: int) -> None:
+        def kill_one(done: int) -> None:
             reached.append(done)
             if len(reached) == 10:
                 os.kill(next(iter(workers.values())), signal.SIGKILL)
