@@ -32,17 +32,7 @@ def warn(scene: Scene) -> None:
 
 
 def check_output(output: Path | None, endings: Collection[str], force: bool, inputs: Sequence[str] = ()) -> None:
-    """Refuse another format, to write over what is there, or where no directory is, before the work.
-
-    An input is not written over in any case.
-
-    None: nothing is to be written.
-
-    Raises
-    ------
-    Refused
-        Names the file.
-    """
+    """Refuse another format, a file that is there, a directory that is not, and an input, before the work."""
     if output is None or output == STDOUT:
         return
     format_of(output, endings)
@@ -60,13 +50,7 @@ def check_output(output: Path | None, endings: Collection[str], force: bool, inp
 
 
 def check_memory(scene: Scene, sampled: bool, grid: int | None = None) -> None:
-    """Refuse more output times, or ticks of a sampled run, than memory holds, before the work.
-
-    Raises
-    ------
-    Refused
-        Names them.
-    """
+    """Refuse more output times, or ticks of a sampled run, than memory holds, before the work."""
     ticks = scene.ticks if sampled or scene.sampled else 0
     for name, rows in (("--grid", grid or 0), (f"{scene.name}: control periods", ticks)):
         try:

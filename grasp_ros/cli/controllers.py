@@ -11,13 +11,7 @@ from grasp_ros.scene.own_law import find_law
 
 
 def sides_of(words: Sequence[str]) -> dict[str, str]:
-    """Where the controllers are found, "module:object" by side.
-
-    Raises
-    ------
-    Refused
-        If a word has another form, or comes twice for a side.
-    """
+    """Where the controllers are found, "module:object" by side."""
     found: dict[str, str] = {}
     for word in words:
         side, _, place = word.partition("=")
@@ -31,11 +25,5 @@ def sides_of(words: Sequence[str]) -> dict[str, str]:
 
 
 def load_controllers(words: Sequence[str]) -> dict[str, Law | type]:
-    """The callables by side.
-
-    Raises
-    ------
-    Refused
-        As `sides_of`, and `scene.own_law.find_law`.
-    """
+    """The callables by side."""
     return {side: find_law(place, f"--controller: {side}={place}") for side, place in sides_of(words).items()}

@@ -30,11 +30,6 @@ def play(recording: Recording, rate: float, first: float | None = None) -> None:
         Seconds of the recording in a second.
     first : float, s, optional
         Where it begins; default: at the first tick.
-
-    Raises
-    ------
-    Refused
-        If the rate is not positive, or the recording does not reach to the first time.
     """
     times = recording.t
     first = float(times[0]) if first is None else first

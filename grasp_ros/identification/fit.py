@@ -10,7 +10,7 @@ import numpy as np
 from grasp_ros.identification.measured import FEWEST, Source, measured
 from grasp_ros.identification.numbers import acts, numbers_of
 from grasp_ros.identification.result import Against, Fit, residual_table, seen_by
-from grasp_ros.identification.search import Problem, first_noise, fitted, least_squares, mean_square, refine, search
+from grasp_ros.identification.search import Problem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -43,7 +43,10 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     Refused
         If scipy is not installed, the data or the keys are not allowed, or there are too few samples.
     """
-    least_squares()
+    try:
+        import scipy.optimize  # noqa: F401
+    except ModuleNotFoundError as error:
+        raise Refused(f"a fit needs {error.name}; pip install '.[fit]' in the checkout") from None
     free, found = [free] if isinstance(free, str) else list(free), measured(data, scene, by_sensors)
     numbers = numbers_of(found.scene, free, found)
     if any(acts(number.key) for number in numbers):

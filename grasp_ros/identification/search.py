@@ -10,8 +10,7 @@ the data do not see stays there. What they see to some percent is moved by a sma
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -82,21 +81,6 @@ class Problem(NamedTuple):
         return scaled.ravel(), (rates[:, seen] / self.noise[seen, None]).reshape(scaled.size, -1)
 
 
-def least_squares() -> Callable[..., Any]:
-    """scipy's.
-
-    Raises
-    ------
-    Refused
-        If it is not installed.
-    """
-    try:
-        from scipy.optimize import least_squares as found
-    except ModuleNotFoundError as error:
-        raise Refused(f"a fit needs {error.name}; pip install '.[fit]' in the checkout") from None
-    return found  # type: ignore[no-any-return]
-
-
 def search(problem: Problem) -> Array:
     """The free numbers (n,) as y, from their starts.
 
@@ -143,6 +127,8 @@ def refine(problem: Problem, begin: Array, rows: int, enough: float = FINE) -> A
     enough : float
         Relative change of the sum of squares at which it ends.
     """
+    from scipy.optimize import least_squares
+
     seen, n = len(problem.data.channels), len(begin)
     last: dict[bytes, tuple[Array, Array]] = {}
 
@@ -161,8 +147,8 @@ def refine(problem: Problem, begin: Array, rows: int, enough: float = FINE) -> A
     if not np.isfinite(both(nowhere)[0]).all():
         return begin
     with np.errstate(all="ignore"):  # of motions far off
-        found = least_squares()(lambda step: both(step)[0], nowhere, lambda step: both(step)[1], method="trf",
-                                ftol=enough, xtol=SHORTEST, gtol=None, max_nfev=MOST)
+        found = least_squares(lambda step: both(step)[0], nowhere, lambda step: both(step)[1], method="trf",
+                              ftol=enough, xtol=SHORTEST, gtol=None, max_nfev=MOST)
     return np.asarray(begin + found.x)
 
 

@@ -36,13 +36,7 @@ def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
 
 @contextmanager
 def connect(workers: int, scheduler: str) -> Iterator[Any]:
-    """A client of a new cluster of so many processes on this machine, or of the scheduler at an address.
-
-    Raises
-    ------
-    Refused
-        If Dask is not installed, or nobody answers there.
-    """
+    """A client of a new cluster of so many processes on this machine, or of the scheduler at an address."""
     try:
         from distributed import Client, LocalCluster
     except ModuleNotFoundError as error:
@@ -61,13 +55,7 @@ def connect(workers: int, scheduler: str) -> Iterator[Any]:
 
 
 def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple[Span, Chunk]]:
-    """Do chunks on a cluster, and hand each over when it is done.
-
-    Raises
-    ------
-    Refused
-        If a chunk kills its workers again and again, or a worker has other versions than the client.
-    """
+    """Do chunks on a cluster, and hand each over when it is done."""
     from distributed import as_completed
 
     document, own = json.dumps(plan.to_document()), versions()

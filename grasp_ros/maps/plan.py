@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -182,13 +181,3 @@ def check(plan: Plan) -> None:
         for end in (axis.low, axis.high):
             if not parameter.accepts(end):
                 raise Refused(f"{plan.scene.name}: {key}: {end!r} is not allowed; allowed: {parameter.allowed}")
-
-
-def relative(scene: Scene, part: float, without: Sequence[str] = ()) -> tuple[Axis, ...]:
-    """Axes for every number of a scene that is neither 0 nor one of its times: off by up to a part of it."""
-    return tuple(
-        Axis(f"{section}.{key}", value - part * abs(value), value + part * abs(value))
-        for section, numbers in scene.values.items() if section != "time"
-        for key, value in numbers.items()
-        if isinstance(value, float) and value and f"{section}.{key}" not in without
-    )

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
+from grasp_ros.maps.plan import Axis
 from grasp_ros.scene import Scene, SceneError
 from lab.cases.scenes import horizon
 
@@ -130,3 +131,12 @@ def _take_losses(sections: dict[str, dict[str, Any]]) -> None:
         sections[f"{side}_arm"]["damping_Ns_per_m"] = 0.0
         sections[f"{side}_feedback"]["velocity_gain_Ns_per_m"] = 0.0
         sections[f"{side}_contact"]["dissipation_s_per_m"] = 0.0
+
+
+def relative(scene: Scene, part: float) -> tuple[Axis, ...]:
+    """Axes for every number of a scene that is neither 0 nor one of its times: off by up to a part of it."""
+    return tuple(
+        Axis(f"{section}.{key}", value - part * abs(value), value + part * abs(value))
+        for section, numbers in scene.values.items() if section != "time"
+        for key, value in numbers.items() if isinstance(value, float) and value
+    )

@@ -17,12 +17,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.maps.plan import Plan, relative
+from grasp_ros.maps.plan import Plan
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.simulate import simulate
+from lab.cases.draw import relative
 from lab.studies.peer_heyoka import BALLISTIC_HERTZ, BALLISTIC_S, HeyokaGrasp, Leg, heyoka_system
 
 ERROR, OFF = 1e-6, 0.02

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.maps import store
-from grasp_ros.maps.plan import Axis, Plan, relative
+from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.run import run
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.sampled import spectral_radii
@@ -20,6 +20,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
+from lab.cases.draw import relative
 
 GAINS = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
 LOSSES = "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"

@@ -10,10 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from grasp_ros import ensemble, load
-from grasp_ros.maps.plan import Axis, Plan, relative
+from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup
+from lab.cases.draw import relative
 from lab.studies import maps
 
 pytestmark = [pytest.mark.slow, pytest.mark.thorough]  # minutes of an integrator in Python

@@ -21,12 +21,13 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
 from grasp_ros.maps import figures
 from grasp_ros.maps import run as runs
-from grasp_ros.maps.plan import POINTS, Axis, Plan, read_axis, relative
+from grasp_ros.maps.plan import POINTS, Axis, Plan, read_axis
 from grasp_ros.maps.run import run
 from grasp_ros.maps.store import STATUS, Store, columns_of, open_group, read
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation.chunk import REFUSED, STATUSES, Setup
 from grasp_ros.simulation.ensemble import ensemble
+from lab.cases.draw import relative
 
 GAIN, LOSS = "left_feedback.position_gain_N_per_m", "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"
 OUTCOMES = ("settling_time", "touches", "last_state")
