@@ -45,7 +45,7 @@ def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort:
     """
     begin = time.monotonic()
     records: list[Record] = []
-    climbing = {contender: iter(contender.ladder[:: effort.stride]) for contender in contenders}
+    climbing = {contender: iter(contender.ladder) for contender in contenders}
     spent: dict[Contender, float] = {}
     while climbing and time.monotonic() - begin <= seconds:
         contender = min(climbing, key=lambda one: spent.get(one, effort.patience))
@@ -71,7 +71,7 @@ def unfinished(records: Iterable[Record], contenders: Sequence[Contender], effor
 
     def left(contender: Contender) -> bool:
         group = groups.get(contender.name, [])
-        more = len(group) < len(contender.ladder[:: effort.stride])
+        more = len(group) < len(contender.ladder)
         return more and not (group and _given_up(group[-1], effort))
 
     return [contender.name for contender in contenders if left(contender)]

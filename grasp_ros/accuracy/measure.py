@@ -23,7 +23,6 @@ class Effort(NamedTuple):
     patience: float  # s; a solver that needs longer for one run climbs no further
     budget: float  # s, of the repeats of one setting
     most: int  # repeats
-    stride: int = 1  # every how many settings of a ladder
 
 
 class Record(NamedTuple):

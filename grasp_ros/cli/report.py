@@ -32,10 +32,12 @@ def table(rows: Iterable[Row]) -> str:
 def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[Row]:
     """What happened in a simulation, in words, with its `summary`; inf and nan are shown as they are."""
     method, own = METHODS[trajectory.method], found["controllers"]
+    of = "" if trajectory.status is Status.DONE else f" of {found['duration_s']:g} s"
     rows = [
         ("scene", found["title"]), ("feedback", found["feedback"]),
         *((f"{side} controller", name) for side, name in own.items()),
-        ("status", trajectory.stop or trajectory.status.value), ("simulated", _simulated(found)),
+        ("status", trajectory.stop or trajectory.status.value),
+        ("simulated", f"{found['reached_s']:g} s{of}, {found['output_times']} output times"),
         *([("at rest", f"from {found['at_rest_s']:.6g} s on")] if "at_rest_s" in found else []),
         ("touches left, right", _touches(found) if method.events else "not looked for"),
         ("method", f"{method.name}, {method.knob} {trajectory.setting:g}{UNITS[method.knob]}"),
@@ -50,12 +52,6 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
     if "V_c_rise_J" in found:
         rows.append(("risen by the method", f"{found['V_c_rise_J']:.3g} J of V_c"))
     return _with_words(trajectory.scene, rows, other=bool(own))
-
-
-def _simulated(found: dict[str, Any]) -> str:
-    """How far the output times go, and how far they should."""
-    of = "" if found["status"] == Status.DONE.name else f" of {found['duration_s']:g} s"
-    return f"{found['reached_s']:g} s{of}, {found['output_times']} output times"
 
 
 def _amounts(found: dict[str, Any]) -> list[Row]:

@@ -56,7 +56,7 @@ def connect(workers: int, scheduler: str) -> Iterator[Any]:
 
 def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple[Span, Chunk]]:
     """Do chunks on a cluster, and hand each over when it is done."""
-    from distributed import as_completed
+    from distributed import CancelledError, KilledWorker, as_completed
 
     document, own = json.dumps(plan.to_document()), versions()
     following = iter(spans)
@@ -69,7 +69,11 @@ def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple
     completed = as_completed(list(waiting))
     for future in completed:
         span = waiting.pop(future)
-        found, chunk = _result(future, span)
+        try:
+            found, chunk = future.result()
+        except (KilledWorker, CancelledError) as error:
+            reason = " ".join(str(error).split())
+            raise Refused(f"rows {span[0]} to {span[1] - 1}: their workers died: {reason}") from None
         if found != own:
             other = ", ".join(f"{name} {version}" for name, version in found.items() if own.get(name) != version)
             raise Refused(f"a worker has {other}; allowed: the versions of this process, because the bits may differ")
@@ -77,13 +81,3 @@ def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple
             waiting[added] = following_span
             completed.add(added)
         yield span, chunk
-
-
-def _result(future: Any, span: Span) -> tuple[dict[str, str], Chunk]:
-    from distributed import CancelledError, KilledWorker
-
-    try:
-        found: tuple[dict[str, str], Chunk] = future.result()
-    except (KilledWorker, CancelledError) as error:
-        raise Refused(f"rows {span[0]} to {span[1] - 1}: their workers died: {' '.join(str(error).split())}") from None
-    return found

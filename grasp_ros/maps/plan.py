@@ -19,7 +19,6 @@ from grasp_ros.simulation.chunk import Setup, checked
 from grasp_ros.simulation.variants import Variants, parameter_of
 
 POINTS, MOST, MOST_AXES = 101, 10**9, 2
-LOG = "log"
 
 
 class Axis(NamedTuple):
@@ -69,7 +68,7 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
     if points and not grid:
         raise Refused(f"{option} {text}: there is no grid of {points} values; allowed: low:high, and ::log behind it")
     try:
-        axis = Axis(name, read_number(low), read_number(high), int(points or POINTS), log == LOG)
+        axis = Axis(name, read_number(low), read_number(high), int(points or POINTS), bool(log))
     except ValueError:
         raise Refused(f"{option} {text}: not understood; {allowed}") from None
     finite = math.isfinite(axis.low) and math.isfinite(axis.high)

@@ -26,7 +26,6 @@ from grasp_ros.simulation.outcomes import find
 
 FORMAT, STATUS, NOT_DONE = "grasp_ros map", "status", -1
 ALL_FILES = {"array.write_empty_chunks": True}  # of zarr: by itself it leaves out chunks of which all is nan
-AGAIN = "what is done is kept: the same command goes on"
 
 
 class Store:
@@ -54,7 +53,6 @@ class Store:
             _create(path, plan, wanted, max(1, rows // self._lines))
         self._group = open_group(path, "r+")
         self._check(wanted)
-        self.chunk = self._group[STATUS].chunks[0] * self._lines
 
     def _check(self, wanted: dict[str, Any]) -> None:
         for what, own in (("plan", wanted), ("versions", versions())):
@@ -67,8 +65,8 @@ class Store:
     @property
     def spans(self) -> list[Span]:
         """Chunks that are still to be done, as their first row and the one behind their last."""
-        first = [i * self.chunk for i in _undone(self._group, self.path)]
-        return [(row, min(row + self.chunk, self.plan.rows)) for row in first]
+        size = self._group[STATUS].chunks[0] * self._lines
+        return [(i * size, min((i + 1) * size, self.plan.rows)) for i in _undone(self._group, self.path)]
 
     def write(self, span: Span, chunk: Chunk) -> None:
         """Write a chunk.
@@ -194,4 +192,4 @@ def _writing(path: Path) -> Iterator[None]:
         with writing(path):
             yield
     except Refused as error:
-        raise Refused(f"{error}; {AGAIN}" if path.exists() else str(error)) from None
+        raise Refused(f"{error}; what is done is kept: the same command goes on") from None
