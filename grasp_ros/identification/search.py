@@ -27,7 +27,7 @@ GOOD = 4.0  # mean square of residuals, in those of the noise, above which a sea
 ROUGH, FINE = 1e-3, 1e-6  # relative change of the sum of squares at which a search ends, on the way and at last
 SHORTEST = 1e-10  # step of y, relative
 MOST = 30  # motions of one horizon
-FLOOR = 1e-9  # of the largest spread of the positions, or of the velocities: the least noise
+FLOOR = 1e-9  # of the spread of a channel, or of others of its kind where it stands still: the least noise
 
 
 class Problem(NamedTuple):
@@ -167,8 +167,9 @@ def residual_noise(data: Measured, fitted: Array) -> Array:
 
 
 def _at_least(noise: Array, data: Measured) -> Array:
-    spread = np.fmax.reduce(np.ptp(data.state, axis=0).reshape(3, 2))
-    return np.asarray(np.maximum(noise, FLOOR * np.tile(spread, 3)))
+    spread = np.ptp(data.state, axis=0)
+    others = np.tile(np.fmax.reduce(spread.reshape(3, 2)), 3)
+    return np.asarray(np.maximum(noise, FLOOR * np.where(spread == 0.0, others, spread)))
 
 
 def fitted(problem: Problem) -> tuple[Problem, Array]:
