@@ -160,5 +160,5 @@ def test_files_and_names(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"mine\.yaml"):
         load(str(path))
     (tmp_path / "dir.yaml").mkdir()
-    with pytest.raises(SceneError, match="no such file"):
+    with pytest.raises(SceneError, match="is no file"):
         load(str(tmp_path / "dir.yaml"))
