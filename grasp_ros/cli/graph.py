@@ -178,7 +178,10 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     if stopped:
         rows.append(("interrupted", f"not verified and not drawn; `grasp verify` and `grasp plot` {graph.bag} do that"))
     else:
-        whole = whole and not recording.alarms and not any(recording.missing.values())
+        ends = int(recording.scene_tick[-1]) == recording.scene.ticks
+        whole = whole and ends and not recording.alarms and not any(recording.missing.values())
+        if not ends:
+            print(f"grasp: {graph.bag}: the run ended at {recording.t[-1]:g} s, before its scene", file=sys.stderr)
     if not (stopped or options.no_check):
         comparison = compare_recording(recording)
         whole, rows = whole and comparison.equal, rows + comparison.rows

@@ -212,6 +212,8 @@ class Graph:
             time.sleep(POLL_SECONDS)
         if not received:
             self._check()
+            if not (self.bag / "metadata.yaml").exists():  # a law can end its process, and all nodes with it
+                raise GraphError(f"{awaited[0]}: ended with exit status 0 before the run was over")
 
     def _check(self) -> None:
         """Nobody has failed, or stands still; the one to name is the first that has said why, or that was killed."""

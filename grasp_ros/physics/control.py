@@ -7,13 +7,16 @@ do nothing. `exact.driver.control` compiles the same source for the kernels.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from enum import IntEnum
 from functools import lru_cache
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import BLOCK
 from grasp_ros.physics.model import Array
 
@@ -57,6 +60,23 @@ def feedback(row: Any, x: Any, v: Any) -> Any:
     force = -row[Column.POSITION_GAIN] * (x - row[Column.SET_POINT]) - row[Column.VELOCITY_GAIN] * v
     if row[Column.FEED_FORWARD] != 0.0:  # adding 0.0 would turn a command of -0.0 into another bit pattern
         force = force + row[Column.FEED_FORWARD]
+    return force
+
+
+def answered(answer: object, who: str, tick: int, time: float) -> float:
+    """The command in N that a law of the user's own has answered with.
+
+    Raises
+    ------
+    Refused
+        If it is not a finite number; `who` is what the refusal begins with.
+    """
+    try:
+        force = float(answer) if isinstance(answer, Real) else math.nan
+    except OverflowError:
+        force = answer = math.inf  # nearer to it than to any float, and with too many digits to print
+    if not math.isfinite(force):
+        raise Refused(f"{who}: it answered {answer!r} at tick {tick}, t = {time!r} s; allowed: a finite number of N")
     return force
 
 

@@ -35,6 +35,12 @@ class Box:
     law = Lag()
 lag, reset, number = Lag(), Reset(), 3.0
 """
+ENDS = {  # what a law does beside answering, and how it is told
+    "sys.exit(3)": "SystemExit: 3", "raise KeyboardInterrupt": "KeyboardInterrupt",
+    "raise GeneratorExit": "GeneratorExit",
+    "raise BrokenPipeError('mine')": "BrokenPipeError: mine", "raise OSError(28, 'No')": r"OSError: \[Errno 28\] No",
+    "1 / 0": "ZeroDivisionError: division by zero",
+}
 DOORS: dict[str, Callable[[str], object]] = {
     "simulate": lambda place: load_controllers([f"left={place}"])["left"], "graph": OwnLaw,
 }
@@ -111,6 +117,35 @@ def test_a_class_makes_one_law_for_each_arm() -> None:
     alone = simulate(scenes.load("case_01", [SHORT]), controllers=load_controllers(words[:1]))
     assert both.command[0, LEFT] == alone.command[0, LEFT]
     assert both.controllers == {"left": "laws_here:Lag", "right": "laws_here:Lag"}
+
+
+@pytest.mark.parametrize("line", ENDS)
+@pytest.mark.parametrize(
+    ("source", "when"),
+    [
+        ("import sys\n{}", "when it was imported"),
+        ("import sys\nclass law:\n    def __init__(self): {}\n    def __call__(self, *_): pass", "when it began"),
+        ("import sys\ndef law(*_): {}", "at tick 7"),
+    ],
+    ids=["import", "begin", "answer"],
+)
+def test_whatever_a_law_raises_in_the_graph_is_its_own(here: Path, source: str, when: str, line: str) -> None:
+    (here / "needs_here.py").write_text(source.format(line))
+    with pytest.raises(Refused, match=rf"^law: needs_here:law: {ENDS[line]}, {when}, .*needs_here.py, line \d$"):
+        OwnLaw("needs_here:law").command(scenes.load("case_01").system, LEFT, 7, 0.007, [0.0] * 6)
+
+
+@pytest.mark.parametrize(
+    ("answer", "told"),
+    [("'1.0'", "'1.0'"), ("None", "None"), ("10 ** 5000", "inf"), ("[1.0]", r"\[1.0\]"), ("-1e999", "-inf")],
+)
+def test_what_is_no_command_is_refused_in_the_same_words(here: Path, answer: str, told: str) -> None:
+    (here / "needs_here.py").write_text(f"law = lambda *_: {answer}")
+    case, words = scenes.load("case_01", [SHORT]), f": it answered {told} at tick 0, t = 0.0 s; allowed: a finite numb"
+    with pytest.raises(Refused, match=f"^law: needs_here:law{words}"):
+        OwnLaw("needs_here:law").command(case.system, LEFT, 0, 0.0, [0.0] * 6)
+    with pytest.raises(Refused, match=f"^left controller needs_here:<lambda>{words}"):
+        simulate(case, controllers=load_controllers(["left=needs_here:law"]))
 
 
 def test_a_module_here_does_not_hide_an_installed_one(here: Path) -> None:

@@ -7,6 +7,8 @@ import re
 import signal
 import subprocess
 import sys
+from argparse import Namespace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,10 +19,14 @@ import rclpy
 from processes import DEADLINE, START, wait_for
 
 from grasp_ros import scene
+from grasp_ros.cli.graph import Spent, _report
 from grasp_ros.graph import bag
+from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.stopping import STOP_SIGNALS
+from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
+from lab.drills import recorder
 
 pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
 
@@ -124,6 +130,38 @@ def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signa
     _, err = process.communicate(timeout=DEADLINE)
     assert err == "left_controller: has not ended 0.5 s after it was asked to: ended by force\n"
     assert process.returncode == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "options", "words"),
+    [
+        ("sys.exit(0)", [], r"left_controller: law: mine:law: SystemExit: 0, at tick 50, .*mine.py, line 4"),
+        ("sys.exit(0)", ["--one-process"], r"left_controller: law: mine:law: SystemExit: 0, at tick 50, .*, line 4"),
+        ("os._exit(0)", [], r"left_controller: ended with exit status 0 before the run was over"),
+        ("os._exit(0)", ["--one-process"], r"graph: ended with exit status 0 before the run was over"),
+    ],
+)
+def test_a_law_that_ends_its_process_has_ended_no_run(
+    launch: Any, tmp_path: Path, line: str, options: list[str], words: str
+) -> None:
+    (tmp_path / "mine.py").write_text(f"import os, sys\ndef law(tick, t, x, v):\n    if tick == 50:\n        {line}\n"
+                                      "    return -5.0 * x - 0.5 * v\n")
+    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=mine:law", "-o", "run"]
+    process = launch(*command, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    out, err = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, out) == (1, "")
+    assert re.search(rf"^grasp: {words}; run/bag has what was recorded$", err, re.M), err
+    assert "Traceback" not in err
+
+
+def test_a_bag_that_ends_before_its_scene_is_no_success(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Whatever lets a run end early without a word: the report looks at the ticks."""
+    case = scene.load("arm_alone", ["time.duration_s=0.2"])
+    half = simulate(case.changed({"time.duration_s": 0.1}), sampled=True)
+    recorder.write(tmp_path / "bag", replace(half, scene=case))
+    quiet = Namespace(max_age=None, min_factor=None, no_check=True, no_figure=True)
+    assert _report(Graph(case, tmp_path, ACCURACY), False, Spent(), quiet) == 1
+    assert capsys.readouterr().err == f"grasp: {tmp_path / 'bag'}: the run ended at 0.1 s, before its scene\n"
 
 
 def test_the_monitor_stops_a_graph_whose_energy_balance_does_not_close(launch: Any, tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import math
 from functools import lru_cache
-from numbers import Real
 from typing import Any
 
 import numba
@@ -21,7 +20,7 @@ from numba.core.errors import NumbaError
 from numba.core.types import float64, int64
 from numba.extending import intrinsic, is_jitted
 
-from grasp_ros.physics.control import Law
+from grasp_ros.physics.control import Law, answered
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.sight import Sight, asked
 
@@ -100,7 +99,7 @@ class Foreign:
         named, compiled = getattr(law, "__wrapped__", law) if numba_law else law, numba_law and not self.asks
         named = named if hasattr(named, "__qualname__") else type(named)
         self.name = f"{named.__module__}:{named.__qualname__}"
-        self._side, self._law = side, law
+        self._who, self._law = f"{side} controller {self.name}", law
         self._error: BaseException | None = None
         try:
             function: Any = _compiled(law) if compiled else PROTOTYPE(self._answer)
@@ -115,29 +114,23 @@ class Foreign:
         """What a callable of Python answers; NaN for what is kept for `failure`."""
         try:
             seen = self.sight(tick).seen(self.asks) if self.asks else {}
-            return self._number(self._law(tick, time, x, v, **seen), tick, time)
+            return answered(self._law(tick, time, x, v, **seen), self._who, tick, time)
         except BaseException as error:  # ctypes would print it and go on
             self._error = error
             return math.nan
-
-    def _number(self, answer: object, tick: int, time: float) -> float:
-        if isinstance(answer, Real) and math.isfinite(answer):
-            return float(answer)
-        raise Refused(f"{self._side} controller {self.name}: it answered {answer!r} at tick {tick}, t = {time!r} s;"
-                      " allowed: a finite number of N")
 
     def failure(self, tick: int, time: float, x: float, v: float) -> BaseException:
         """Why the answer to a measurement is no command: what the law raised, or a refusal of its answer."""
         error, self._error = self._error, None
         if error is None:  # a compiled law has no memory: it does the same again
             try:
-                self._number(self._law(tick, time, x, v), tick, time)
+                answered(self._law(tick, time, x, v), self._who, tick, time)
             except BaseException as again:
                 error = again
         if error is None:
-            return Refused(f"{self._side} controller {self.name}: no finite command at tick {tick}, t = {time!r} s")
+            return Refused(f"{self._who}: no finite command at tick {tick}, t = {time!r} s")
         if isinstance(error, (SystemExit, GeneratorExit)):  # which would end who called us, as if all were done
-            error = Refused(f"{self._side} controller {self.name}: {described(error)}, tick {tick}, t = {time!r} s")
+            error = Refused(f"{self._who}: {described(error)}, tick {tick}, t = {time!r} s")
         elif not isinstance(error, Refused):
-            error.add_note(f"{self._side} controller {self.name}, tick {tick}, t = {time!r} s")
+            error.add_note(f"{self._who}, tick {tick}, t = {time!r} s")
         return error

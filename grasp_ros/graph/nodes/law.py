@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
-from grasp_ros.physics.control import limited
+from grasp_ros.physics.control import answered, limited
 from grasp_ros.physics.errors import Refused, place_of
 from grasp_ros.physics.sight import Sight, asked, check
 from grasp_ros.physics.system import COLUMN, System
@@ -27,12 +28,14 @@ class OwnLaw:
 
     def __init__(self, words: str) -> None:
         self.words = words
-        self._found = find_law(words, f"law: {words}")
+        with self._own_up("when it was imported"):
+            self._found = find_law(words, f"law: {words}")
         self.reset()
 
     def reset(self) -> None:
         """Begin anew, without memory."""
-        self._law = begin(self._found, f"law: {self.words}")
+        with self._own_up("when it began"):
+            self._law = begin(self._found, f"law: {self.words}")
         self.asks = asked(self._law)
 
     def check(self, system: System, side: int) -> None:
@@ -45,13 +48,21 @@ class OwnLaw:
         Raises
         ------
         Refused
-            If the law itself raises, or returns what is no number.
+            If the law itself raises, or its answer is no command.
         """
         stages, seen = system.laws[side], Sight(system, system.laws, side, tick, state).seen(self.asks)
         x, v = stages.measured(tick, *state[COLUMN[side] :][:2])
+        with self._own_up(f"at tick {tick}"):
+            answer = self._law(tick, time, x, v, **seen)
+        return float(limited(stages.row.tolist(), answered(answer, f"law: {self.words}", tick, time)))
+
+    @contextmanager
+    def _own_up(self, when: str) -> Iterator[None]:
+        """Refuse whatever a user's code raises, an exit and an interrupt too: a node notes signals, they raise none."""
         try:
-            force = float(self._law(tick, time, x, v, **seen))
-        except Exception as error:  # whatever a user's code may raise
-            words = f"{type(error).__name__}: {error}, at tick {tick}, {place_of(error)}"
-            raise Refused(f"law: {self.words}: {words}") from error
-        return float(limited(stages.row.tolist(), force))
+            yield
+        except Refused:
+            raise
+        except BaseException as error:
+            words = ": ".join(filter(None, (type(error).__name__, str(error))))
+            raise Refused(f"law: {self.words}: {words}, {when}, {place_of(error)}") from error
