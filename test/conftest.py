@@ -25,6 +25,7 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
         signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 RUN_SECONDS = 90.0
+RUN = 'run #1 "🦾\x7f'  # a name that is not quoted alike by all
 SECOND_DOMAIN = str(215 + 8 * (WORKER % 2) + os.getpid() % 8)  # those between have ports that the system gives away
 
 
@@ -71,7 +72,7 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     The first has four processes, the second has one.
     """
     os.environ["ROS_LOG_DIR"] = str(tmp_path_factory.mktemp("log"))
-    command = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=3", "-o", "run #1"]
+    command = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=3", "-o", RUN]
     started = []
     runs = (("first", os.environ["ROS_DOMAIN_ID"], []), ("second", SECOND_DOMAIN, ["--one-process"]))
     for name, domain, words in runs:
@@ -84,4 +85,4 @@ def two_runs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
         out, err = run.communicate(timeout=RUN_SECONDS)
         assert run.returncode == 0, err
         (cwd / "stdout").write_text(out)
-    return started[0][0] / "run #1", started[1][0] / "run #1"
+    return started[0][0] / RUN, started[1][0] / RUN

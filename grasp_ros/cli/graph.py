@@ -16,11 +16,11 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene
 from grasp_ros.cli.bags import add_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
-from grasp_ros.cli.controllers import sides_of
+from grasp_ros.cli.controllers import load_controllers, sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check_reach, network
-from grasp_ros.graph.processes import Graph, GraphError, become
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.processes import PEER_SECONDS, Graph, GraphError, become, quoted
+from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
 from grasp_ros.physics.errors import Refused
 
@@ -48,8 +48,9 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--one-process", action="store_true", help="run all nodes in one process and one thread")
     sub.add_argument("--paused", action="store_true", help="begin paused at the first state, see ctl")
     sub.add_argument(
-        "--peer-timeout", type=float, metavar="S",
-        help="wall time without a sign of life or an answer of a node after which it is silent (default 1.5 s)",
+        "--peer-timeout", type=float, default=PEER_SECONDS, metavar="S",
+        help="wall time without a sign of life or an answer of a node after which it is silent"
+        f" (default {PEER_SECONDS:g} s)",
     )
     sub.add_argument(
         "--on-silence", choices=("end", "wait"), default="end", help="what is done when a node is gone or silent"
@@ -99,9 +100,12 @@ def _reach(options: argparse.Namespace) -> None:
 def _run(options: argparse.Namespace) -> int:
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
+    load_controllers(options.laws)  # refuses what is wrong before anything is there, as the next one does
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
-    Running(options.accuracy, real_time_factor=options.free_running or 0.0)  # refuses what is wrong
+    Running(options.accuracy)
+    if options.free_running is not None:
+        check_factor(options.free_running)
     spent = Spent()
     if not kernels_on_disk():  # otherwise the plant alone loads them
         prepare()
@@ -202,7 +206,7 @@ def _replay(options: argparse.Namespace) -> int:
 
     bag.names(options.bag)  # refuses what is none
     _reach(options)
-    become("player", {"bag": json.dumps(str(options.bag)), "rate": repr(options.rate)})
+    become("player", {"bag": quoted(str(options.bag)), "rate": repr(options.rate)})
 
 
 def _watch(options: argparse.Namespace) -> int:
@@ -220,4 +224,4 @@ def _watch(options: argparse.Namespace) -> int:
 
 def _ctl(options: argparse.Namespace) -> int:
     _reach(options)
-    become("remote", {"words": json.dumps(json.dumps(options.words))}, options.namespace)
+    become("remote", {"words": quoted(json.dumps(options.words))}, options.namespace)

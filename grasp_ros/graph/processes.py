@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -26,7 +27,7 @@ from grasp_ros.scene.files import writing
 STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
-PEER_SECONDS = 1.5  # without a sign of life of a node
+PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a sign of life of a node, and until it comes
 # For the nodes to say it themselves, which know more; they cannot while a lock of shared memory is held by the one that
 # was stopped.
 NODES_SECONDS = 0.4
@@ -57,6 +58,28 @@ def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str
     return [sys.executable, "-P", "-m", "grasp_ros.graph", *nodes, "--ros-args", *words, *names]
 
 
+def quoted(text: str) -> str:
+    """A text as ROS takes one for a parameter, in ASCII: as YAML, to which JSON's pairs of surrogates are nothing.
+
+    Raises
+    ------
+    Refused
+        If it is a name of bytes that are no text.
+    """
+    if re.search("[\ud800-\udfff]", text):
+        raise Refused(f"{text}: not allowed; allowed: a name in UTF-8")
+    return '"' + re.sub(r'[^ !#-\[\]-~]', lambda sign: f"\\U{ord(sign[0]):08x}", text) + '"'
+
+
+def check_timeouts(peer: float, start: float) -> None:
+    """Refuse wall times in s after which a node is silent, and after which it has not come, that can be none."""
+    if not start > 0.0:
+        raise Refused(f"start_timeout_s: {start:g} is not allowed; allowed: a number > 0, or 0 for any time")
+    if not 0.0 < peer <= start:
+        raise Refused(f"peer_timeout_s: {peer:g} is not allowed; allowed: a number > 0, not above start_timeout_s,"
+                      f" {start:g}")
+
+
 class GraphError(RuntimeError):
     """A process of the graph failed: names it and its exit status."""
 
@@ -85,8 +108,8 @@ class Graph:
         Whether all nodes run in one process and one thread.
     namespace : str
         Of all names, /clock too where it is not the root.
-    peer_timeout : float, s, optional
-        Wall time without a sign of life, or an answer, after which a node is silent; default: that of the nodes.
+    peer_timeout : float, s
+        Wall time without a sign of life, or an answer, after which a node is silent.
     on_silence : str
         What the others do then: "end" or "wait".
     """
@@ -101,7 +124,7 @@ class Graph:
     plant: Mapping[str, str] = field(default_factory=dict)
     one_process: bool = False
     namespace: str = "/"
-    peer_timeout: float | None = None
+    peer_timeout: float = PEER_SECONDS
     on_silence: str = "end"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
     begun: float | None = None  # wall time at which the bag was there
@@ -125,7 +148,8 @@ class Graph:
         Raises
         ------
         Refused
-            If the directory exists or cannot be written, the scene has no such controller, or another graph runs here.
+            If the directory exists or cannot be written, the scene has no such controller, the timeout can be none, or
+            another graph runs here.
         """
         for name in (*self.without, *self.laws):
             if name not in self.scene.controllers:
@@ -133,8 +157,9 @@ class Graph:
                 raise Refused(f"{self.scene.name}: {name}: no such controller; allowed: {allowed}")
         for name in self.laws.keys() & {*self.without}:
             raise Refused(f"{name}: a law of its own, and without it: allowed: one of the two")
-        self._place = hold(os.environ, self.namespace)
         scene_file = self.directory / f"{self.scene.name}.yaml"
+        settings = self._settings(scene_file)
+        self._place = hold(os.environ, self.namespace)
         try:
             with writing(self.directory):
                 self.directory.mkdir(parents=True)
@@ -143,29 +168,6 @@ class Graph:
             self.stop()
             raise
         environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ}
-        shared = {"on_silence": self.on_silence}
-        if self.peer_timeout is not None:
-            shared["peer_timeout_s"] = repr(self.peer_timeout)
-        if self.without:
-            shared["start_timeout_s"] = "0"
-        settings = {
-            "monitor": {"bag": json.dumps(str(self.bag)), **shared},
-            **{
-                name: {**shared, "wait_for_monitor": "true", "law": json.dumps(self.laws.get(name, ""))}
-                for name in self.scene.controllers if name not in self.without
-            },
-            "plant": {
-                "scene": json.dumps(str(scene_file)),
-                "accuracy": repr(float(self.accuracy)),
-                "wait_for_monitor": "true",
-                "progress": str(self.progress).lower(),
-                **shared,
-                **self.plant,
-            },
-        }
-        if "free_running" in self.plant:
-            for name in settings.keys() - {"monitor"}:
-                settings[name]["real_time_priority"] = "1"
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         shared_memory.remove_left()
@@ -182,6 +184,33 @@ class Graph:
         finally:
             end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def _settings(self, scene: Path) -> dict[str, dict[str, str]]:
+        """Parameters of the nodes, where the file of the scene will be."""
+        patience = 0.0 if self.without else START_SECONDS
+        check_timeouts(self.peer_timeout, patience or math.inf)
+        shared = {
+            "on_silence": self.on_silence, "peer_timeout_s": repr(self.peer_timeout), "start_timeout_s": repr(patience)
+        }
+        settings = {
+            "monitor": {"bag": quoted(str(self.bag)), **shared},
+            **{
+                name: {**shared, "wait_for_monitor": "true", "law": quoted(self.laws.get(name, ""))}
+                for name in self.scene.controllers if name not in self.without
+            },
+            "plant": {
+                "scene": quoted(str(scene)),
+                "accuracy": repr(float(self.accuracy)),
+                "wait_for_monitor": "true",
+                "progress": str(self.progress).lower(),
+                **shared,
+                **self.plant,
+            },
+        }
+        if "free_running" in self.plant:
+            for name in settings.keys() - {"monitor"}:
+                settings[name]["real_time_priority"] = "1"
+        return settings
 
     def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
         """Command lines by the names of the processes."""
@@ -248,8 +277,7 @@ class Graph:
                 self._stopped.pop(name, None)
             elif found is not None:
                 self._stopped[name] = time.monotonic()
-        patience = PEER_SECONDS if self.peer_timeout is None else self.peer_timeout
-        patience += 0.0 if self.one_process else NODES_SECONDS
+        patience = self.peer_timeout + (0.0 if self.one_process else NODES_SECONDS)
         if self.on_silence == "end" and time.monotonic() - self._stopped.get(name, math.inf) > patience:
             raise GraphError(f"{name}: was stopped, and did not go on for {patience:g} s")
 

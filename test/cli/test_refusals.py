@@ -117,6 +117,13 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("run case_01 --controller left=math:sin --without left_controller -o z",
          "left_controller: a law of its own, and without it: allowed: one of the two"),
         ("run case_01 -o file/x", "file/x: cannot be written: Not a directory"),
+        ("run case_01 -o \udcff", "allowed: a name in UTF-8"),
+        *((f"run case_01 -o z --peer-timeout {word}", f"peer_timeout_s: {word} is not allowed; allowed: a number > 0")
+          for word in ("0", "-1", "nan", "70")),
+        ("run case_01 -o z --free-running 0", "real_time_factor: 0.0 is not allowed; allowed: 1e-06 to 1e+06"),
+        ("run case_01 -o z --free-running nan", "real_time_factor: nan is not allowed"),
+        ("run case_01 -o z --controller left=nowhere:soft", "left=nowhere:soft: no module nowhere; allowed: one of"),
+        ("run case_01 -o z --controller left=math:soft", "left=math:soft: math has no soft; allowed: a callable"),
         ("run case_01 --accuracy 2", "accuracy: 2.0"),
         ("ctl --namespace lab status", "'lab' is not allowed; allowed: / and names of ROS such as /lab/one"),
         ("watch --namespace /1a", "'/1a' is not allowed"),
@@ -169,7 +176,8 @@ def test_bad_input_ends_in_a_line(
     assert program == "lab" or not [line for line in others if "warning: " not in line]
     assert last.startswith(("grasp", "python -m lab"))
     assert complaint in last
-    assert not [path for path in set(workplace.rglob("*")) - before if path.is_file()]
+    assert "a node" not in last
+    assert not [path for path in set(workplace.rglob("*")) - before if path.is_file() or program == "run"]
 
 
 @pytest.mark.parametrize("fault", [ValueError, OSError, MemoryError, KeyError, TypeError, RuntimeError])

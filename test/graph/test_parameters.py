@@ -172,6 +172,22 @@ def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
     assert found.returncode == 0, found.stderr
 
 
+@pytest.mark.parametrize(
+    ("word", "why"),
+    [
+        ("start_timeout_s:=-1", "start_timeout_s: -1 is not allowed; allowed: a number > 0, or 0 for any time"),
+        ("start_timeout_s:=.nan", "start_timeout_s: nan is not allowed"),
+        ("peer_timeout_s:=-1", "peer_timeout_s: -1 is not allowed; allowed: a number > 0, not above start"),
+        ("steps:=0", "Invalid parameter value (0) for parameter. Reason: Parameter steps out of range Min: 1"),
+    ],
+)
+def test_what_a_node_cannot_start_with_is_refused_by_its_name(word: str, why: str) -> None:
+    command = [*START, "plant", "--ros-args", "-p", word]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert found.returncode == 2
+    assert found.stderr.startswith(why)
+
+
 def test_a_word_that_no_node_takes_is_refused() -> None:
     found = subprocess.run([*START, "plant", "case_03"], capture_output=True, text=True, timeout=DEADLINE, check=False)
     assert found.returncode == 2

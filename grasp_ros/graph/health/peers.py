@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from grasp_ros.graph.health.beats import ENDED, Beats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
-from grasp_ros.graph.processes import PEER_SECONDS
+from grasp_ros.graph.processes import PEER_SECONDS, START_SECONDS, check_timeouts
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
@@ -22,7 +22,6 @@ LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this thread was busy
 SWEEPS = 4  # looks without progress that sweep, each of them at first and then one of as many
 GONE_SECONDS = 0.7  # without a source: its last messages are on the way
-START_SECONDS = 60.0
 SLOW = 4  # times longer who shows that it lives may take
 MOST_TEXTS = 8  # that wait for somebody to vouch for them
 
@@ -75,9 +74,7 @@ class PeerNode(GraspNode):
         self.patience = self.read_only("peer_timeout_s", PEER_SECONDS)
         self.start_patience = self.read_only("start_timeout_s", START_SECONDS) or math.inf
         reaction = self.read_only("on_silence", "wait")
-        if not 0.0 < self.patience <= self.start_patience:
-            raise Refused(f"peer_timeout_s: {self.patience:g} is not allowed; allowed: a number > 0, not above"
-                          " start_timeout_s")
+        check_timeouts(self.patience, self.start_patience)
         if reaction not in ("end", "wait"):
             raise Refused(f"on_silence: {reaction!r} is not allowed; allowed: end, wait")
         self._ends = reaction == "end"

@@ -37,7 +37,7 @@ class Steering:
         self._paused = plant.read_only("paused", False)
         self.steps = 0
         self.reset_due = False
-        plant.declare_parameter("steps", 1, ParameterDescriptor(
+        plant.declare("steps", 1, ParameterDescriptor(
             description="control periods of one call of the service step",
             integer_range=[IntegerRange(from_value=1, to_value=MOST_STEPS, step=1)],
         ))

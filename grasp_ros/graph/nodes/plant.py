@@ -27,9 +27,8 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.ros.priority import Priority
 from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.physics.accuracy import ACCURACY
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
@@ -104,8 +103,7 @@ class Plant(SteppedNode):
         if not free:
             return Running(self._accuracy)
         factor = self.read_only("real_time_factor", 1.0)
-        if not factor:
-            raise Refused("real_time_factor: 0.0 is not allowed; allowed: a number > 0, or free_running:=false")
+        check_factor(factor)
         timeouts, reactions = {}, {}
         for topic in topics:
             side = topic.name.split("/")[0]

@@ -52,7 +52,7 @@ def main(name: str, child: bool = False) -> int:
     if name == "plant":
         _spare_the_plant()
     names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
-    makes = [_maker(each) for each in names]
+    makes = {each: _maker(each) for each in names}
     status: int = import_module("grasp_ros.graph.ros.life").run(makes, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)

@@ -6,7 +6,7 @@ import gc
 import signal
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
 import rclpy
@@ -23,7 +23,7 @@ BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before 
 POLL_SECONDS = 0.2
 
 
-def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> int:
+def run(makes: Mapping[str, Callable[[], GraspNode]], received: Sequence[int]) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
 
     0 after a finished run or a signal, 2 if a node refuses its parameters, otherwise the first status of a node that is
@@ -31,12 +31,12 @@ def run(makes: Sequence[Callable[[], GraspNode]], received: Sequence[int]) -> in
     raises.
     """
     nodes: list[GraspNode] = []
-    names = "a node"  # a node that is destroyed has none
+    names = together = ", ".join(makes)
     try:
         _init()
-        for make in makes:
+        for names, make in makes.items():  # noqa: B007 - which one is refused
             nodes.append(make())
-            names = _names(nodes)
+        names = together
         gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
         gc.enable()
         if not nodes[0].work(received):

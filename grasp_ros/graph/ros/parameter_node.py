@@ -43,14 +43,14 @@ class ParameterNode(Node):
         """Declare a parameter that is set at start only, and return its value."""
         number = isinstance(default, float)  # for which an integer will do as well
         descriptor = ParameterDescriptor(description=self._in_words[name], read_only=True, dynamic_typing=number)
-        value = self._declare(name, default, descriptor)
+        value = self.declare(name, default, descriptor)
         if not number:
             return value
         if not isinstance(value, (float, int)) or isinstance(value, bool):
             raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
         return float(value)
 
-    def _declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
+    def declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
         """The value that the start has given, or the default."""
         with _refusing():
             return _plain(self.declare_parameter(name, default, descriptor).value)
@@ -71,7 +71,7 @@ class ParameterNode(Node):
                 if parameter.key not in scene.values[effect.section]:
                     continue
                 name, value = f"{effect.section}.{parameter.key}", scene.values[effect.section][parameter.key]
-                found = self._declare(name, list(value) if parameter.several else value, messages.descriptor(parameter))
+                found = self.declare(name, list(value) if parameter.several else value, messages.descriptor(parameter))
                 if not parameter.accepts(found):
                     raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
                 if (found := parameter.read(found)) != value:
