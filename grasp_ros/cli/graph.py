@@ -18,11 +18,12 @@ from grasp_ros.cli.bags import add_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.controllers import load_controllers, sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
-from grasp_ros.graph.host import check_reach, network
+from grasp_ros.graph.host import check_reach, hold, network
 from grasp_ros.graph.processes import PEER_SECONDS, Graph, GraphError, become, quoted
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.topics import JOINT_STATES
 
 
 def add_to(commands: Any) -> None:
@@ -122,10 +123,18 @@ def _run(options: argparse.Namespace) -> int:
         stopped = _live(graph, spent)
     except GraphError:
         return 1
-    if not (graph.bag / "metadata.yaml").exists():
-        print("grasp: interrupted before the first tick: no bag", file=sys.stderr)
+    if stopped and not _has_ticks(graph.bag):
+        print("grasp: interrupted before the first tick", file=sys.stderr)
         return 130
     return _report(graph, stopped, spent, options)
+
+
+def _has_ticks(path: Path) -> bool:
+    """Whether there is a bag with a state; with one that comes from elsewhere a run waits with a bag that has none."""
+    from grasp_ros.graph import bag
+
+    closed = (path / "metadata.yaml").exists()
+    return closed and any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in bag.raw(path))
 
 
 class Spent:
@@ -204,8 +213,10 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
 def _replay(options: argparse.Namespace) -> int:
     from grasp_ros.graph import bag
 
-    bag.names(options.bag)  # refuses what is none
+    [states] = [name for name, topic in bag.names(options.bag).items() if topic == JOINT_STATES]
     _reach(options)
+    held = hold(os.environ, states.removesuffix(f"/{JOINT_STATES.name}") or "/")
+    held.set_inheritable(True)  # what this process becomes has it to its end
     become("player", {"bag": quoted(str(options.bag)), "rate": repr(options.rate)})
 
 

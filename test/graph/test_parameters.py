@@ -178,7 +178,7 @@ def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
         ("start_timeout_s:=-1", "start_timeout_s: -1 is not allowed; allowed: a number > 0, or 0 for any time"),
         ("start_timeout_s:=.nan", "start_timeout_s: nan is not allowed"),
         ("peer_timeout_s:=-1", "peer_timeout_s: -1 is not allowed; allowed: a number > 0, not above start"),
-        ("steps:=0", "Invalid parameter value (0) for parameter. Reason: Parameter steps out of range Min: 1"),
+        ("steps:=0", "Invalid parameter value (0) for parameter. Reason: Parameter steps out of range. Min: 1"),
     ],
 )
 def test_what_a_node_cannot_start_with_is_refused_by_its_name(word: str, why: str) -> None:

@@ -110,6 +110,16 @@ def test_a_bag_is_published_again_with_its_clock(
         assert {stamp % 1_000_000 for stamp in rows} == {0}
 
 
+def test_a_bag_is_not_published_beside_another_one(two_runs: tuple[Path, Path], launch: Any, command: Any) -> None:
+    """Nor beside a graph, which holds the same place; both would lose their states to each other."""
+    words = ("replay", str(two_runs[0] / "bag"))
+    player = launch(sys.executable, "-m", "grasp_ros.cli", *words)
+    wait_for(lambda: b"player" in Path(f"/proc/{player.pid}/cmdline").read_bytes(), "the first one")
+    found = command(*words)
+    assert (found.returncode, found.stdout) == (2, "")
+    assert "grasp: a graph runs, or a bag is replayed, in ROS domain" in found.stderr
+
+
 def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     """Over one node, so that discovery is paid for once."""
     plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true"]

@@ -34,16 +34,19 @@ pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by 
 @pytest.mark.parametrize(
     ("number", "moment"),
     [(signal.SIGINT, "recording"), (signal.SIGHUP, "recording"), (signal.SIGTERM, "starting"),
-     (signal.SIGQUIT, "starting")],
+     (signal.SIGQUIT, "starting"), (signal.SIGINT, "waiting")],
 )
 def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signal.Signals, moment: str) -> None:
     process = launch(
         sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run"),
+        *(["--without", "left_controller"] if moment == "waiting" else []),
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
     )
     recorded = tmp_path / "run" / "bag" / "bag.mcap"
     if moment == "recording":
         wait_for(lambda: recorded.exists() and recorded.stat().st_size > 200_000, "a bag that grows")
+    elif moment == "waiting":  # for somebody else: there is a bag, without a tick
+        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 0, "a bag")
     else:
         wait_for(lambda: (tmp_path / "run" / "case_01.yaml").exists(), "the first process")
     process.send_signal(number)
