@@ -186,20 +186,20 @@ class Graph:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _settings(self, scene: Path) -> dict[str, dict[str, str]]:
-        """Parameters of the nodes, where the file of the scene will be."""
+        """Parameters of the nodes, where the file of the scene will be; a law may leave the working directory."""
         patience = 0.0 if self.without else START_SECONDS
         check_timeouts(self.peer_timeout, patience or math.inf)
         shared = {
             "on_silence": self.on_silence, "peer_timeout_s": repr(self.peer_timeout), "start_timeout_s": repr(patience)
         }
         settings = {
-            "monitor": {"bag": quoted(str(self.bag)), **shared},
+            "monitor": {"bag": quoted(str(self.bag.absolute())), **shared},
             **{
                 name: {**shared, "wait_for_monitor": "true", "law": quoted(self.laws.get(name, ""))}
                 for name in self.scene.controllers if name not in self.without
             },
             "plant": {
-                "scene": quoted(str(scene)),
+                "scene": quoted(str(scene.absolute())),
                 "accuracy": repr(float(self.accuracy)),
                 "wait_for_monitor": "true",
                 "progress": str(self.progress).lower(),

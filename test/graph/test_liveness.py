@@ -242,6 +242,28 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not() -> None:
     context.shutdown()
 
 
+AWAY = """
+import os, time
+def law(tick, t, x, v):
+    if tick == 50:
+        os.chdir("/")
+    if tick == 500:
+        time.sleep(3600.0)
+    return -5.0 * x - 0.5 * v
+"""
+
+
+def test_a_law_that_goes_away_is_followed_and_one_that_stands_in_one_process_has_as_long_as_in_four(
+    launch: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.py").write_text(AWAY)
+    run = launch(*RUN, "--one-process", "--controller", "left=mine:law", cwd=tmp_path, stderr=subprocess.PIPE)
+    _, err = run.communicate(timeout=DEADLINE)  # the time for the first answer is longer than this
+    assert run.returncode == 1
+    assert re.search(r"^grasp: plant: stands for [67]\.\d s: in .*mine.py, line 7; run/bag has what", err, re.M), err
+    assert bag.read(tmp_path / "run" / "bag").tick[-1] > 100
+
+
 STANDING = """
 import time
 from pathlib import Path

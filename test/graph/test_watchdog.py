@@ -20,8 +20,8 @@ class Clock:
         self.now, self.frozen, self.ended = 100.0, ["/plant"], list[int]()
         monkeypatch.setattr(watchdog.time, "monotonic", lambda: self.now)
         monkeypatch.setattr(watchdog.os, "_exit", self.ended.append)
-        self.dog = Watchdog("monitor", PATIENCE, LAW_PATIENCE, ends, lambda: self.frozen)
-        self.dog.seen(True)
+        self.most: float | None = LAW_PATIENCE
+        self.dog = Watchdog("monitor", PATIENCE, lambda: self.most, ends, lambda: self.frozen)
 
     def beat(self, times: int, seconds: float = BEAT_SECONDS) -> None:
         for _ in range(times):
@@ -63,8 +63,9 @@ def test_a_law_that_does_not_return_has_longer(monkeypatch: Any, capsys: Any) ->
     assert not clock.ended
     clock.beat(2)
     assert clock.ended
-    assert "a law that does not return, say" in capsys.readouterr().err
-    clock.dog.seen(False)
+    assert f" s: in {watchdog.__file__}, line " in capsys.readouterr().err  # where the thread of the nodes is
+    clock.most = None
+    clock.dog.seen()
     clock.ended.clear()
     clock.beat(1000)
     assert not clock.ended

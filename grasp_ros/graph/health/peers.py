@@ -90,7 +90,7 @@ class PeerNode(GraspNode):
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
         self._watchdog = Watchdog(
-            self.get_name(), self.patience, self.start_patience, self._ends, lambda: self.beats.frozen()
+            self.get_name(), self.patience, self.standing, self._ends, lambda: self.beats.frozen()
         )
         self.beats = Beats(self, self.heard, self._watchdog.beat)
         self._looked = self._excused = time.monotonic()
@@ -102,6 +102,10 @@ class PeerNode(GraspNode):
     @abstractmethod
     def needs(self) -> Iterator[Need]:
         """What this node needs of others now that it has begun."""
+
+    def standing(self) -> float | None:
+        """How long its thread may stand, in a law that does not return, say, in s; None: for ever, before it begins."""
+        return self.start_patience if self.begun else None
 
     @abstractmethod
     def progress(self) -> object:
@@ -133,7 +137,7 @@ class PeerNode(GraspNode):
         elif now - self._looked > STILL_SECONDS:  # this thread was busy: what others did meanwhile waits here
             self.sweep()
         self._looked = now
-        self._watchdog.seen(self.begun)
+        self._watchdog.seen()
         self._offer()
         if self.finished:
             return

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -26,8 +27,10 @@ class Watchdog:
     ----------
     name : str
         Of the node.
-    patience, law_patience : float, s
-        How long it may stand while a node of this machine is stopped, and in any case.
+    patience : float, s
+        How long it may stand while a node of this machine is stopped.
+    standing : callable
+        How long in any case, in s; None: for ever.
     ends : bool
         Whether the process ends then.
     frozen : callable
@@ -40,16 +43,17 @@ class Watchdog:
     """
 
     def __init__(
-        self, name: str, patience: float, law_patience: float, ends: bool, frozen: Callable[[], list[str]]
+        self, name: str, patience: float, standing: Callable[[], float | None], ends: bool,
+        frozen: Callable[[], list[str]],
     ) -> None:
-        self._name, self._patience, self._law_patience, self._ends = name, patience, law_patience, ends
+        self._name, self._patience, self._standing, self._ends = name, patience, standing, ends
         self._frozen, self._beaten = frozen, time.monotonic()
         self.resumed, self.stood = self._beaten, 0.0
-        self.seen(False)
+        self.seen()
 
-    def seen(self, armed: bool) -> None:
-        """The nodes' thread goes on; armed: what it does from now on must not last."""
-        self._since, self._said, self._armed = time.monotonic(), -math.inf, armed
+    def seen(self) -> None:
+        """The nodes' thread goes on."""
+        self._since, self._said = time.monotonic(), -math.inf
 
     @property
     def stopped(self) -> bool:
@@ -62,17 +66,18 @@ class Watchdog:
         if self._beaten - before > PAUSE_SECONDS:  # nobody stood meanwhile
             self._since = self.resumed = self._beaten
             self.stood = self._beaten - before
-        seconds = self._beaten - self._since
-        if not self._armed or seconds <= self._patience:
+        seconds, most = self._beaten - self._since, self._standing()
+        if most is None or seconds <= self._patience:
             return
         frozen = " and ".join(self._frozen())
-        if not frozen and not (self._ends and seconds > self._law_patience):
+        if not frozen and not (self._ends and seconds > most):
             return
+        frame = sys._current_frames()[threading.main_thread().ident or 0]  # in which the nodes are
+        why = f"{frozen} was stopped" if frozen else f"in {frame.f_code.co_filename}, line {frame.f_lineno}"
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten
-            why = f"{frozen} was stopped" if frozen else "a law that does not return, say"
             with suppress(OSError):
                 print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
-            tell_parent(self._name, f"stands: {frozen or 'a law'}")
+            tell_parent(self._name, f"stands for {seconds:.1f} s: {why}")
             os._exit(1)

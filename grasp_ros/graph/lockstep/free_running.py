@@ -62,8 +62,11 @@ class FreeRunning:
     Attributes
     ----------
     topics : list of Topic
-        None: it waits for no controller.
+    answered : bool
+        None and never: it waits for no controller.
     """
+
+    answered = False
 
     def __init__(self, plant: SteppedNode, steering: Steering, running: Running, waits: bool) -> None:
         self._plant, self._steering, self._running, self._awaits = plant, steering, running, waits

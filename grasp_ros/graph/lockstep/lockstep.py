@@ -36,6 +36,8 @@ class Lockstep:
     ----------
     topics : list of Topic
         Where the commands come from.
+    answered : bool
+        Whether a state of this run was.
     """
 
     def __init__(self, plant: SteppedNode, steering: Steering) -> None:
@@ -43,7 +45,7 @@ class Lockstep:
         self._commands: dict[int, float] = {}
         self._recorded = Recorded(plant, self.advance)
         self._refused = False  # a second source has come
-        self._answered = False  # whether a state of this run was
+        self.answered = False
         self._asked = 0.0  # wall time of the last repetition
         self._timer: Any = None
         self._going = True  # the timer
@@ -81,14 +83,14 @@ class Lockstep:
         what = f"answer to tick {plant.tick}"
         for topic, side in zip(self.topics, plant.scene.system.laws, strict=True):
             due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
-            yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self._answered)
+            yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self.answered)
         if plant.monitored:
             due = max(plant.asked, self._recorded.heard) if self._complete and self._ahead else math.inf
             yield Need(LYAPUNOV, Gone.ENDS, what=what, due=due)
 
     def ask_again(self, now: float) -> None:
         """Publish the current state again if nothing has come of it for a while: it, or an answer, was lost."""
-        patience = REPEAT_SECONDS if self._answered else FIRST_SECONDS
+        patience = REPEAT_SECONDS if self.answered else FIRST_SECONDS
         since = max(self._plant.asked, self._asked, self._recorded.heard if self._complete else 0.0)
         if self._unsettled:
             self._settle(now)
@@ -147,7 +149,7 @@ class Lockstep:
         self._let_go_on(not ahead and (resetting or not self._steering.stands))
         if self._refused or not plant.begun or plant.finished or ahead or not self._complete:
             return
-        self._answered = True
+        self.answered = True
         if resetting:
             self._commands.clear()
             self._recorded.forget()

@@ -18,7 +18,7 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
 from grasp_ros.graph.health.beats import digest
-from grasp_ros.graph.health.peers import Need
+from grasp_ros.graph.health.peers import SLOW, Need
 from grasp_ros.graph.lockstep.free_running import FreeRunning
 from grasp_ros.graph.lockstep.lockstep import Lockstep
 from grasp_ros.graph.lockstep.steering import Steering
@@ -130,6 +130,10 @@ class Plant(SteppedNode):
     def needs(self) -> Iterator[Need]:
         """Of its loop: controllers and monitor."""
         return self.loop.needs()
+
+    def standing(self) -> float | None:
+        """In one process the laws are in this thread: as long as an answer of another process may take."""
+        return SLOW * self.patience if self.begun and self.loop.answered else super().standing()
 
     def progress(self) -> object:
         """Its time."""
