@@ -16,6 +16,7 @@ import pytest
 
 from grasp_ros import scene, simulation
 from grasp_ros.cli.commands import COMMANDS
+from grasp_ros.cli.main import _parser
 
 
 def test_scenes_lists_all_with_their_titles(command: Any) -> None:
@@ -167,3 +168,9 @@ def test_commands_are_found_in_the_files_that_have_them_and_a_run_needs_no_compi
                " print({'numba', 'scipy', 'matplotlib'} & {*sys.modules})")
     found = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60, check=True)
     assert found.stdout == "set()\n"
+
+
+@pytest.mark.parametrize("number", ["-1", "-.5", "-1e-3", "-2.E+5"])
+def test_a_negative_number_is_no_option(number: str) -> None:
+    words = ["ctl", "set", "left_controller", "left_feedback.set_point_m", number]
+    assert _parser(words).parse_args(words).words == words[1:]

@@ -141,15 +141,19 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     assert ask("resume").startswith("arm_alone: running at tick")
     message = json.loads(ask("echo joint_states 1"))
     assert message["name"] == ["left"]
-    refused = ["set plant steps 0", "step", "pause now", "echo nothing", "nonsense", "step x", "get nobody steps",
+    assert "One arm by itself" in ask("echo scene 1")  # said before this reader came
+    refused = ["set plant steps 0", "step", "pause now", "echo nothing", "nonsense", "step x", "step 0",
+               "get nobody steps", "set left_controller law x", f"set plant steps {10 ** 20}", "set plant steps [1,a]",
                f"set left_controller {gain} -100", "set left_controller left_feedback.position_gain 9"]
     _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
     for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
-                  "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number",
+                  "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number >= 1",
+                  "0: not allowed; allowed: a whole number >= 1", "law: set at the start only",
+                  f"steps: {10 ** 20} is not allowed", "steps: [1, 'a'] is not allowed",
                   "no nobody answers in ROS domain", "allowed: a sum >= 0",
                   "left_feedback.position_gain: left_controller has no such parameter; did you mean " + gain):
         assert words in err
-    assert shell.returncode == 1
+    assert shell.returncode == 2  # that of the last line, which nobody takes; of one that fails it is 1
 
 
 @pytest.mark.parametrize("words", ["yes help | head -n 5000 | {} | head -n 1", "{} <&-"])
@@ -157,6 +161,12 @@ def test_a_shell_ends_with_its_reader_and_without_an_input(words: str) -> None:
     command = "set -o pipefail; " + words.format(f"{sys.executable} -m grasp_ros.cli ctl")
     found = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=DEADLINE, check=False)
     assert (found.returncode in (0, 141), found.stderr) == (True, "")  # 141: `yes`, which nobody reads any more
+
+
+def test_an_output_that_is_full_is_a_sentence() -> None:
+    command = f"{sys.executable} -m grasp_ros.cli ctl help >/dev/full"
+    found = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert (found.returncode, found.stderr) == (1, "standard input or output: No space left on device\n")
 
 
 def test_a_graph_runs_without_any_standard_stream(tmp_path: Path) -> None:

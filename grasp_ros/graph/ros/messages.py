@@ -63,8 +63,8 @@ def reader_qos(topic: Topic) -> QoSProfile:
 
 
 def glance_qos(topic: Topic) -> QoSProfile:
-    """That of a reader for which nobody waits: it may miss what it has no time for."""
-    return QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
+    """That of a reader for which nobody waits: it may miss what it has no time for, but not what was said before it."""
+    return qos(topic) if topic.latched else QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def to_time(time_ns: int) -> Time:

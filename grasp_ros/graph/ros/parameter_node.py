@@ -99,7 +99,9 @@ class ParameterNode(Node):
             if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
                 if _plain(parameter.value) == _plain(self.get_parameter(parameter.name).value):
                     continue
-                return SetParametersResult(successful=False, reason=f"{parameter.name}: {self.why_read_only}")
+                of_scene = "." in parameter.name
+                why = self.why_read_only if of_scene else ParameterNode.why_read_only
+                return SetParametersResult(successful=False, reason=f"{parameter.name}: {why}")
             whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
             numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
         return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)

@@ -16,6 +16,7 @@ from typing import Any
 from rcl_interfaces.srv import GetParameters, ListParameters, SetParameters
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.qos import DurabilityPolicy
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph.host import place
@@ -28,12 +29,17 @@ from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 5.0  # without an answer, or without progress
 SPIN_SECONDS = 0.1
+MOST_BITS = 63  # of a whole number, beside its sign
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
 
 
 class Stopped(Exception):  # noqa: N818 - no error
     """A signal has come."""
+
+
+class Failed(Refused):
+    """Nobody answers, or does what was asked for."""
 
 
 class Remote(GraspNode):
@@ -58,8 +64,11 @@ class Remote(GraspNode):
             self.exit_code = _say(self, self._wanted) if self._wanted else _shell(self)
         except Stopped:
             pass
-        except BrokenPipeError:  # the reader of our output, `head` say, has had it
+        except OSError as error:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            if not isinstance(error, BrokenPipeError):  # the reader of our output, `head` say, has had it
+                print(f"standard input or output: {error.strerror}", file=sys.stderr)
+                self.exit_code = 1
         return True
 
     def do(self, words: Sequence[str]) -> str:
@@ -68,7 +77,9 @@ class Remote(GraspNode):
         Raises
         ------
         Refused
-            If it is not allowed, or nobody answers.
+            If it is not allowed.
+        Failed
+            If nobody answers, or does it.
         """
         action = self._actions.get(words[0])
         wrong = f"{' '.join(words)}: not allowed; allowed: {HELP}"
@@ -82,7 +93,7 @@ class Remote(GraspNode):
 
     def step(self, number: str = "1") -> str:
         """Let a paused plant do some periods."""
-        self._set("plant", Parameter("steps", value=_whole(number)))
+        self._set("plant", "steps", _whole(number))
         return self.plant("step")
 
     def plant(self, name: str) -> str:
@@ -94,14 +105,14 @@ class Remote(GraspNode):
             if found != before:
                 deadline = time.monotonic() + PATIENCE_SECONDS
             elif time.monotonic() > deadline:
-                raise Refused(f"the plant does not go on: {_line(found)}")
+                raise Failed(f"the plant does not go on: {_line(found)}")
         return _line(found)
 
     def _status(self, service: str) -> dict[str, Any]:
         answer = self._ask(Trigger, f"plant/{service}", Trigger.Request())
         found: dict[str, Any] = json.loads(answer.message)
         if not answer.success:
-            raise Refused(found["why"])
+            raise Failed(found["why"])
         return found
 
     def get(self, node: str, *names: str) -> str:
@@ -117,7 +128,7 @@ class Remote(GraspNode):
     def put(self, node: str, name: str, value: str) -> str:
         """Set a parameter of a node."""
         self._names(node, [name])
-        self._set(node, Parameter(name, value=strict_yaml.load(value)))
+        self._set(node, name, strict_yaml.load(value))
         return self._values(node, [name])
 
     def _names(self, node: str, wanted: Sequence[str]) -> list[str]:
@@ -128,21 +139,29 @@ class Remote(GraspNode):
                 raise Refused(f"{name}: {node} has no such parameter; {allowed(name, known)}")
         return known
 
-    def _set(self, node: str, parameter: Parameter) -> None:
-        request = SetParameters.Request(parameters=[parameter.to_parameter_msg()])
+    def _set(self, node: str, name: str, value: Any) -> None:
+        try:
+            if isinstance(value, int) and value.bit_length() > MOST_BITS:
+                raise TypeError
+            request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
+        except TypeError:
+            raise Refused(f"{name}: {value} is not allowed; allowed: what a parameter of ROS can be") from None
         [result] = self._ask(SetParameters, f"{node}/set_parameters", request).results
         if not result.successful:
             raise Refused(result.reason)
 
-    def echo(self, topic: str, number: str = "0") -> str:
+    def echo(self, topic: str, number: str = "") -> str:
         """Print messages of a topic as they come, a line each; so many, or until a signal."""
-        name, wanted = self.resolve_topic_name(topic), _whole(number) or None
+        name, wanted = self.resolve_topic_name(topic), _whole(number) if number else None
         self._wait(lambda: bool(self.count_publishers(name)), f"nobody publishes {name}")
         [kind, *_] = dict(self.get_topic_names_and_types())[name]
         if kind not in messages.TYPES:
             raise Refused(f"{name}: {kind} cannot be shown; allowed: {', '.join(messages.TYPES)}")
         found: list[Any] = []
-        qos = messages.glance_qos(Topic(name, kind))
+        latched = {DurabilityPolicy.TRANSIENT_LOCAL} == {
+            writer.qos_profile.durability for writer in self.get_publishers_info_by_topic(name)
+        }
+        qos = messages.glance_qos(Topic(name, kind, latched=latched))
         subscription = self.create_subscription(messages.TYPES[kind], name, found.append, qos)
         try:
             for message in islice(self._coming(found), wanted):
@@ -174,7 +193,7 @@ class Remote(GraspNode):
         while not condition():
             self._spin()
             if time.monotonic() > deadline:
-                raise Refused(otherwise)
+                raise Failed(otherwise)
 
     def _spin(self) -> None:
         self._executor.spin_once(timeout_sec=SPIN_SECONDS)
@@ -183,8 +202,8 @@ class Remote(GraspNode):
 
 
 def _whole(word: str) -> int:
-    if not word.isdecimal():
-        raise Refused(f"{word}: not allowed; allowed: a whole number")
+    if not word.isdecimal() or not int(word):
+        raise Refused(f"{word}: not allowed; allowed: a whole number >= 1")
     return int(word)
 
 
@@ -223,5 +242,5 @@ def _say(remote: Remote, words: Sequence[str]) -> int:
             print(answer, flush=True)
     except Refused as error:
         print(error, file=sys.stderr, flush=True)
-        return 1
+        return 1 if isinstance(error, Failed) else 2
     return 0
