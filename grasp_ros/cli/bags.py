@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_output
 from grasp_ros.cli.checks import check_output, prepare, warn
 from grasp_ros.cli.output import destination, show
+from grasp_ros.physics.errors import Refused
 
 if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
     from grasp_ros.graph.recording import Recording
@@ -38,6 +39,13 @@ def add_limits(sub: argparse.ArgumentParser) -> None:
                      " in control periods")
     sub.add_argument("--min-factor", type=float, metavar="F", help="of a free run: exit status 1 if it was slower,"
                      " simulated seconds in a second")
+
+
+def check_limits(options: argparse.Namespace, lockstep: bool) -> None:
+    """Refuse limits that no run can be judged by; one in lockstep, which waits for every command, by none."""
+    for name, limit in (("--max-age", options.max_age), ("--min-factor", options.min_factor)):
+        if limit is not None and (lockstep or not 0.0 <= limit < math.inf):
+            raise Refused(f"{name} {limit:g} is not allowed; allowed: for a free run, a number >= 0")
 
 
 def keeps(recording: Recording, options: argparse.Namespace) -> bool:
@@ -72,6 +80,7 @@ def _inspect(options: argparse.Namespace) -> int:
 
     check_output(options.output, (".csv",), options.force, [options.bag])
     recording = bag.read(options.bag)
+    check_limits(options, recording.running.lockstep)
     warn(recording.scene)
     found = summary(recording)
     rows, equal = report.describe_recording(recording, found), True

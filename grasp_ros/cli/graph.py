@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene
-from grasp_ros.cli.bags import add_limits, keeps
+from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.controllers import load_controllers, sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
@@ -104,6 +104,7 @@ def _run(options: argparse.Namespace) -> int:
     load_controllers(options.laws)  # refuses what is wrong before anything is there, as the next one does
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
+    check_limits(options, lockstep=options.free_running is None)
     Running(options.accuracy)
     if options.free_running is not None:
         check_factor(options.free_running)
@@ -121,7 +122,9 @@ def _run(options: argparse.Namespace) -> int:
     )
     try:
         stopped = _live(graph, spent)
-    except GraphError:
+    except GraphError as error:
+        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
+        print(f"grasp: {error}{there}", file=sys.stderr)
         return 1
     if stopped and not _has_ticks(graph.bag):
         print("grasp: interrupted before the first tick", file=sys.stderr)
@@ -166,10 +169,6 @@ def _live(graph: Graph, spent: Spent) -> bool:
         graph.wait(received)
         spent.note("start", graph.begun)
         spent.note("run")
-    except GraphError as error:  # said before the others are stopped, which takes a while
-        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
-        print(f"grasp: {error}{there}", file=sys.stderr)
-        raise
     finally:
         graph.stop()
         spent.note("stop")

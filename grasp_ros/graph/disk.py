@@ -37,7 +37,8 @@ class Sink:
 
     def __init__(self, path: Path, reserve: Reserve) -> None:
         self.file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        self._reserve, self._size, self.full = reserve, 0, False
+        self._reserve, self._size = reserve, 0
+        self.full = 0  # the error, one of FULL
 
     def write(self, data: bytes) -> int:
         """Write all of it."""
@@ -48,7 +49,7 @@ class Sink:
             except OSError as error:
                 if self.full or error.errno not in FULL:
                     raise
-                self.full = True
+                self.full = error.errno
                 self._reserve.release()
                 continue
             self._size += done

@@ -7,6 +7,7 @@ bag is closed, not cut off.
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import resource
@@ -187,11 +188,11 @@ class Recorder:
         except OSError as error:
             if error.errno not in FULL:
                 raise
-            self._sink.full = True
+            self._sink.full = error.errno
         limit, _ = resource.getrlimit(resource.RLIMIT_FSIZE)
         room = limit - self._sink.tell() if limit != resource.RLIM_INFINITY else RESERVE_BYTES + index
         if self._sink.full or room < RESERVE_BYTES + index:
-            why = "no space is left on the disk" if self._sink.full else "files may not be larger"
+            why = "files may not be larger" if self._sink.full in (0, errno.EFBIG) else "no space is left on the disk"
             end = f"the recording ends at {self._last_ns / NANOSECONDS} s"
             self._error = f"{self._path}: {end}: {why}; the bag is closed, and whole up to there"
             self._finish(why, {})

@@ -117,6 +117,9 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("run case_01 --controller left=math:sin --without left_controller -o z",
          "left_controller: a law of its own, and without it: allowed: one of the two"),
         ("run case_01 -o file/x", "file/x: cannot be written: Not a directory"),
+        ("run case_01 -o z --max-age 3", "--max-age 3 is not allowed; allowed: for a free run, a number >= 0"),
+        ("run case_01 -o z --free-running --min-factor -1", "--min-factor -1 is not allowed; allowed: for a free run"),
+        ("run case_01 -o z --free-running --max-age nan", "--max-age nan is not allowed; allowed: for a free run"),
         ("run case_01 -o \udcff", "allowed: a name in UTF-8"),
         *((f"run case_01 -o z --peer-timeout {word}", f"peer_timeout_s: {word} is not allowed; allowed: a number > 0")
           for word in ("0", "-1", "nan", "70")),

@@ -47,6 +47,18 @@ def test_inspect_says_size_duration_and_rates_in_numbers(recorded: tuple[Path, T
     assert "501 at 1000 Hz: /clock, joint_states, left/effort_command, " in shown
 
 
+def test_limits_of_a_free_run_are_none_of_lockstep(recorded: tuple[Path, Trajectory], command: Any) -> None:
+    found = command("inspect", str(recorded[0]), "--max-age", "3")
+    assert (found.returncode, found.stdout) == (2, "")
+    assert found.stderr == "grasp: --max-age 3 is not allowed; allowed: for a free run, a number >= 0\n"
+
+
+def test_the_file_of_a_bag_is_drawn_as_its_directory(recorded: tuple[Path, Trajectory], command: Any) -> None:
+    found = [command("plot", str(path), "-o", f"{number}.png", "--width", "60")
+             for number, path in enumerate((recorded[0], recorded[0] / "bag.mcap"))]
+    assert [result.returncode for result in found] == [0, 0], found
+
+
 def test_verify_says_in_numbers_what_differs(recorded: tuple[Path, Trajectory], tmp_path: Path, command: Any) -> None:
     path, run = recorded
     found = json.loads(command("verify", str(path), "--json").stdout)

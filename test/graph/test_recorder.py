@@ -335,7 +335,7 @@ def test_a_bag_that_was_moved_meanwhile_ends_and_opens(tmp_path: Path, run: Traj
 
 def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-    ticks = list(study.ticks_of(run))
+    ticks, number = list(study.ticks_of(run)), 0
     try:
         recorder = Recorder(path, run.scene, {})
         for number in range(10**6):
@@ -343,6 +343,16 @@ def limited(path: Path, run: Trajectory, limit: int, answers: Any) -> None:
             recorder.write_tick(number * run.scene.period_ns, messages)
     except bag.BagError as error:
         answers.put((number, str(error)))
+
+
+@pytest.mark.slow
+def test_a_limit_that_leaves_no_room_is_no_full_disk(tmp_path: Path, run: Trajectory) -> None:
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+    child = context.Process(target=limited, args=(tmp_path / "bag", run, RESERVE_BYTES, answers))
+    child.start()
+    assert "the recording ends at 0.0 s: files may not be larger" in answers.get(timeout=SECONDS)[1]
+    child.join(SECONDS)
 
 
 @pytest.mark.slow
