@@ -71,6 +71,7 @@ def add_to(commands: Any) -> None:
     _add_namespace(sub, "of the graph")
     _add_network(sub)
     sub = add_command(commands, "ctl", _ctl)
+    sub._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")  # -1e-3 is no option, either
     sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N]; none: a shell that stays connected")
     _add_namespace(sub, "of the graph")

@@ -53,12 +53,6 @@ def test_limits_of_a_free_run_are_none_of_lockstep(recorded: tuple[Path, Traject
     assert found.stderr == "grasp: --max-age 3 is not allowed; allowed: for a free run, a number >= 0\n"
 
 
-def test_the_file_of_a_bag_is_drawn_as_its_directory(recorded: tuple[Path, Trajectory], command: Any) -> None:
-    found = [command("plot", str(path), "-o", f"{number}.png", "--width", "60")
-             for number, path in enumerate((recorded[0], recorded[0] / "bag.mcap"))]
-    assert [result.returncode for result in found] == [0, 0], found
-
-
 def test_verify_says_in_numbers_what_differs(recorded: tuple[Path, Trajectory], tmp_path: Path, command: Any) -> None:
     path, run = recorded
     found = json.loads(command("verify", str(path), "--json").stdout)
