@@ -25,7 +25,7 @@ for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
         signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
 
 RUN_SECONDS = 90.0
-RUN = 'run #1 "🦾\x7f'  # a name that is not quoted alike by all
+RUN = 'run #1 "🦾'  # a name that is not quoted alike by all
 SECOND_DOMAIN = str(215 + 8 * (WORKER % 2) + os.getpid() % 8)  # those between have ports that the system gives away
 
 

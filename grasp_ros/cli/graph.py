@@ -9,6 +9,7 @@ import re
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,11 @@ from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.controllers import load_controllers, sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check_reach, hold, network
-from grasp_ros.graph.processes import PEER_SECONDS, Graph, GraphError, become, quoted
+from grasp_ros.graph.parameters import PEER_SECONDS, quoted
+from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
-from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.errors import Refused, place_of
 from grasp_ros.scene.topics import JOINT_STATES
 
 
@@ -102,11 +104,11 @@ def _reach(options: argparse.Namespace) -> None:
 def _run(options: argparse.Namespace) -> int:
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
-    load_controllers(options.laws)  # refuses what is wrong before anything is there, as the next one does
+    _try_to_load(options.laws)
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)
-    Running(options.accuracy)
+    Running(options.accuracy)  # refuses what is wrong before anything is there, as those around it do
     if options.free_running is not None:
         check_factor(options.free_running)
     spent = Spent()
@@ -131,6 +133,17 @@ def _run(options: argparse.Namespace) -> int:
         print("grasp: interrupted before the first tick", file=sys.stderr)
         return 130
     return _report(graph, stopped, spent, options)
+
+
+def _try_to_load(laws: Sequence[str]) -> None:
+    """Refuse laws that are not to be had; the nodes load them again."""
+    try:
+        load_controllers(laws)
+    except Refused:
+        raise
+    except (Exception, SystemExit) as error:
+        words = f"{type(error).__name__}: {error}, {place_of(error)}"
+        raise Refused(f"--controller: {' '.join(laws)}: cannot be imported: {words}") from None
 
 
 def _has_ticks(path: Path) -> bool:

@@ -29,13 +29,7 @@ class Alike(NamedTuple):
 
 
 def alike(topic: Topic, cdrs: Sequence[bytes]) -> Iterator[Alike]:
-    """All messages of a topic, those together that differ in their numbers alone.
-
-    Raises
-    ------
-    rosbags.serde.SerdeError, or what `scene.files.DAMAGE` lists
-        If one is no message of the topic.
-    """
+    """All messages of a topic, those together that differ in their numbers alone."""
     sizes, rest = np.array([len(cdr) for cdr in cdrs]), np.arange(len(cdrs))
     while len(rest):
         cdr = cdrs[rest[0]]

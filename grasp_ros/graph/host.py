@@ -77,11 +77,6 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     given : mapping of str to str
     alone : bool, optional
         Whether all nodes are in one process, which need not look for others.
-
-    Raises
-    ------
-    Refused
-        ROS itself would take another domain, or wait.
     """
     domain, reach = given.get(DOMAIN, ""), given.get(RANGE, "")
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):

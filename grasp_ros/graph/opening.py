@@ -22,13 +22,7 @@ CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it
 
 
 def open_storage(path: Path, salvage: bool = False) -> Storage:
-    """The storage file of a bag, or of a directory that holds one.
-
-    Raises
-    ------
-    BagError
-        If there is none, or more than one.
-    """
+    """The storage file of a bag, or of a directory that holds one."""
     path = Path(path)
     with decoding(path, KIND, BagError):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
@@ -49,11 +43,6 @@ def begin(storage: Storage, path: Path) -> Iterator[Stored]:
     """All messages of a bag; from the first one on its records say which scene it holds, and how that ran.
 
     In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
-
-    Raises
-    ------
-    BagError
-        If nothing in the bag says it.
     """
     messages = storage.messages()
     first = list(islice(messages, 1))
@@ -78,13 +67,7 @@ def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
 
 
 def scene_of(storage: Storage, path: Path) -> scenes.Scene:
-    """The scene of a bag, once its first record has been read.
-
-    Raises
-    ------
-    BagError
-        If the bag has none.
-    """
+    """The scene of a bag, once its first record has been read."""
     if OWN_RECORD not in storage.records:
         raise BagError(f"{path}: not {KIND}: its scene is missing")
     return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
+from grasp_ros.physics.errors import Refused
+
+PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a sign of life of a node, and until it comes
 PEERS = {
-    "peer_timeout_s": "wall time without a sign of life or an answer (1.5)",
-    "start_timeout_s": "wall time for peers to come and to answer first; 0: any (60)",
+    "peer_timeout_s": f"wall time without a sign of life or an answer ({PEER_SECONDS:g})",
+    "start_timeout_s": f"wall time for peers to come and to answer first; 0: any ({START_SECONDS:g})",
     "on_silence": "what is done when a peer is gone or silent: end or wait (wait)",
 }
 MONITORED = {"wait_for_monitor": "start only when a monitor listens; a plant never outruns it (false)"}
@@ -48,3 +53,19 @@ def usage(node: str) -> str:
         own = "left_arm.position_m" if node == "plant" else f"{node.split('_')[0]}_feedback.position_gain_N_per_m"
         rows += ["", f"Numbers of the scene are parameters, too: -p {own}:=0.4"]
     return "\n".join([f"usage: {node} [--ros-args [-p NAME:=VALUE] ...]", "", *rows, ""])
+
+
+def quoted(text: str) -> str:
+    """A text as `-p` takes one, in ASCII: as YAML, to which JSON's pairs of surrogates are nothing."""
+    if re.search("[\ud800-\udfff]", text):
+        raise Refused(f"{text}: not allowed; allowed: a name in UTF-8")
+    return '"' + re.sub(r'[^ !#-\[\]-~]', lambda sign: f"\\U{ord(sign[0]):08x}", text) + '"'
+
+
+def check_timeouts(peer: float, start: float) -> None:
+    """Refuse wall times in s after which a node is silent, and after which it has not come, that can be none."""
+    if not start > 0.0:
+        raise Refused(f"start_timeout_s: {start:g} is not allowed; allowed: a number > 0, or 0 for any time")
+    if not 0.0 < peer <= start:
+        raise Refused(f"peer_timeout_s: {peer:g} is not allowed; allowed: a number > 0, not above start_timeout_s,"
+                      f" {start:g}")

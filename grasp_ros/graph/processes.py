@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 import signal
 import socket
 import subprocess
@@ -19,6 +18,7 @@ from typing import NoReturn
 
 from grasp_ros.graph import shared_memory
 from grasp_ros.graph.host import hold
+from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts, quoted
 from grasp_ros.graph.stopping import STOP_SIGNALS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
@@ -27,7 +27,6 @@ from grasp_ros.scene.files import writing
 STOP_SECONDS = 10.0
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
-PEER_SECONDS, START_SECONDS = 1.5, 60.0  # without a sign of life of a node, and until it comes
 # For the nodes to say it themselves, which know more; they cannot while a lock of shared memory is held by the one that
 # was stopped.
 NODES_SECONDS = 0.4
@@ -56,28 +55,6 @@ def _command(nodes: Sequence[str], parameters: Mapping[str, str], namespace: str
     names = ["-r", f"__ns:={namespace}", "-r", f"/clock:={root}/clock"] if root else []
     # -P: a checkout in the working directory must not take the place of the package that is running.
     return [sys.executable, "-P", "-m", "grasp_ros.graph", *nodes, "--ros-args", *words, *names]
-
-
-def quoted(text: str) -> str:
-    """A text as ROS takes one for a parameter, in ASCII: as YAML, to which JSON's pairs of surrogates are nothing.
-
-    Raises
-    ------
-    Refused
-        If it is a name of bytes that are no text.
-    """
-    if re.search("[\ud800-\udfff]", text):
-        raise Refused(f"{text}: not allowed; allowed: a name in UTF-8")
-    return '"' + re.sub(r'[^ !#-\[\]-~]', lambda sign: f"\\U{ord(sign[0]):08x}", text) + '"'
-
-
-def check_timeouts(peer: float, start: float) -> None:
-    """Refuse wall times in s after which a node is silent, and after which it has not come, that can be none."""
-    if not start > 0.0:
-        raise Refused(f"start_timeout_s: {start:g} is not allowed; allowed: a number > 0, or 0 for any time")
-    if not 0.0 < peer <= start:
-        raise Refused(f"peer_timeout_s: {peer:g} is not allowed; allowed: a number > 0, not above start_timeout_s,"
-                      f" {start:g}")
 
 
 class GraphError(RuntimeError):

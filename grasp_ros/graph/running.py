@@ -35,11 +35,6 @@ class Running:
         Simulated time without a command after which `reactions` apply, by side; empty in lockstep.
     reactions : dict of str to str
         "hold" the last command, "zero" force, or "stop" the run.
-
-    Raises
-    ------
-    Refused
-        If one of them is not allowed.
     """
 
     accuracy: float = ACCURACY
@@ -79,13 +74,7 @@ class Running:
 
 
 def parse(text: str) -> Running:
-    """Read what `Running.to_yaml` wrote.
-
-    Raises
-    ------
-    Refused
-        If the text is not such a text.
-    """
+    """Read what `Running.to_yaml` wrote."""
     try:
         found: dict[str, Any] = strict_yaml.load(text)
         found.pop("mode")

@@ -76,13 +76,7 @@ class Storage:
         self.closed = len(self._data) > FOOTER_BYTES and self._data[-len(MAGIC) :] == MAGIC
 
     def messages(self) -> Iterator[Stored]:
-        """All messages in the order of the file.
-
-        Raises
-        ------
-        BagError
-            If the file is no MCAP file of ROS 2, or damaged.
-        """
+        """All messages in the order of the file."""
         data = self._data
         if data[: len(MAGIC)] != MAGIC:
             raise BagError(f"{self.path}: not a bag of this package: no MCAP file")
@@ -210,13 +204,7 @@ class Storage:
 
 
 def unpack(body: bytes) -> bytes:
-    """Content of a chunk's record, of the size and with the checksum that it claims, and not too large.
-
-    Raises
-    ------
-    McapError, zstandard.ZstdError, struct.error, UnicodeDecodeError, OverflowError
-        If it is not.
-    """
+    """Content of a chunk's record, of the size and with the checksum that it claims, and not too large."""
     chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     allowed = min(RECORD_BYTES, RATIO * (len(chunk.data) + 1000))
     if chunk.uncompressed_size > allowed:

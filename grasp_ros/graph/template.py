@@ -36,13 +36,7 @@ class Template:
                 first = last
 
     def fill(self, time_ns: int, numbers: Sequence[float]) -> bytes:
-        """The serialized message of a time and some numbers.
-
-        Raises
-        ------
-        struct.error
-            If there are more or fewer numbers than it has.
-        """
+        """The serialized message of a time and some numbers."""
         _STAMP.pack_into(self._cdr, _STAMP_AT, *divmod(time_ns, NANOSECONDS))
         packed = self._numbers.pack(*numbers)
         for place, which in self._runs:

@@ -28,6 +28,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "merge.yaml": b"<<: {title: x}\n", "date.yaml": b"title: 2001-13-45\n",
         "digits.yaml": b"title: x\nreadings: " + b"1" * 5000, "empty.npz": b"", "nomarks.md": b"x", "bytes.md": b"\xff",
         "keys/journal.jsonl": b'{"a": 1}\n', "list/journal.jsonl": b"[]\n", "bytes/journal.jsonl": b"\xff\n",
+        "exits.py": b"import sys; sys.exit(0)", "breaks.py": b"raise BrokenPipeError",
         "words/journal.jsonl": b"not JSON\n", "bag/metadata.yaml": b"[" * 20_000,
         "there.npz/x": b"", "folder.yaml/x": b"", "no.mcap": b"x",
     }.items():
@@ -126,6 +127,8 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("run case_01 -o z --free-running 0", "real_time_factor: 0.0 is not allowed; allowed: 1e-06 to 1e+06"),
         ("run case_01 -o z --free-running nan", "real_time_factor: nan is not allowed"),
         ("run case_01 -o z --controller left=nowhere:soft", "left=nowhere:soft: no module nowhere; allowed: one of"),
+        *((f"run case_01 -o z --controller left={module}:law", f"cannot be imported: {error}")
+          for module, error in (("exits", "SystemExit: 0"), ("breaks", "BrokenPipeError: "))),
         ("run case_01 -o z --controller left=math:soft", "left=math:soft: math has no soft; allowed: a callable"),
         ("run case_01 --accuracy 2", "accuracy: 2.0"),
         ("ctl --namespace lab status", "'lab' is not allowed; allowed: / and names of ROS such as /lab/one"),
@@ -180,7 +183,8 @@ def test_bad_input_ends_in_a_line(
     assert last.startswith(("grasp", "python -m lab"))
     assert complaint in last
     assert "a node" not in last
-    assert not [path for path in set(workplace.rglob("*")) - before if path.is_file() or program == "run"]
+    new = [path for path in set(workplace.rglob("*")) - before if "__pycache__" not in str(path)]
+    assert not [path for path in new if path.is_file() or program == "run"]
 
 
 @pytest.mark.parametrize("fault", [ValueError, OSError, MemoryError, KeyError, TypeError, RuntimeError])

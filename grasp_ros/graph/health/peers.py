@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 from grasp_ros.graph.health.beats import ENDED, Beats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
-from grasp_ros.graph.processes import PEER_SECONDS, START_SECONDS, check_timeouts
+from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
@@ -56,12 +56,6 @@ class Trouble(NamedTuple):
 
 class PeerNode(GraspNode):
     """A node that needs others; parameters peer_timeout_s, start_timeout_s, on_silence.
-
-    Parameters
-    ----------
-    name : str
-    options
-        As in `rclpy.node.Node`.
 
     Attributes
     ----------

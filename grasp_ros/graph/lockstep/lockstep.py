@@ -20,7 +20,6 @@ from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import NEW
-from grasp_ros.physics.model import Array
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
 REPEAT_SECONDS, FIRST_SECONDS = 1.0, 0.4  # the first state is the one that a reader may miss: it has just come
@@ -158,7 +157,11 @@ class Lockstep:
             if plant.at_end:
                 plant.finish()
             else:
-                plant.step(self._take_commands())
+                forces = np.zeros(3)
+                for side, force in self._commands.items():
+                    forces[side] = force
+                self._commands.clear()
+                plant.step(forces)
 
     def _let_go_on(self, going: bool) -> None:
         """Stop the timer of a scene without controllers while nothing is due: it would keep others from their turn."""
@@ -183,10 +186,3 @@ class Lockstep:
                  if len(nodes) > 1]
         self._plant.fail(f"{'; '.join(words) or 'a command topic had two sources'};"
                          " allowed in lockstep: one, or who answers first would decide")
-
-    def _take_commands(self) -> Array:
-        forces = np.zeros(3)
-        for side, force in self._commands.items():
-            forces[side] = force
-        self._commands.clear()
-        return forces

@@ -46,13 +46,7 @@ class Judge:
                 if name.removesuffix("_controller") not in self._acting]
 
     def announce(self, side: str, announcement: Announcement) -> None:
-        """Take note of a law that will act.
-
-        Raises
-        ------
-        Refused
-            If it is not a law of this scene.
-        """
+        """Take note of a law that will act."""
         wanted = set(self._scene.numbers_of(f"{side}_controller"))
         if set(announcement.numbers) != wanted:
             raise Refused(f"{side}/parameters: {', '.join(announcement.numbers) or 'nothing'}; allowed: exactly"

@@ -19,11 +19,6 @@ class OwnLaw:
     ----------
     words : str
         "module:object", see `scene.own_law`.
-
-    Raises
-    ------
-    Refused
-        If there is no such object, or it cannot be called.
     """
 
     def __init__(self, words: str) -> None:
@@ -43,13 +38,7 @@ class OwnLaw:
         check(self.asks, system, side, f"law: {self.words}")
 
     def command(self, system: System, side: int, tick: int, time: float, state: Sequence[float]) -> float:
-        """Command in N that answers the state (6,) of a tick, through the stages of the scene.
-
-        Raises
-        ------
-        Refused
-            If the law itself raises, or its answer is no command.
-        """
+        """Command in N that answers the state (6,) of a tick, through the stages of the scene."""
         stages, seen = system.laws[side], Sight(system, system.laws, side, tick, state).seen(self.asks)
         x, v = stages.measured(tick, *state[COLUMN[side] :][:2])
         with self._own_up(f"at tick {tick}"):

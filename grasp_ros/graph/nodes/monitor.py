@@ -196,12 +196,10 @@ class Monitor(PeerNode):
             self.refuse("refused announcements", CHANGES[side])
             self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
 
-    def _is_sure(self, topic: Topic, cdr: bytes) -> bool:
-        """Whether a command can be nobody else's."""
-        return self._sources[topic].alone() and self._limits.allow(topic, messages.raw_command(cdr))
-
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        arrival = self._ticks.put(topic, cdr, topic not in self._sources or self._is_sure(topic, cdr))
+        sources = self._sources.get(topic)  # of commands: is this one nobody else's?
+        sure = sources is None or (sources.alone() and self._limits.allow(topic, messages.raw_command(cdr)))
+        arrival = self._ticks.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
         elif arrival is Arrival.AGAIN:  # what was published has been lost

@@ -33,7 +33,10 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: Sequence[int]) -
     nodes: list[GraspNode] = []
     names = together = ", ".join(makes)
     try:
-        _init()
+        try:
+            rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+        except RuntimeError as error:  # the base of what rcl raises
+            raise Refused(f"--ros-args: {error}") from None
         for names, make in makes.items():  # noqa: B007 - which one is refused
             nodes.append(make())
         names = together
@@ -102,11 +105,3 @@ def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:
         before, look = now, time.monotonic() + QUIET_SECONDS
         while time.monotonic() < look:
             executor.spin_once(timeout_sec=QUIET_SECONDS)
-
-
-def _init() -> None:
-    """Start rclpy with the arguments of the process."""
-    try:
-        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
-    except RuntimeError as error:  # the base of what rcl raises
-        raise Refused(f"--ros-args: {error}") from None

@@ -47,12 +47,6 @@ class Phase(Enum):
 class GraspNode(ParameterNode):
     """A node with counters on /diagnostics and an end.
 
-    Parameters
-    ----------
-    name : str
-    options
-        As in `rclpy.node.Node`: context, namespace, parameter_overrides and so on.
-
     Attributes
     ----------
     finished : bool

@@ -59,11 +59,6 @@ class ParameterNode(Node):
         """Declare the numbers of a scene that belong to an executable; returns what the start has put in their place.
 
         The types are dynamic so that an integer will do for a floating-point number.
-
-        Raises
-        ------
-        Refused
-            If the start has given a number that is not allowed, or one that is not there.
         """
         given = {}
         for effect in scene.effects:

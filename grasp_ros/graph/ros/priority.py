@@ -19,11 +19,6 @@ class Priority:
     Between equals a thread waits some milliseconds for its turn when all processors are busy, several periods of a fast
     loop. Linux gives this priority to whoever has the right, by CAP_SYS_NICE or a limit `rtprio`; without it the node
     says so and goes on.
-
-    Raises
-    ------
-    Refused
-        If it is not a whole number from 0 to 99.
     """
 
     def __init__(self, node: GraspNode) -> None:
