@@ -142,9 +142,10 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     message = json.loads(ask("echo joint_states 1"))
     assert message["name"] == ["left"]
     assert "One arm by itself" in ask("echo scene 1")  # said before this reader came
-    refused = ["set plant steps 0", "step", "pause now", "echo nothing", "nonsense", "step x", "step 0",
-               "get nobody steps", "set left_controller law x", f"set plant steps {10 ** 20}", "set plant steps [1,a]",
-               f"set left_controller {gain} -100", "set left_controller left_feedback.position_gain 9"]
+    refused = ["set plant steps 0", f"set plant steps {10 ** 20}", "set plant steps [1,a]", "step",  # while it is there
+               "pause now", "echo nothing", "nonsense", "step x", "step 0", "get nobody steps",
+               "set left_controller law x", f"set left_controller {gain} -100",
+               "set left_controller left_feedback.position_gain 9"]
     _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
     for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
                   "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number >= 1",
