@@ -9,7 +9,6 @@ import re
 import signal
 import sys
 import time
-from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from grasp_ros.graph.parameters import PEER_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
-from grasp_ros.physics.errors import Refused, place_of
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.topics import JOINT_STATES
 
 
@@ -73,7 +72,6 @@ def add_to(commands: Any) -> None:
     _add_namespace(sub, "of the graph")
     _add_network(sub)
     sub = add_command(commands, "ctl", _ctl)
-    sub._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?$")  # -1e-3 is no option, either
     sub.add_argument("words", nargs="*", metavar="WORD", help="pause, resume, step [N], reset, status, get NODE"
                      " [NAME ...], set NODE NAME VALUE, echo TOPIC [N]; none: a shell that stays connected")
     _add_namespace(sub, "of the graph")
@@ -104,7 +102,7 @@ def _reach(options: argparse.Namespace) -> None:
 def _run(options: argparse.Namespace) -> int:
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
-    _try_to_load(options.laws)
+    load_controllers(options.laws)  # the nodes do it again
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)
@@ -133,17 +131,6 @@ def _run(options: argparse.Namespace) -> int:
         print("grasp: interrupted before the first tick", file=sys.stderr)
         return 130
     return _report(graph, stopped, spent, options)
-
-
-def _try_to_load(laws: Sequence[str]) -> None:
-    """Refuse laws that are not to be had; the nodes load them again."""
-    try:
-        load_controllers(laws)
-    except Refused:
-        raise
-    except (Exception, SystemExit) as error:
-        words = f"{type(error).__name__}: {error}, {place_of(error)}"
-        raise Refused(f"--controller: {' '.join(laws)}: cannot be imported: {words}") from None
 
 
 def _has_ticks(path: Path) -> bool:

@@ -13,6 +13,8 @@ from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.sight import CALLABLE, asked
 
+FAULTS = (Exception, SystemExit, GeneratorExit)  # of a user's code; a KeyboardInterrupt is somebody's Ctrl-C
+
 
 def find_law(place: str, what: str) -> Law | type:
     """The object that `module:object` names.
@@ -44,7 +46,7 @@ def find_law(place: str, what: str) -> Law | type:
                       " installed") from None
     except (ImportError, SyntaxError) as error:
         raise Refused(f"{what}: {module} cannot be imported: {error}") from None
-    except (Exception, SystemExit) as error:
+    except FAULTS as error:
         raise Refused(f"{what}: {module} cannot be imported: {described(error)}") from error
     try:
         law: Any = reduce(getattr, name.split("."), holder)
@@ -83,7 +85,7 @@ def begin(law: Law | type, what: str) -> Law:
             begun = law()
         elif hasattr(law, "reset"):
             law.reset()
-    except (Exception, SystemExit) as error:
+    except FAULTS as error:
         raise Refused(f"{what}: {law!r} does not begin: {described(error)}") from error
     if not callable(begun):
         raise Refused(f"{what}: {begun!r} is not allowed; allowed: {CALLABLE}")

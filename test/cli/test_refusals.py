@@ -128,7 +128,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("run case_01 -o z --free-running nan", "real_time_factor: nan is not allowed"),
         ("run case_01 -o z --controller left=nowhere:soft", "left=nowhere:soft: no module nowhere; allowed: one of"),
         *((f"run case_01 -o z --controller left={module}:law", f"cannot be imported: {error}")
-          for module, error in (("exits", "SystemExit: 0"), ("breaks", "BrokenPipeError: "))),
+          for module, error in (("exits", "SystemExit: 0"), ("breaks", "BrokenPipeError, "))),
         ("run case_01 -o z --controller left=math:soft", "left=math:soft: math has no soft; allowed: a callable"),
         ("run case_01 --accuracy 2", "accuracy: 2.0"),
         ("ctl --namespace lab status", "'lab' is not allowed; allowed: / and names of ROS such as /lab/one"),

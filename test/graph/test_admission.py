@@ -205,6 +205,6 @@ def test_a_law_that_raises_ends_the_run_with_its_line(launch: Any, tmp_path: Pat
     )
     _, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 1
-    assert re.search(r"law: broken:law: ZeroDivisionError: division by zero, at tick 30, \S*broken\.py, line 2", err)
+    assert re.search(r"law: broken:law: ZeroDivisionError: division by zero, \S*broken\.py, line 2, at tick 30", err)
     assert "Traceback" not in err
     assert len(bag.read(tmp_path / "run" / "bag").tick) == 30

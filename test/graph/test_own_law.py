@@ -123,15 +123,17 @@ def test_a_class_makes_one_law_for_each_arm() -> None:
 @pytest.mark.parametrize(
     ("source", "when"),
     [
-        ("import sys\n{}", "when it was imported"),
-        ("import sys\nclass law:\n    def __init__(self): {}\n    def __call__(self, *_): pass", "when it began"),
-        ("import sys\ndef law(*_): {}", "at tick 7"),
+        ("import sys\n{}", ""),
+        ("import sys\nclass law:\n    def __init__(self): {}\n    def __call__(self, *_): pass", ""),
+        ("import sys\ndef law(*_): {}", ", at tick 7"),
     ],
     ids=["import", "begin", "answer"],
 )
 def test_whatever_a_law_raises_in_the_graph_is_its_own(here: Path, source: str, when: str, line: str) -> None:
+    if "Keyboard" in line and not when:
+        pytest.skip("it is somebody's Ctrl-C")
     (here / "needs_here.py").write_text(source.format(line))
-    with pytest.raises(Refused, match=rf"^law: needs_here:law: {ENDS[line]}, {when}, .*needs_here.py, line \d$"):
+    with pytest.raises(Refused, match=rf"^law: needs_here:law: .*{ENDS[line]}, .*needs_here.py, line \d{when}$"):
         OwnLaw("needs_here:law").command(scenes.load("case_01").system, LEFT, 7, 0.007, [0.0] * 6)
 
 

@@ -138,8 +138,8 @@ def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signa
 @pytest.mark.parametrize(
     ("line", "options", "words"),
     [
-        ("sys.exit(0)", [], r"left_controller: law: mine:law: SystemExit: 0, at tick 50, .*mine.py, line 4"),
-        ("sys.exit(0)", ["--one-process"], r"left_controller: law: mine:law: SystemExit: 0, at tick 50, .*, line 4"),
+        ("sys.exit(0)", [], r"left_controller: law: mine:law: SystemExit: 0, .*mine.py, line 4, at tick 50"),
+        ("sys.exit(0)", ["--one-process"], r"left_controller: law: mine:law: SystemExit: 0, .*, line 4, at tick 50"),
         ("os._exit(0)", [], r"left_controller: ended with exit status 0 before the run was over"),
         ("os._exit(0)", ["--one-process"], r"graph: ended with exit status 0 before the run was over"),
     ],
