@@ -37,7 +37,7 @@ from grasp_ros.exact.records import (
 from grasp_ros.observe.observe import BEGIN, FINISH
 from grasp_ros.observe.observer import Watcher
 from grasp_ros.observe.settling import takes_energy
-from grasp_ros.observe.sight import UNDECIDED, Context, Seen, Wanted
+from grasp_ros.observe.sight import UNDECIDED, Memory, Seen, Switch, Wanted
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
 
 
@@ -73,18 +73,6 @@ class Room(NamedTuple):
     observer: Integers  # (2,)
 
 
-class Watch(NamedTuple):
-    """Arrays of a `observer.Watcher`."""
-
-    loop: Array
-    own: Array
-    base: Array
-    gains: Array
-    seen: Array
-    bound: Array  # (1,)
-    context: Integers
-
-
 class Limits(NamedTuple):
     """What bounds a row."""
 
@@ -92,6 +80,7 @@ class Limits(NamedTuple):
     max_events: int
     max_work: int
     stop: Integers  # (1,) not 0: return after the row
+    settled: float  # part of the largest displacement within which a row counts as settled
     horizons: int  # that a row may go on until V_c decides whether it has settled
 
 
@@ -125,17 +114,17 @@ def door() -> Door:
 
 
 @kernel
-def load_row(rows: Rows, i: int, room: Room, watch: Watch) -> None:
+def load_row(rows: Rows, i: int, room: Room, memory: Memory) -> None:
     """Put one row where it is computed."""
     for body in range(3):
         for column in range(4):
             value = rows.loop[i, body, column]
-            watch.loop[body, column] = watch.base[body, column] = value
-            watch.own[body, column] = rows.own[i, body, column]
+            memory.loop[body, column] = memory.base[body, column] = value
+            memory.own[body, column] = rows.own[i, body, column]
             room.plant.given[body, column] = 1.0 if column == Of.MASS and value == 0.0 else value
     for side in range(2):
         for column in range(2):
-            watch.gains[side, column] = rows.gains[i, side, column]
+            memory.gains[side, column] = rows.gains[i, side, column]
             room.plant.pairs[side, column] = rows.pairs[i, side, column]
     for place in range(6):
         room.state.y[place] = rows.state[i, place]
@@ -170,12 +159,12 @@ def run_row(door: Any, loop: Loop, rows: Rows, i: int, room: Room, limits: Limit
 
 
 @kernel
-def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, watch: Watch, limits: Limits) -> int:
+def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, memory: Memory, limits: Limits) -> int:
     """Go on with a row as `observer.settle` does, until V_c decides; why it ended."""
-    seen, outcome, done = watch.seen, Outcome.DONE.value, 1
-    wanted, losses = watch.context[Context.WANTED], watch.context[Context.LOSSES]
-    watch.context[Context.WANTED], watch.context[Context.LOSSES] = Wanted.SETTLING.value, 0
-    losing = takes_energy(watch.loop, room.plant.pairs, room.plant_block[COULOMB])
+    seen, switches, outcome, done = memory.seen, memory.switches, Outcome.DONE.value, 1
+    wanted, losses = switches[Switch.WANTED], switches[Switch.LOSSES]
+    switches[Switch.WANTED], switches[Switch.LOSSES] = Wanted.SETTLING.value, 0
+    losing = takes_energy(memory.loop, room.plant.pairs, room.plant_block[COULOMB])
     left, right = rows.touches[i, 0], rows.touches[i, 1]
     while seen[Seen.SETTLED] == UNDECIDED and losing and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
@@ -187,41 +176,41 @@ def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, watch: Watch, l
     rows.seen[i, Seen.SETTLED] = seen[Seen.SETTLED] if seen[Seen.SETTLED] != UNDECIDED else math.inf
     for body in range(3):
         rows.seen[i, Seen.OUTSIDE + body] = seen[Seen.OUTSIDE + body]
-    watch.context[Context.WANTED], watch.context[Context.LOSSES] = wanted, losses
+    switches[Switch.WANTED], switches[Switch.LOSSES] = wanted, losses
     return int(outcome)
 
 
 @machine_door
-def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, watch: Watch, limits: Limits) -> int:
+def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, memory: Memory, limits: Limits) -> int:
     """Integrate the rows; returns how many, fewer only if a stop was asked for."""
     n = rows.state.shape[0]
     for i in range(n):
         if limits.stop[0] != 0:
             return i
-        load_row(rows, i, room, watch)
+        load_row(rows, i, room, memory)
         if room.observer[ADDRESS] != 0:
-            call(room.observer[ADDRESS], room.observer[CONTEXT], BEGIN, watch.bound[0], 0.0, 0)
+            call(room.observer[ADDRESS], room.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0)
         outcome = run_row(door, loop, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
         if room.observer[ADDRESS] != 0:
             call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
-            for place in range(watch.seen.shape[0]):
-                rows.seen[i, place] = watch.seen[place]
-            if outcome == Outcome.DONE and watch.context[Context.WANTED] & Wanted.SETTLING.value:
-                outcome = go_on(door, loop, rows, i, room, watch, limits)
+            for place in range(memory.seen.shape[0]):
+                rows.seen[i, place] = memory.seen[place]
+            if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
+                outcome = go_on(door, loop, rows, i, room, memory, limits)
         rows.outcome[i] = outcome
     return n
 
 
-def integrate_rows(rows: Rows, duration: float, wanted: Wanted, settled: float, limits: Limits) -> int:
+def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) -> int:
     """Integrate rows of one length under continuous feedback; returns how many.
 
     Parameters
     ----------
     rows : Rows
         Updated in place.
-    duration, wanted, settled
+    duration, wanted
         As for an `Integrator` and `observer.watch`.
     limits : Limits
         Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too. Another thread may set
@@ -231,13 +220,11 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, settled: float, 
     plant, state = plant_of(plant_block), state_of(state_block, mode)
     watcher = Watcher(plant, state, wanted)
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
-    watcher.context[Context.CERTAIN] = 1
-    watch = Watch(
-        watcher.loop, watcher.own, watcher.base, watcher.gains, watcher.seen, np.array([settled]), watcher.context)
+    watcher.memory.switches[Switch.CERTAIN] = 1
     limits = limits._replace(max_work=min(limits.max_work, BREATH))
     with workspace(limits.tolerance) as (block, order, tables, events):
         observer = watcher.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
         room = Room(block, order, plant_block, state_block, mode, plant, state, np.zeros(0), np.zeros((0, 6)), events,
                     np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)
-        done = run_rows(door(), loop, rows, room, watch, limits)
+        done = run_rows(door(), loop, rows, room, watcher.memory, limits)
     return int(done)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import math
 
-from numba import carray
-
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import allocating, inlined, kernel
-from grasp_ros.exact.driver.callback import call, floats_at, integers_at
+from grasp_ros.exact.compilation.jit import door, inlined, kernel
+from grasp_ros.exact.driver.callback import call
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.impact import stored_energy
-from grasp_ros.exact.records import Array, Integers
+from grasp_ros.exact.records import Array
 from grasp_ros.observe.flight_extremes import flight_ranges, state_of, weights
 from grasp_ros.observe.losses import add_losses
 from grasp_ros.observe.settling import kept_sight, last_outside, settled_from, watch_bound
@@ -22,21 +20,19 @@ from grasp_ros.observe.sight import (
     SEEN,
     STATES,
     UPPER,
-    Context,
     Kept,
+    Memory,
     Quantity,
     Seen,
     Sight,
+    Switch,
     Wanted,
-    bodies_at,
-    kept_at,
-    seen_at,
+    memory_at,
     sight_of,
 )
 from grasp_ros.observe.step_extremes import extremes_of, step_ranges
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Kind, Law, Of, Pair, U, X
 
-PLACES, CLOCK, RESTS = len(Context), 3, 3
 BEGIN, FINISH = -2, -1  # in place of a kind of segment
 
 
@@ -96,69 +92,63 @@ def watch_quantities(sight: Sight, seen: Array, wanted: int) -> None:
             seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
 
 
-@allocating
-def watch_level(context: Integers, sight: Sight, seen: Array) -> None:
+@kernel
+def watch_level(m: Memory) -> None:
     """Keep the largest rise of V_c, as it is at the ends of segments."""
-    seen[Seen.LEVEL] = level(bodies_at(context, Context.LOOP), sight.pairs, sight.y)
+    seen = m.seen
+    seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
     seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
     seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
 
 
-@allocating
-def begin(context: Integers, bound: float) -> None:
+@kernel
+def begin(m: Memory, bound: float) -> None:
     """Forget the last run, and remember the state at which this one begins."""
-    seen = seen_at(context)
+    seen, y = m.seen, m.y
     for place in range(SEEN):
         seen[place] = 0.0
     for q in range(QUANTITIES):
         seen[Seen.LOW + q], seen[Seen.HIGH + q] = math.inf, -math.inf
-    y = carray(floats_at(context[Context.Y]), (STATES,))
     for place in range(STATES):
         seen[Seen.STATE + place] = y[place]
-    pairs = carray(floats_at(context[Context.PAIRS]), (2, 2))
-    seen[Seen.LEVEL] = seen[Seen.LEAST] = level(bodies_at(context, Context.LOOP), pairs, y)
+    seen[Seen.LEVEL] = seen[Seen.LEAST] = level(m.loop, m.pairs, y)
     seen[Seen.BOUND], seen[Seen.SETTLED] = bound * max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])), math.nan
-    kept = kept_at(context)
     for body in (LEFT, OBJECT, RIGHT):
-        kept[body, Kept.KIND] = NONE
+        m.kept[body, Kept.KIND] = NONE
         if abs(y[velocity_lane(body) - 1]) > seen[Seen.BOUND]:
             seen[Seen.OUTSIDE + body] = math.inf
 
 
-@allocating
-def finish(context: Integers) -> None:
+@kernel
+def finish(m: Memory) -> None:
     """What follows at the end of a run: the last times outside the bound, and whether they are the last for good."""
-    seen, kept = seen_at(context), kept_at(context)
+    seen, kept = m.seen, m.kept
     for body in (LEFT, OBJECT, RIGHT):
         if kept[body, Kept.KIND] != NONE:
-            sight = kept_sight(sight_of(context, 0, 0.0, 0.0, 0), kept[body])
+            sight = kept_sight(sight_of(m, 0, 0.0, 0.0, 0), kept[body])
             seen[Seen.OUTSIDE + body] = kept[body, Kept.BEGIN] + last_outside(sight, body, seen[Seen.BOUND])
             kept[body, Kept.KIND] = NONE
     seen[Seen.LAST_OUTSIDE] = max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
-    pairs, y = carray(floats_at(context[Context.PAIRS]), (2, 2)), carray(floats_at(context[Context.Y]), (STATES,))
-    loop = bodies_at(context, Context.LOOP)
-    if context[Context.CERTAIN] != 0:
-        rest = carray(floats_at(context[Context.REST]), (RESTS,))
-        seen[Seen.SETTLED] = settled_from(loop, pairs, level(loop, pairs, y), rest[SINCE] < math.inf, seen)
+    if m.switches[Switch.CERTAIN] != 0:
+        V_c, rests = level(m.loop, m.pairs, m.y), m.rest[SINCE] < math.inf
+        seen[Seen.SETTLED] = settled_from(m.loop, m.pairs, V_c, rests, seen)
 
 
-@allocating
+@door
 def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
     """Remember what is wanted of a segment of t s, which has just ended; called by `callback.notify`.
 
     Before a run it is called with BEGIN and the part of the largest displacement that counts as settled; after it with
     FINISH.
     """
-    context = carray(integers_at(address), (PLACES,))
+    m = memory_at(address)
     if kind == BEGIN:
-        begin(context, t)
+        begin(m, t)
         return 0
     if kind == FINISH:
-        finish(context)
+        finish(m)
         return 0
-    sight, seen, wanted = sight_of(context, kind, t, s, degree), seen_at(context), context[Context.WANTED]
-    clock = carray(floats_at(context[Context.CLOCK]), (CLOCK,))
-    now = clock[2] + (clock[0] + clock[1])
+    sight, seen, wanted = sight_of(m, kind, t, s, degree), m.seen, m.switches[Switch.WANTED]
     if not math.isfinite(sight.y.sum() + t):
         return 0
     seen[Seen.SEGMENTS] += 1.0
@@ -167,19 +157,19 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
         write_ranges(sight)
         watch_quantities(sight, seen, wanted)
     if bound:
-        watch_bound(sight, seen, kept_at(context), now)
-    if context[Context.LOSSES] != 0:
-        call(context[Context.LOSSES], address, kind, t, s, degree)
+        watch_bound(sight, seen, m.kept, m.clock[2] + (m.clock[0] + m.clock[1]))
+    if m.switches[Switch.LOSSES] != 0:
+        call(m.switches[Switch.LOSSES], address, kind, t, s, degree)
     if wanted & Wanted.RISE.value:
-        watch_level(context, sight, seen)
+        watch_level(m)
     for place in range(STATES):
         sight.before[place] = sight.y[place]
     return 0
 
 
-@allocating
+@door
 def observe_losses(address: int, kind: int, t: float, s: float, degree: int) -> int:
     """Add the losses of a segment; a function of its own, so that only who asks for them waits for its compilation."""
-    context = carray(integers_at(address), (PLACES,))
-    add_losses(sight_of(context, kind, t, s, degree), bodies_at(context, Context.BASE), seen_at(context))
+    m = memory_at(address)
+    add_losses(sight_of(m, kind, t, s, degree), m.base, m.seen)
     return 0

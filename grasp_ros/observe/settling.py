@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import allocating, kernel
+from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import own_acceleration
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
@@ -88,7 +88,7 @@ def keep(sight: Sight, kept: Array, now: float) -> None:
             kept[Kept.TABLE + i] = sight.c[i]
 
 
-@allocating
+@inlined
 def kept_sight(sight: Sight, kept: Array) -> Sight:
     """The segment that was kept, in place of the last one."""
     for body in range(3):

@@ -5,12 +5,22 @@ from __future__ import annotations
 from enum import IntEnum, IntFlag
 from typing import NamedTuple
 
-from numba import carray
+import numpy as np
+from numba import typeof
 
-from grasp_ros.exact.compilation.jit import allocating
+from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.contact.step_order import higher_order, series_order
-from grasp_ros.exact.driver.callback import floats_at, integers_at
-from grasp_ros.exact.records import Array, Integers
+from grasp_ros.exact.driver.callback import reader
+from grasp_ros.exact.records import (
+    PLANT_NUMBERS,
+    STATE_NUMBERS,
+    Array,
+    Integers,
+    Plant,
+    State,
+    plant_of,
+    state_of,
+)
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.layout import LANES
 
@@ -87,29 +97,48 @@ NONE = -1.0
 KEPT = Kept.TABLE + LANES * LONGEST
 
 
-class Context(IntEnum):
-    """Places of the addresses and numbers that an observer is called with."""
+class Switch(IntEnum):
+    """Places of the whole numbers by which an observer is told what to do."""
 
-    C = 0  # records.Tables
-    SIZE = 1
-    Y = 2  # records.State
-    MODE = 3
-    CLOCK = 4
-    BODIES = 5  # records.Plant
-    GIVEN = 6
-    PAIRS = 7
-    LOOP = 8  # (3, 4) bodies with the continuous feedback, whose energy is V_c
-    OWN = 9  # (3, 4) bodies by themselves
-    BASE = 10  # (3, 4) those of them that the motion has without held commands and external forces
-    GAINS = 11  # (2, 2) Kp and Kv of the feedback that acts all the time; 0 where commands are held
-    SEEN = 12
-    KEPT = 13  # (3, KEPT) see `Kept`, by body
-    ROWS = 14  # scratch
-    COUNTS = 15  # scratch, and the modes of a segment that was kept
-    WANTED = 16
-    LOSSES = 17  # address of `observe.observe_losses`, 0: they are not wanted
-    REST = 18  # records.State
-    CERTAIN = 19  # 1: V_c cannot rise
+    WANTED = 0
+    LOSSES = 1  # address of `observe.observe_losses`, 0: they are not wanted
+    CERTAIN = 2  # 1: V_c cannot rise
+
+
+class Memory(NamedTuple):
+    """What an observer is called with: arrays of a run, and its own."""
+
+    c: Array  # (LANES LONGEST,) records.Tables
+    size: Array
+    y: Array  # records.State
+    mode: Integers
+    clock: Array
+    rest: Array
+    bodies: Array  # records.Plant
+    given: Array
+    pairs: Array
+    loop: Array  # (3, 4) bodies with the continuous feedback, whose energy is V_c
+    own: Array  # (3, 4) bodies by themselves
+    base: Array  # (3, 4) those of them that the motion has without held commands and external forces
+    gains: Array  # (2, 2) Kp and Kv of the feedback that acts all the time; 0 where commands are held
+    seen: Array  # (SEEN,)
+    kept: Array  # (3, KEPT) see `Kept`, by body
+    rows: Array  # (LOOKS, LONGEST) scratch
+    counts: Integers  # (COUNTS + MODES,) scratch, and the modes of a segment that was kept
+    switches: Integers  # (3,)
+
+
+def memory_of(plant: Plant, state: State) -> Memory:
+    """A memory for the runs that use these arrays; a run brings its tables."""
+    scratch = np.zeros((LOOKS, LONGEST))
+    return Memory(
+        scratch[0], scratch[0], state.y, state.mode, state.clock, state.rest, plant.bodies, plant.given, plant.pairs,
+        np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((2, 2)), np.zeros(SEEN), np.zeros((3, KEPT)),
+        scratch, np.zeros(COUNTS + MODES, dtype=np.int64), np.zeros(len(Switch), dtype=np.int64))
+
+
+_RUN = plant_of(np.zeros(PLANT_NUMBERS)), state_of(np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64))
+memory_at = reader(typeof(memory_of(*_RUN)))
 
 
 class Sight(NamedTuple):
@@ -133,35 +162,8 @@ class Sight(NamedTuple):
     counts: Integers  # (COUNTS + MODES,) scratch
 
 
-@allocating
-def seen_at(context: Integers) -> Array:
-    """What is remembered."""
-    return carray(floats_at(context[Context.SEEN]), (SEEN,))
-
-
-@allocating
-def kept_at(context: Integers) -> Array:
-    """The segments that are kept."""
-    return carray(floats_at(context[Context.KEPT]), (3, KEPT))
-
-
-@allocating
-def bodies_at(context: Integers, place: Context) -> Array:
-    """One of the tables (3, 4) of bodies."""
-    return carray(floats_at(context[place]), (3, 4))
-
-
-@allocating
-def sight_of(context: Integers, kind: int, t: float, s: float, degree: int) -> Sight:
+@inlined
+def sight_of(m: Memory, kind: int, t: float, s: float, degree: int) -> Sight:
     """The segment that has just ended."""
-    seen = seen_at(context)
-    return Sight(
-        kind, t, s, degree, carray(floats_at(context[Context.C]), (LANES * LONGEST,)),
-        carray(floats_at(context[Context.SIZE]), (LANES,)),
-        seen[Seen.STATE :], carray(floats_at(context[Context.Y]), (STATES,)),
-        carray(integers_at(context[Context.MODE]), (3,)), bodies_at(context, Context.BODIES),
-        carray(floats_at(context[Context.PAIRS]), (2, 2)), bodies_at(context, Context.GIVEN),
-        bodies_at(context, Context.OWN), carray(floats_at(context[Context.GAINS]), (2, 2)),
-        carray(floats_at(context[Context.ROWS]), (LOOKS, LONGEST)),
-        carray(integers_at(context[Context.COUNTS]), (COUNTS + MODES,)),
-    )
+    return Sight(kind, t, s, degree, m.c, m.size, m.seen[Seen.STATE :], m.y, m.mode, m.bodies, m.pairs, m.given, m.own,
+                 m.gains, m.rows, m.counts)

@@ -64,6 +64,12 @@ def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
     return Directions(*(np.ascontiguousarray(np.stack(arrays, axis=-1)) for arrays in zip(*found, strict=True)))
 
 
+def no_directions(n: int) -> Directions:
+    """Directions that change nothing."""
+    return Directions(np.zeros((3, 4, n)), np.zeros((2, 2, n)), np.zeros((6, n)), np.zeros(n),
+                      np.zeros((2, len(Column), n)), np.zeros((0, 3, n)))
+
+
 def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> None:
     """Refuse numbers by which a run of a scene has no derivatives.
 

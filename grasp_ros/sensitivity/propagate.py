@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import allocating, kernel
+from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.records import Array
@@ -30,11 +30,20 @@ from grasp_ros.sensitivity.contact import (
 )
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
-from grasp_ros.sensitivity.tangents import Count, Motion, Number, Outputs, Rates, Tangents, copy_matrix, tangents_at
+from grasp_ros.sensitivity.tangents import (
+    UNSEEN,
+    Count,
+    Motion,
+    Number,
+    Outputs,
+    Rates,
+    Tangents,
+    copy_matrix,
+    tangents_at,
+)
 
 FINISH = -1  # in place of a kind of segment
 GAP = 64.0 * EPS  # of the time: what is longer was rest, of which no segment tells
-UNSEEN = -1  # slide before the first segment
 
 
 @kernel
@@ -113,7 +122,7 @@ def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
 @kernel
 def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
     """Write what stands in `at` to the next output, and the forces that act."""
-    row, n = outputs.counts[Count.FILLED], outputs.counts[Count.DIRECTIONS]
+    row, n = outputs.counts[Count.FILLED], outputs.out.shape[2]
     for body in (LEFT, RIGHT, OBJECT):
         outputs.forces[row, body, 0] = motion.bodies[body, Of.FORCE]
         for j in range(n):
@@ -259,7 +268,7 @@ def remember(t: Tangents) -> None:
         t.motion.before[place] = t.motion.y[place]
 
 
-@allocating
+@door
 def propagate(address: int, kind: int, span: float, s: float, degree: int) -> int:
     """Carry the tangents over a segment, which has just ended; called by `callback.notify`.
 

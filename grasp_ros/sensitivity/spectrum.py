@@ -12,12 +12,11 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.accuracy import ACCURACY
-from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
-from grasp_ros.sensitivity.directions import Directions
+from grasp_ros.sensitivity.directions import no_directions
 from grasp_ros.sensitivity.run import Carrier
 
 PIECE_S = 0.5
@@ -39,10 +38,8 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     n = len(places)
     start = np.zeros((6, n))
     start[places, range(n)] = 1.0
-    changes = Directions(np.zeros((3, 4, n)), np.zeros((2, 2, n)), start, np.zeros(n),
-                         np.zeros((2, len(Column), n)), np.zeros((0, 3, n)))
     integrator = Integrator(scene.system, continuous=True, accuracy=accuracy)
-    integrator.observer = carrier = Carrier(integrator, changes, np.zeros(0))
+    integrator.observer = carrier = Carrier(integrator, no_directions(n)._replace(state=start), np.zeros(0))
     pieces = max(math.ceil(scene.duration / PIECE_S), 1)
     grown: Array = np.zeros(n)
     for piece in range(pieces):

@@ -6,19 +6,31 @@ directions last, so that the inner loops of the kernels become vector instructio
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 from typing import NamedTuple
 
-from numba import carray
+import numpy as np
+from numba import typeof
 
-from grasp_ros.exact.compilation.jit import allocating, kernel
+from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.compilation.vectors import WIDTH
 from grasp_ros.exact.contact.step_order import higher_order, series_order
-from grasp_ros.exact.driver.callback import floats_at, integers_at
-from grasp_ros.exact.records import Array, Integers
+from grasp_ros.exact.driver.callback import reader
+from grasp_ros.exact.records import (
+    PLANT_NUMBERS,
+    STATE_NUMBERS,
+    Array,
+    Integers,
+    Plant,
+    State,
+    plant_of,
+    state_of,
+)
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import LANES
+from grasp_ros.sensitivity.directions import Directions, no_directions
 
 TERMS = higher_order(series_order(FINEST)) + 1  # of the longest series
 STATES = 6
@@ -26,6 +38,8 @@ STEP = STATES * WIDTH  # numbers of one coefficient of all states, for WIDTH dir
 BLOCK = STEP * TERMS
 ROOM = LANES * (TERMS + 3)  # of eight series for `contact.multiply`
 COLUMNS = len(Column)
+UNSEEN = -1  # slide before the first segment
+LINE_BYTES = 64
 
 
 class Row(IntEnum):
@@ -44,16 +58,10 @@ ROWS = Row.LOSS + 2
 class Count(IntEnum):
     """Places of the whole numbers."""
 
-    DIRECTIONS = 0
-    OUTPUTS = 1
-    FILLED = 2  # outputs
-    TICK = 3  # whose inputs act; -1: none yet
-    TICKS = 4  # rows of `external`; 0: no external force depends on a direction
-    DELAY = 5
-    NORMALS = 6  # rows of `normals`
-    DRIVEN = 7  # whether inputs change at ticks
-    SLIDE = 8  # mode of the object in the last segment; -1: there was none
-    COLUMNS = 9  # of tangents: the directions, and zeros up to a multiple of WIDTH
+    FILLED = 0  # outputs
+    TICK = 1  # whose inputs act; -1: none yet
+    DRIVEN = 2  # whether inputs change at ticks
+    SLIDE = 3  # mode of the object in the last segment; UNSEEN: there was none
 
 
 class Number(IntEnum):
@@ -66,44 +74,6 @@ class Number(IntEnum):
 
 
 NUMBERS = Number.OBJECT + 4
-
-
-class Place(IntEnum):
-    """Places of the addresses that the observer is called with."""
-
-    C = 0  # of the run: records.Tables, State, Plant
-    Y = 1
-    MODE = 2
-    CLOCK = 3
-    BODIES = 4
-    PAIRS = 5
-    COUNTS = 6
-    NUMBERS = 7
-    BEFORE = 8
-    X = 9
-    AT = 10
-    GIVEN = 11
-    ACTING = 12
-    FORCE = 13
-    LAW = 14
-    COULOMB = 15
-    GRID = 16
-    OUT = 17
-    SERIES = 18
-    ROWS = 19
-    MATRICES = 20
-    CONTROL = 21
-    CONTROL_RATES = 22
-    NORMALS = 23
-    WAITING = 24
-    EXTERNAL = 25
-    FACTORS = 26
-    PRODUCTS = 27
-    FORCES = 28
-    OWN = 29  # where the Taylor table is copied to
-
-
-PLACES, COUNTS = len(Place), len(Count)
 
 
 class Motion(NamedTuple):
@@ -119,7 +89,7 @@ class Motion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Derivatives of its state, and of the numbers that act in it; with zeros up to `Count.COLUMNS` directions."""
+    """Derivatives of its state, and of the numbers that act in it; with zeros up to a multiple N of WIDTH."""
 
     x: Array  # (6, N) of the state at its begin, then at its end
     at: Array  # (6, N) scratch: the same at some time of the segment
@@ -171,37 +141,38 @@ class Tangents(NamedTuple):
     source: Array  # (LANES TERMS,) the Taylor table of the run
 
 
-@allocating
-def tangents_at(address: int) -> Tangents:
-    """The tangents behind an address."""
-    at = carray(integers_at(address), (PLACES,))
-    counts = carray(integers_at(at[Place.COUNTS]), (COUNTS,))
-    n, wide, outputs = counts[Count.DIRECTIONS], counts[Count.COLUMNS], counts[Count.OUTPUTS]
-    motion = Motion(
-        carray(floats_at(at[Place.OWN]), (LANES * TERMS,)), carray(floats_at(at[Place.Y]), (8,)),
-        carray(integers_at(at[Place.MODE]), (3,)), carray(floats_at(at[Place.CLOCK]), (3,)),
-        carray(floats_at(at[Place.BODIES]), (3, 4)), carray(floats_at(at[Place.PAIRS]), (2, 2)),
-        carray(floats_at(at[Place.BEFORE]), (8,)))
-    rates = Rates(
-        carray(floats_at(at[Place.X]), (STATES, wide)), carray(floats_at(at[Place.AT]), (STATES, wide)),
-        carray(floats_at(at[Place.ACTING]), (3, 4, wide)), carray(floats_at(at[Place.LAW]), (2, 2, wide)))
-    table = Table(
-        carray(floats_at(at[Place.SERIES]), (wide // WIDTH * BLOCK,)),
-        carray(floats_at(at[Place.ROWS]), (ROWS, TERMS)), carray(floats_at(at[Place.FACTORS]), (2, ROOM)),
-        carray(floats_at(at[Place.PRODUCTS]), (3, ROOM)))
-    inputs = Inputs(
-        carray(floats_at(at[Place.GIVEN]), (3, 4, n)), carray(floats_at(at[Place.FORCE]), (3, n)),
-        carray(floats_at(at[Place.COULOMB]), (n,)), carray(floats_at(at[Place.CONTROL]), (2, COLUMNS)),
-        carray(floats_at(at[Place.CONTROL_RATES]), (2, COLUMNS, n)),
-        carray(floats_at(at[Place.NORMALS]), (counts[Count.NORMALS], 2, 2)),
-        carray(floats_at(at[Place.WAITING]), (counts[Count.DELAY], 2, n)),
-        carray(floats_at(at[Place.EXTERNAL]), (counts[Count.TICKS], 3, n)))
-    written = Outputs(
-        counts, carray(floats_at(at[Place.NUMBERS]), (NUMBERS,)), carray(floats_at(at[Place.GRID]), (outputs,)),
-        carray(floats_at(at[Place.OUT]), (outputs, STATES, n)),
-        carray(floats_at(at[Place.FORCES]), (outputs, 3, n + 1)))
-    return Tangents(motion, rates, table, inputs, written, carray(floats_at(at[Place.MATRICES]), (5, STATES, STATES)),
-                    carray(floats_at(at[Place.C]), (LANES * TERMS,)))
+def zeros(*shape: int) -> Array:
+    """Zeros that begin on a line of the processor's cache: vectors that lie on two lines take twice as long."""
+    count = math.prod(shape)
+    whole = np.zeros(count + WIDTH)
+    first = -whole.ctypes.data % LINE_BYTES // whole.itemsize
+    return whole[first : first + count].reshape(shape)
+
+
+def _padded(array: Array) -> Array:
+    """An array with zeros behind its last axis, up to a multiple of WIDTH."""
+    n = array.shape[-1]
+    wide = zeros(*array.shape[:-1], n + -n % WIDTH)
+    wide[..., :n] = array
+    return wide
+
+
+def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) -> Tangents:
+    """The tangents of a run that begins, without held commands, for output times (m,) in s."""
+    n, m, x = len(changes.coulomb), len(grid), _padded(changes.state)
+    wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(NUMBERS)
+    counts[Count.TICK], counts[Count.SLIDE], numbers[Number.CORNER] = -1, UNSEEN, math.inf
+    motion = Motion(zeros(LANES * TERMS), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
+    rates = Rates(x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs))
+    table = Table(zeros(wide // WIDTH * BLOCK), np.zeros((ROWS, TERMS)), zeros(2, ROOM), zeros(3, ROOM))
+    inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb, np.zeros((2, COLUMNS)),
+                    np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
+    outputs = Outputs(counts, numbers, grid, np.zeros((m, STATES, n)), np.zeros((m, 3, 1 + n)))
+    return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), motion.c)
+
+
+_RUN = plant_of(np.zeros(PLANT_NUMBERS)), state_of(np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64))
+tangents_at = reader(typeof(tangents_of(*_RUN, no_directions(1), np.zeros(0))))
 
 
 @kernel

@@ -159,8 +159,8 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
         block.coulomb[which, 0, 0], block.state[which, :, 0]))
     rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
                 np.full(n, LEFT_OUT))
-    limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.horizons)
-    integrate_rows(rows, variants.scene.duration, wanted, setup.settled, limits)
+    limits = Limits(setup.accuracy, setup.max_events, setup.max_work, stop, setup.settled, setup.horizons)
+    integrate_rows(rows, variants.scene.duration, wanted, limits)
     done = rows.outcome == Ended.DONE
     runs.seen[which[done]], runs.state[which[done]] = rows.seen[done], rows.state[done]
     runs.touches[which[done]] = rows.touches[done]

@@ -6,9 +6,9 @@ import ctypes
 import time
 
 import numpy as np
-from numba import cfunc
+from numba import cfunc, typeof
 
-from grasp_ros.exact.driver.callback import integers_at
+from grasp_ros.exact.driver.callback import block_of, reader
 from grasp_ros.exact.records import Integers, Tables
 from grasp_ros.observe.observer import SIGNATURE
 from grasp_ros.physics.model import Array
@@ -18,13 +18,14 @@ COUNT, FIRST = 2, 3  # places, behind the seconds and nanoseconds of the clock; 
 MONOTONIC = time.CLOCK_MONOTONIC
 clock_gettime = ctypes.CDLL(None).clock_gettime
 clock_gettime.argtypes = ctypes.c_int, ctypes.c_size_t
+places_at = reader(typeof((np.zeros(0, dtype=np.int64),)))
 
 
 @cfunc(SIGNATURE)  # type: ignore[untyped-decorator]
 def read_clock(context: int, kind: int, t: float, s: float, degree: int) -> int:
     """Note the kind of a segment, and when it was over."""
-    place = integers_at(context)
-    clock_gettime(MONOTONIC, context)
+    place = places_at(context)[0]
+    clock_gettime(MONOTONIC, place.ctypes.data)
     row = FIRST + 2 * place[COUNT]
     place[row], place[row + 1] = kind, place[0] * NANOSECONDS + place[1]
     place[COUNT] += 1
@@ -36,10 +37,11 @@ class SegmentClock:
 
     def __init__(self, most: int) -> None:
         self._places: Integers = np.zeros(FIRST + 2 * most, dtype=np.int64)
+        self._block = block_of((self._places,))
 
     def attach(self, tables: Tables) -> Integers:
         """What a run calls after each segment."""
-        return np.array([read_clock.address, self._places.ctypes.data])
+        return np.array([read_clock.address, self._block.ctypes.data])
 
     @property
     def segments(self) -> tuple[Integers, Array]:

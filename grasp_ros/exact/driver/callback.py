@@ -7,7 +7,7 @@ called when the segment is over and before its transitions, so that modes and bo
 
 from __future__ import annotations
 
-import ctypes
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -33,37 +33,41 @@ def call(_: Any, address: Any, context: Any, kind: Any, t: Any, s: Any, degree: 
     return whole(whole, whole, whole, real, real, whole), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def floats_at(_: Any, address: Any) -> Any:
-    """A pointer to the floats at an address."""
-    def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], ir.DoubleType().as_pointer())
+def block_of(record: Any) -> Integers:
+    """A record of arrays, and of records of them, as kernels have it in memory; it holds for as long as they live."""
+    block = np.array([*_words(record)])
+    if not COMPILED:
+        _RECORDS[block.ctypes.data] = record
+    return block
 
-    return types.CPointer(types.float64)(types.int64), code
+
+def _words(record: Any) -> Iterator[int]:
+    for part in record:
+        if isinstance(part, tuple):
+            yield from _words(part)
+        else:  # owners, of which there are none, numbers, bytes of one, address, shape, bytes to the next
+            yield from (0, 0, part.size, part.itemsize, part.ctypes.data, *part.shape, *part.strides)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def integers_at(_: Any, address: Any) -> Any:
-    """A pointer to the integers at an address."""
-    def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:
-        return builder.inttoptr(arguments[0], ir.IntType(64).as_pointer())
+def reader(kind: Any) -> Any:
+    """A function that kernels call for the record of this type behind an address."""
+    @intrinsic  # type: ignore[untyped-decorator]
+    def read(_: Any, address: Any) -> Any:
+        def code(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
+            return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
 
-    return types.CPointer(types.int64)(types.int64), code
+        return kind(types.int64), code
 
+    return read if COMPILED else lambda address: _RECORDS[int(address)]
+
+
+_RECORDS: dict[int, Any] = {}  # where nothing is compiled
 
 if not COMPILED:
 
     def call(address: int, context: int, kind: int, t: float, s: float, degree: int) -> int:
         """Call the function at an address."""
         return int(function_at(int(address))(int(context), kind, t, s, degree))
-
-    def floats_at(address: int) -> Any:
-        """A pointer to the floats at an address."""
-        return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_double))
-
-    def integers_at(address: int) -> Any:
-        """A pointer to the integers at an address."""
-        return ctypes.cast(int(address), ctypes.POINTER(ctypes.c_int64))
 
 
 @inlined
