@@ -19,7 +19,7 @@ from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import COMPILED
-from grasp_ros.exact.records import Array
+from grasp_ros.exact.records import Array, Lanes
 
 WIDTH = 8
 LANES, INDEX = ir.VectorType(ir.DoubleType(), WIDTH), ir.IntType(32)
@@ -99,10 +99,37 @@ def spread(_: Any, number: Any) -> Any:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
+def vector_of(_: Any, numbers: Any) -> Any:
+    """A vector of eight numbers."""
+    def code(_: Any, builder: Any, __: Any, values: Any) -> Any:
+        found = ir.Constant(LANES, ir.Undefined)
+        for i in range(WIDTH):
+            found = builder.insert_element(found, builder.extract_value(values[0], i), INDEX(i))
+        return found
+
+    return VECTOR(numbers), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def numbers_of(_: Any, vector: Any) -> Any:
+    """The eight numbers of a vector."""
+    def code(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        return context.make_tuple(builder, kinds.return_type, _numbers(builder, values[0]))
+
+    return types.UniTuple(REAL, WIDTH)(vector), code
+
+
+@intrinsic  # type: ignore[untyped-decorator]
 def add_product(_: Any, total: Any, vector: Any, factor: Any) -> Any:
     """A total and the product of a vector with another one or a number, with one rounding."""
     fused = _of_llvm("fma")
     return VECTOR(total, vector, factor), _emit(lambda builder, c, a, b: fused(builder, a, b, c))
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def sizes(_: Any, vector: Any) -> Any:
+    """The absolute numbers of a vector."""
+    return VECTOR(vector), _emit(_of_llvm("fabs"))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -112,11 +139,16 @@ def larger(_: Any, first: Any, second: Any) -> Any:
     return VECTOR(first, second), _emit(lambda builder, a, b: most(builder, size(builder, a), size(builder, b)))
 
 
+def _numbers(builder: Any, vector: Any) -> list[Any]:
+    return [builder.extract_element(vector, INDEX(i)) for i in range(WIDTH)]
+
+
 def _code_of_highest(_: Any, builder: Any, __: Any, values: Any) -> Any:
-    found, *others = (builder.extract_element(values[0], INDEX(i)) for i in range(WIDTH))
-    for other in others:
-        found = builder.select(builder.fcmp_ordered(">", other, found), other, found)
-    return found
+    found = _numbers(builder, values[0])
+    while len(found) > 1:  # in pairs: none waits for all before it
+        found = [builder.select(builder.fcmp_ordered(">", a, b), a, b)
+                 for a, b in zip(found[::2], found[1::2], strict=True)]
+    return found[0]
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -150,6 +182,18 @@ if not COMPILED:
     def spread(number: float) -> Array:
         """A vector of one number."""
         return np.full(WIDTH, number)
+
+    def vector_of(numbers: Lanes) -> Array:
+        """A vector of eight numbers."""
+        return np.array(numbers)
+
+    def numbers_of(vector: Array) -> Lanes:
+        """The eight numbers of a vector."""
+        return tuple(vector)  # type: ignore[return-value]
+
+    def sizes(vector: Array) -> Array:
+        """The absolute numbers of a vector."""
+        return abs(vector)
 
     def add_product(total: Array, vector: Array, factor: float | Array) -> Array:
         """A total and the product of a vector with another one or a number, with one rounding."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.compilation.vectors import add_product, load, numbers_of, spread
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.records import FACTORS, Array, Lanes, PerMass
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Lane, Law, Of, V, X, Z
@@ -31,24 +32,13 @@ FIRST, UPPER, ONE, TWO = (whole(number) for number in (0, 8, 1, 2))  # typed, or
 def convolve(f: Array, k: int, lane: int, skip: int) -> Lanes:
     """Coefficients k of eight products of series, without the terms that hold a coefficient below `skip`.
 
-    f has FACTORS numbers for each order. Eight sums in one loop, written out, become one vector instruction each;
-    unsigned indices spare the test for negative ones. The caller adds the terms that are left out: they hold the
-    newest coefficients, which have just been stored one by one, and reading those as a vector would wait.
+    f has FACTORS numbers for each order. The caller adds the terms that are left out: they hold the newest
+    coefficients, which have just been stored one by one, and reading those as a vector would wait.
     """
-    s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = 0.0
-    end = np.uint64(k)
-    for j in range(np.uint64(skip), np.uint64(max(k + 1 - skip, skip))):
-        i = np.uint64(FACTORS) * j + np.uint64(lane)
-        m = np.uint64(FACTORS) * (end - j) + np.uint64(SECOND + lane)
-        s0 = fma(f[i], f[m], s0)
-        s1 = fma(f[i + np.uint64(1)], f[m + np.uint64(1)], s1)
-        s2 = fma(f[i + np.uint64(2)], f[m + np.uint64(2)], s2)
-        s3 = fma(f[i + np.uint64(3)], f[m + np.uint64(3)], s3)
-        s4 = fma(f[i + np.uint64(4)], f[m + np.uint64(4)], s4)
-        s5 = fma(f[i + np.uint64(5)], f[m + np.uint64(5)], s5)
-        s6 = fma(f[i + np.uint64(6)], f[m + np.uint64(6)], s6)
-        s7 = fma(f[i + np.uint64(7)], f[m + np.uint64(7)], s7)
-    return s0, s1, s2, s3, s4, s5, s6, s7
+    total = spread(0.0)
+    for j in range(skip, max(k + 1 - skip, skip)):
+        total = add_product(total, load(f, FACTORS * j + lane), load(f, FACTORS * (k - j) + SECOND + lane))
+    return numbers_of(total)
 
 
 @kernel

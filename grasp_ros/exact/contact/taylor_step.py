@@ -8,17 +8,17 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.compilation.jit import inlined, whole
-from grasp_ros.exact.contact.series import ONE, TWO, expand_both, expand_one, scale_of
+from grasp_ros.exact.compilation.jit import inlined
+from grasp_ros.exact.compilation.vectors import highest, larger, load, numbers_of, sizes, vector_of
+from grasp_ros.exact.contact.series import expand_both, expand_one, scale_of
 from grasp_ros.exact.kinematics import own_size
-from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, larger, products, sizes, values, values_and_ways
+from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values, values_and_ways
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Settings, State, Step, Tables
 from grasp_ros.exact.tolerances import STILL
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Lane, Pair, U, V, Work, X, Z
 
 TAIL = 5  # at a touch with p = 0 only every fifth coefficient differs from zero
-THREE, FOUR, FIVE = (whole(k) for k in range(3, TAIL + 1))  # typed, see `polynomial`
 SMALLEST = 1e-290  # of what moves
 BELOW, ABOVE = 0.25, 4.0  # steps beyond which what moves is not what moves within a unit
 FAR_BELOW, FAR_ABOVE = 2.0**-10, 2.0**5  # steps whose unit does not fit; a small unit lets terms underflow
@@ -31,39 +31,31 @@ def motion_sizes(c: Array, reach: float) -> Lanes:
     """Sizes of what moves in each lane within `reach`: the largest of a few terms."""
     square = reach * reach
     cube, fourth = square * reach, square * square
-    low = larger(products(sizes(c, ONE), reach), products(sizes(c, TWO), square))
-    high = larger(products(sizes(c, THREE), cube), products(sizes(c, FOUR), fourth))
-    return larger(larger(low, high), products(sizes(c, FIVE), fourth * reach))
+    low = larger(load(c, LANES) * reach, load(c, 2 * LANES) * square)
+    high = larger(load(c, 3 * LANES) * cube, load(c, 4 * LANES) * fourth)
+    return numbers_of(larger(larger(low, high), load(c, TAIL * LANES) * (fourth * reach)))
 
 
 @inlined
-def largest_part(x: Lanes, inverse: Lanes) -> float:
-    """The largest size of a lane, by the inverse of what it is measured by."""
-    left = max(max(x[0] * inverse[0], x[1] * inverse[1]), max(x[2] * inverse[2], x[3] * inverse[3]))
-    right = max(max(x[4] * inverse[4], x[5] * inverse[5]), max(x[6] * inverse[6], x[7] * inverse[7]))
-    return max(left, right)
-
-
-@inlined
-def growth_up_to(c: Array, inverse: Lanes, n: int) -> float:
+def growth_up_to(c: Array, inverse: Array, n: int) -> float:
     """Binary logarithm of the inverse radius of convergence as TAIL coefficients up to n tell; -inf: they vanish."""
     growth = -math.inf
     for k in range(n - TAIL + 1, n + 1):
-        largest = largest_part(sizes(c, k), inverse)
+        largest = highest(sizes(load(c, LANES * k)) * inverse)
         if largest > 0.0:
             growth = max(growth, near_log2(largest) * INVERSE[k])
     return growth
 
 
 @inlined
-def step_size(c: Array, inverse: Lanes, order: Order) -> float:
+def step_size(c: Array, inverse: Array, order: Order) -> float:
     """Step in s / unit at which the first neglected term of a lane is the tolerated part of its size, or inf.
 
     The terms of a high order must fall on the way, too: 52 of an exponential function neglect nothing at ten time
     constants, but some of them are thousands of times as large as what moves.
     """
     n = order.number
-    last = sizes(c, n)
+    last = numbers_of(sizes(load(c, LANES * n)))
     if not last[0] + last[1] + last[2] + last[3] + last[5] + last[6] + last[7] < math.inf:
         return 0.0  # the coefficients have left the range of numbers
     growth = growth_up_to(c, inverse, n)
@@ -135,7 +127,7 @@ def length(tables: Tables, pulled: tuple[float, float, float], step: Step, setti
     z_l = depth_size(c[Z.L], step.left, z_l, t * (v_l + v_o))
     z_r = depth_size(c[Z.R], step.right, z_r, t * (v_o + v_r))
     parts = (inverse(t), inverse(v_l), inverse(x_o), inverse(v_o), 0.0, inverse(v_r), inverse(z_l), inverse(z_r))
-    return step_size(c, parts, step.order)
+    return step_size(c, vector_of(parts), step.order)
 
 
 @inlined

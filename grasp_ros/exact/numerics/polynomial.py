@@ -1,6 +1,6 @@
 """Tables of eight polynomials side by side: their values, their ranges, and the inverse of the time; products of one.
 
-Coefficient k of a lane stands at LANES k + lane, so that one pass evaluates all lanes in vector instructions. Orders
+Coefficient k of a lane stands at LANES k + lane, so that one pass evaluates the vector of all lanes. Orders
 are even: the even and the odd powers are summed side by side, which halves the time until the result is there.
 """
 
@@ -10,74 +10,24 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.compilation.fma import fma
-from grasp_ros.exact.compilation.jit import inlined, kernel, whole
-from grasp_ros.exact.records import Array, Lanes, Step, Tables
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.compilation.vectors import add_product, load, sizes, store
+from grasp_ros.exact.records import Array, Step, Tables
 from grasp_ros.exact.tolerances import NOISE
 from grasp_ros.physics.layout import EPS, LANES, Lane, V, Z
 
-FIRST, SECOND = whole(0), whole(2)  # typed: numba would compile `lanes` and `sizes` once more for a literal
 INVERSE = np.array([0.0, *(1.0 / n for n in range(1, 100))])  # a quotient would keep the next one waiting
 
 
-@kernel
-def lanes(c: Array, k: int) -> Lanes:
-    """The coefficients k."""
-    i = np.uint64(LANES) * np.uint64(k)  # unsigned indices spare the test for negative ones
-    return (
-        c[i], c[i + np.uint64(1)], c[i + np.uint64(2)], c[i + np.uint64(3)],
-        c[i + np.uint64(4)], c[i + np.uint64(5)], c[i + np.uint64(6)], c[i + np.uint64(7)],
-    )
-
-
-@kernel
-def sizes(c: Array, k: int) -> Lanes:
-    """The absolute coefficients k."""
-    x = lanes(c, k)
-    return (
-        abs(x[0]), abs(x[1]), abs(x[2]), abs(x[3]),
-        abs(x[4]), abs(x[5]), abs(x[6]), abs(x[7]),
-    )
-
-
-@kernel
-def larger(x: Lanes, z: Lanes) -> Lanes:
-    """The larger number of each lane."""
-    return (
-        max(x[0], z[0]), max(x[1], z[1]), max(x[2], z[2]), max(x[3], z[3]),
-        max(x[4], z[4]), max(x[5], z[5]), max(x[6], z[6]), max(x[7], z[7]),
-    )
-
-
-@kernel
-def sums(x: Lanes, z: Lanes) -> Lanes:
-    """The sum of each lane."""
-    return (x[0] + z[0], x[1] + z[1], x[2] + z[2], x[3] + z[3], x[4] + z[4], x[5] + z[5], x[6] + z[6], x[7] + z[7])
-
-
-@kernel
-def products(x: Lanes, s: float) -> Lanes:
-    """Each lane times s."""
-    return (x[0] * s, x[1] * s, x[2] * s, x[3] * s, x[4] * s, x[5] * s, x[6] * s, x[7] * s)
-
-
-@kernel
-def horner(total: Lanes, s: float, x: Lanes) -> Lanes:
-    """One more coefficient of each lane."""
-    return (
-        fma(total[0], s, x[0]), fma(total[1], s, x[1]), fma(total[2], s, x[2]), fma(total[3], s, x[3]),
-        fma(total[4], s, x[4]), fma(total[5], s, x[5]), fma(total[6], s, x[6]), fma(total[7], s, x[7]),
-    )
-
-
 @inlined
-def ways(c: Array, n: int, s: float) -> Lanes:
+def ways(c: Array, n: int, s: float) -> Array:
     """How far the lanes come on the way to s, of the even degree n."""
     square = s * s
-    even, odd = lanes(c, n), lanes(c, n - 1)
+    even, odd = load(c, LANES * n), load(c, LANES * (n - 1))
     for k in range(n - 2, 0, -2):
-        even, odd = horner(even, square, lanes(c, k)), horner(odd, square, lanes(c, k - 1))
-    return products(horner(even, s, odd), s)
+        even = add_product(load(c, LANES * k), even, square)
+        odd = add_product(load(c, LANES * (k - 1)), odd, square)
+    return add_product(odd, even, s) * s
 
 
 @inlined
@@ -86,30 +36,27 @@ def values(c: Array, n: int, s: float, at: Array) -> None:
 
     The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
     """
-    total = sums(ways(c, n, s), lanes(c, FIRST))
-    for lane in range(LANES):
-        at[lane] = total[lane]
+    store(at, 0, ways(c, n, s) + load(c, 0))
 
 
 @inlined
 def values_and_ways(c: Array, n: int, s: float, at: Array) -> None:
     """Write the lanes' values at s, of the even degree n, to `at`, and behind them how far they have come."""
     way = ways(c, n, s)
-    total = sums(way, lanes(c, FIRST))
-    for lane in range(LANES):
-        at[lane], at[LANES + lane] = total[lane], way[lane]
+    store(at, 0, way + load(c, 0))
+    store(at, LANES, way)
 
 
 @inlined
 def curvatures(c: Array, n: int, s: float, size: Array) -> None:
     """Write the lanes' sums of |c_k| s^k over k >= 2 to `size`."""
     square = s * s
-    even, odd = sizes(c, n), sizes(c, n - 1)
+    even, odd = sizes(load(c, LANES * n)), sizes(load(c, LANES * (n - 1)))
     for k in range(n - 2, 2, -2):
-        even, odd = horner(even, square, sizes(c, k)), horner(odd, square, sizes(c, k - 1))
-    even = horner(even, square, sizes(c, SECOND))
-    for lane in range(LANES):
-        size[lane] = (even[lane] + s * odd[lane]) * square
+        even = add_product(sizes(load(c, LANES * k)), even, square)
+        odd = add_product(sizes(load(c, LANES * (k - 1))), odd, square)
+    even = add_product(sizes(load(c, 2 * LANES)), even, square)
+    store(size, 0, (even + s * odd) * square)
 
 
 @inlined
