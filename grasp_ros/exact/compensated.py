@@ -1,4 +1,4 @@
-"""Positions and velocities as pairs of doubles: what a rounding leaves out stands in a low word.
+"""Positions, velocities and times as pairs of doubles: what a rounding leaves out stands in a low word.
 
 A shallow penetration is a small difference of two large positions. With some 106 bits in each position the difference
 has digits of its own, so that u is no state beside them: `write_penetrations` derives it. The low words also keep many
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compilation.jit import inlined, kernel
-from grasp_ros.exact.records import Flown, State
+from grasp_ros.exact.records import Array, Flown, State
 from grasp_ros.exact.tolerances import SHORT_WAY
 from grasp_ros.physics.layout import LEFT, OBJECT, Body, U, V, X
 
@@ -38,6 +38,19 @@ def add(state: State, lane: int, change: float) -> None:
     low += state.low[lane]
     state.y[lane] = high + low
     state.low[lane] = low - (state.y[lane] - high)
+
+
+@kernel
+def until(clock: Array, time: float) -> float:
+    """Seconds from now to a time of an interval, by its clock: the time since its begin, and beside it the low word."""
+    return (time - clock[0]) - clock[1]
+
+
+@kernel
+def tick(clock: Array, step: float) -> None:
+    """Add a step in s to the clock, so that long runs do not drift."""
+    clock[0], low = two_sum(clock[0], step)
+    clock[1] += low
 
 
 @inlined

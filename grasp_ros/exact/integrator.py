@@ -15,23 +15,13 @@ from grasp_ros.exact.driver.outputs import SPARE
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.events import Event, to_events
-from grasp_ros.exact.records import (
-    COULOMB,
-    PLANT_NUMBERS,
-    STATE_NUMBERS,
-    Integers,
-    Loop,
-    Tables,
-    new_place,
-    plant_of,
-    state_of,
-)
+from grasp_ros.exact.records import COULOMB, Integers, Loop, Tables, new_place, new_run
 from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
-from grasp_ros.physics.layout import Filled, Of, Outcome, Pair, U, Work, X
+from grasp_ros.physics.layout import Filled, Of, Outcome, U, Work, X
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import System
 
@@ -55,18 +45,7 @@ class Status(Enum):
 
 _OUTPUTS, _EVENTS, _FILLED, _WORK = int(Filled.OUTPUTS), int(Filled.EVENTS), len(Filled), len(Work)
 _NO_TIMES, _NOBODY = np.zeros(0), np.zeros(2, dtype=np.int64)
-_UNKNOWN = [int(Pair.UNKNOWN)] * 3
 _DONE, _NO_COMMAND = int(Outcome.DONE), int(Outcome.NO_COMMAND)
-_STATUS: dict[int, Status] = {
-    Outcome.DONE: Status.DONE,
-    Outcome.NOT_FINITE: Status.NOT_FINITE,
-    Outcome.OUTSIDE: Status.OUTSIDE,
-    Outcome.STALLED: Status.STALLED,
-    Outcome.ENERGY_RISES: Status.ENERGY_RISES,
-    Outcome.ENERGY_FALLS: Status.ENERGY_FALLS,
-    Outcome.PENETRATES: Status.PENETRATES,
-    Outcome.WORK_USED: Status.WORK_BUDGET,
-}
 
 
 class Observer(Protocol):
@@ -124,9 +103,7 @@ class Integrator:
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self.system, self.continuous = system, continuous
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
-        self._plant_block, self._state_block = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS)
-        self._mode = np.array(_UNKNOWN)
-        self.plant, self.records = plant_of(self._plant_block), state_of(self._state_block, self._mode)
+        self._plant_block, self._state_block, self._mode, self.plant, self.records = new_run()
         bodies = system.closed_loop if continuous else system.bodies
         self.plant.given[:] = bodies  # `bodies` follow from it
         for body in system.absent:  # what is not there rests at 0 without any force
@@ -266,9 +243,9 @@ class Integrator:
             if self._event_count > self._max_events:
                 self.status = Status.EVENT_BUDGET
             return False
-        if outcome == Outcome.WORK_USED and self._spent < self._max_work:
+        if outcome == Outcome.WORK_BUDGET and self._spent < self._max_work:
             return False
-        self.status = _STATUS[outcome]
+        self.status = Status[Outcome(outcome).name]
         return True
 
 

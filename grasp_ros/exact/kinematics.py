@@ -155,9 +155,9 @@ def is_closed(mode: Pair) -> bool:
 
 
 @kernel
-def surface_factor(plant: Plant, y: Array, side: Body, roundings: float) -> float:
+def surface_factor(pairs: Array, y: Array, side: Body, roundings: float) -> float:
     """1 + p u' of a pair; 0 within some roundings of its terms."""
-    loss, (front, back) = plant.pairs[side, Law.DISSIPATION], rate_lanes(side)
+    loss, (front, back) = pairs[side, Law.DISSIPATION], rate_lanes(side)
     factor = damping_factor(loss, y[front] - y[back])
     return factor if abs(factor) > roundings * EPS * (1.0 + loss * (abs(y[front]) + abs(y[back]))) else 0.0
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.layout import LANES, Kind, Place, Slide, Transition
+from grasp_ros.physics.layout import LANES, Kind, Pair, Place, Slide, Transition
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -35,6 +35,7 @@ BODY_NUMBERS, PAIR_NUMBERS = 12, 4
 COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its place in the block of a plant
 PLANT_NUMBERS = COULOMB + 4
 STATE_NUMBERS = 20
+_UNKNOWN = [int(Pair.UNKNOWN)] * 3
 
 
 def plant_of(block: Array) -> Plant:
@@ -57,6 +58,12 @@ class State(NamedTuple):
 def state_of(block: Array, mode: Integers) -> State:
     """A state whose numbers are parts of a block (STATE_NUMBERS,)."""
     return State(block[:8], mode, block[8:14], block[14:17], block[17:])
+
+
+def new_run() -> tuple[Array, Array, Integers, Plant, State]:
+    """What a run works on: blocks of plant and state, modes that are not known yet, and the records of these."""
+    plant, state, mode = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS), np.array(_UNKNOWN)
+    return plant, state, mode, plant_of(plant), state_of(state, mode)
 
 
 class Order(NamedTuple):

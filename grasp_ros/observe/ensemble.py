@@ -23,16 +23,13 @@ from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.integrator import BREATH, compile_kernels
 from grasp_ros.exact.records import (
     COULOMB,
-    PLANT_NUMBERS,
-    STATE_NUMBERS,
     Array,
     Integers,
     Loop,
     Plant,
     State,
     new_place,
-    plant_of,
-    state_of,
+    new_run,
 )
 from grasp_ros.observe.observe import BEGIN, FINISH
 from grasp_ros.observe.observer import Watcher
@@ -216,15 +213,14 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
         Budgets of each row; what takes longer than `BREATH` is left to `Integrator`, too. Another thread may set
         `stop`, to have the rows stop.
     """
-    plant_block, state_block, mode = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64)
-    plant, state = plant_of(plant_block), state_of(state_block, mode)
-    watcher = Watcher(plant, state, wanted)
+    run = new_run()
+    watcher = Watcher(*run[3:], wanted)
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
     watcher.memory.switches[Switch.CERTAIN] = 1
     limits = limits._replace(max_work=min(limits.max_work, BREATH))
     with workspace(limits.tolerance) as (block, order, tables, events):
         observer = watcher.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
-        room = Room(block, order, plant_block, state_block, mode, plant, state, np.zeros(0), np.zeros((0, 6)), events,
+        room = Room(block, order, *run, np.zeros(0), np.zeros((0, 6)), events,
                     np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)
         done = run_rows(door(), loop, rows, room, watcher.memory, limits)
     return int(done)

@@ -16,7 +16,7 @@ from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.flight_extremes import first_zero
 from grasp_ros.observe.sight import COUNTS, LOWER, MODES, NONE, STATES, UNDECIDED, UPPER, Kept, Seen, Sight
-from grasp_ros.observe.step_extremes import FIRST, ROW, SQUARE, WORK, expand_quantity, extremes_of
+from grasp_ros.observe.step_extremes import FIRST, ROW, WORK, expand_quantity, extremes_of
 from grasp_ros.physics import reach as bounds
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of
 
@@ -151,7 +151,4 @@ def last_in_step(sight: Sight, q: int, bound: float) -> float:
         first = min(first, first_rise(rows[WORK], n, sight.s, 0.0, sight.counts))
     if not first < math.inf:
         return 0.0
-    s = sight.s - first
-    for k in range(n + 1):
-        rows[SQUARE, k] = sight.c[LANES * k + Lane.TIME]
-    return value_and_rate(rows[SQUARE], n, s)[0]
+    return value_and_rate(sight.c[Lane.TIME :: LANES], n, sight.s - first)[0]

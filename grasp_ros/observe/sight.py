@@ -11,16 +11,7 @@ from numba import typeof
 from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.contact.step_order import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
-from grasp_ros.exact.records import (
-    PLANT_NUMBERS,
-    STATE_NUMBERS,
-    Array,
-    Integers,
-    Plant,
-    State,
-    plant_of,
-    state_of,
-)
+from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.layout import LANES
 
@@ -137,8 +128,7 @@ def memory_of(plant: Plant, state: State) -> Memory:
         scratch, np.zeros(COUNTS + MODES, dtype=np.int64), np.zeros(len(Switch), dtype=np.int64))
 
 
-_RUN = plant_of(np.zeros(PLANT_NUMBERS)), state_of(np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64))
-memory_at = reader(typeof(memory_of(*_RUN)))
+memory_at = reader(typeof(memory_of(*new_run()[3:])))
 
 
 class Sight(NamedTuple):

@@ -2,7 +2,7 @@
 
 A law is a row of numbers, `Column`, and three functions of it: what is measured, what the paper's feedback (4), (5)
 answers, and what the actuator makes of that. Every effect of a scene fills in its columns; those that none has named
-do nothing. `exact.driver.control` compiles the same source for the kernels.
+do nothing. `exact.driver.intervals` compiles the same source for the kernels.
 """
 
 from __future__ import annotations

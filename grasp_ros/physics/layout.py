@@ -129,7 +129,7 @@ class Transition(IntEnum):
 
 
 class Outcome(IntEnum):
-    """Why the kernel returned."""
+    """Why the kernel returned; what ends a run is called as its `Status`."""
 
     GO_ON = -1  # it did not
     DONE = 0
@@ -137,7 +137,7 @@ class Outcome(IntEnum):
     NOT_FINITE = 2
     STALLED = 3
     ENERGY_RISES = 4
-    WORK_USED = 5
+    WORK_BUDGET = 5
     ENERGY_FALLS = 6
     PENETRATES = 7
     NO_COMMAND = 8  # a controller gave no finite number

@@ -14,6 +14,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import WIDTH, add_product, highest, larger, load, spread, store
 from grasp_ros.exact.contact.series import put
 from grasp_ros.exact.numerics.polynomial import INVERSE
+from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, V, X, Z
 from grasp_ros.sensitivity.tangents import BLOCK, STATES, STEP, Motion, Rates, Row, Table
@@ -222,10 +223,7 @@ def shift(c: Array, n: int, s: float) -> None:
 @inlined
 def time_at(c: Array, n: int, s: float) -> tuple[float, float]:
     """Time since the begin of a step at s, and its derivative by s."""
-    time = pace = 0.0
-    for k in range(n, -1, -1):
-        pace = pace * s + time
-        time = time * s + c[LANES * k + Lane.TIME]
+    time, pace, _ = value_and_rate(c[Lane.TIME :: LANES], n, s)
     return time, pace
 
 

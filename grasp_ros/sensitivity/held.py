@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import kernel
-from grasp_ros.exact.driver.control import feedback
+from grasp_ros.exact.driver.intervals import feedback
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of, Slide

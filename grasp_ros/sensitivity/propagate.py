@@ -15,7 +15,7 @@ import math
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
-from grasp_ros.exact.kinematics import approach
+from grasp_ros.exact.kinematics import approach, surface_factor
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, Slide, U, V, X
@@ -107,8 +107,7 @@ def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
     """Note a run that begins with a pair at u' = -1/p which nothing moves off: a change to one side has a force."""
     for side in (LEFT, RIGHT):
         loss, d = motion.pairs[side, Law.DISSIPATION], approach(motion.before, side)
-        rounding = SURFACE * EPS * (1.0 + loss * (abs(motion.before[velocity_lane(side)]) + abs(motion.before[V.O])))
-        if motion.before[U.L + side] <= 0.0 or abs(damping_factor(loss, d)) > rounding:
+        if motion.before[U.L + side] <= 0.0 or surface_factor(motion.pairs, motion.before, side, SURFACE) != 0.0:
             continue
         if acceleration(motion, side) != acceleration(motion, OBJECT):
             continue

@@ -17,16 +17,7 @@ from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.compilation.vectors import WIDTH
 from grasp_ros.exact.contact.step_order import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
-from grasp_ros.exact.records import (
-    PLANT_NUMBERS,
-    STATE_NUMBERS,
-    Array,
-    Integers,
-    Plant,
-    State,
-    plant_of,
-    state_of,
-)
+from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import LANES
@@ -171,8 +162,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) ->
     return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), motion.c)
 
 
-_RUN = plant_of(np.zeros(PLANT_NUMBERS)), state_of(np.zeros(STATE_NUMBERS), np.zeros(3, dtype=np.int64))
-tangents_at = reader(typeof(tangents_of(*_RUN, no_directions(1), np.zeros(0))))
+tangents_at = reader(typeof(tangents_of(*new_run()[3:], no_directions(1), np.zeros(0))))
 
 
 @kernel

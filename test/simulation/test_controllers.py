@@ -14,7 +14,7 @@ import pytest
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.cli.report import describe_trajectory
-from grasp_ros.exact.driver import control as compiled
+from grasp_ros.exact.driver import intervals as compiled
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics import control
 from grasp_ros.physics.control import ControlLaw

@@ -12,7 +12,7 @@ import pytest
 from documents import case_of, scene_of
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.driver import control as compiled
+from grasp_ros.exact.driver import intervals as compiled
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics import control
 from grasp_ros.physics.control import NO_NOISE

@@ -9,13 +9,15 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.resting_pair import HIGHEST, difference, short_time
-from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.records import Array, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, HELD, OUTWEIGHS
 from grasp_ros.physics.layout import Body, Law, Pair, U
+
+FORCE, IMPULSE = whole(0), whole(2)  # twice the power of the time by which a force is multiplied
 
 
 @inlined
@@ -45,14 +47,14 @@ def time_of_impulse(per_hertz: float, loss: float, order: float, a: float) -> fl
 
 
 @kernel
-def time_of_rounding(per_hertz: float, loss: float, order: int, a: float, speed: float) -> float:
-    """The same with the impulse 2^-HELD mu `speed`: H u^(3/2) (1 + p u') t = 2^-HELD mu v."""
-    if speed == 0.0:
+def time_of_force(reach: float, loss: float, order: int, a: float, power: int) -> float:
+    """The same for a force, times t where it is its impulse: u^(3/2) (1 + p u') t^(power / 2) = 2^-HELD reach."""
+    if reach == 0.0:
         return 0.0
     above = exponent(a) + 1
-    e = (2 * (exponent(per_hertz * speed) - HELD) - 3 * above) // (3 * order + 2)
+    e = (2 * (exponent(reach) - HELD) - 3 * above) // (3 * order + power)
     if loss > 0.0:
-        e = min(e, (2 * (exponent(per_hertz * speed / (loss * order)) - HELD) - 5 * above) // (5 * order))
+        e = min(e, (2 * (exponent(reach / (loss * order)) - HELD) - 5 * above) // (5 * order - 2 + power))
     return power_of_two(e)
 
 
@@ -76,21 +78,10 @@ def force_free_time(plant: Plant, state: State, side: Body) -> float:
         else:
             time = min(time, power_of_two((exponent(leading / a) - OUTWEIGHS) // (order - first)))
         time = min(time, max(time_of_impulse(per_hertz, loss, float(order), a),
-                             time_of_rounding(per_hertz, loss, order, a, speed)))
+                             time_of_force(per_hertz * speed, loss, order, a, IMPULSE)))
         if plant.coulomb > 0.0:
-            time = min(time, time_of_force(plant, side, order, a))
+            time = min(time, time_of_force(plant.coulomb / plant.pairs[side, Law.HERTZIAN], loss, order, a, FORCE))
     return time if time == math.inf else min(time, short_time(plant, side))
-
-
-@kernel
-def time_of_force(plant: Plant, side: Body, order: int, a: float) -> float:
-    """The same with a force that is 2^-HELD of the dry friction: H u^(3/2) (1 + p u') = 2^-HELD F."""
-    per_hertz, loss = plant.coulomb / plant.pairs[side, Law.HERTZIAN], plant.pairs[side, Law.DISSIPATION]
-    above = exponent(a) + 1
-    e = (2 * (exponent(per_hertz) - HELD) - 3 * above) // (3 * order)
-    if loss > 0.0:
-        e = min(e, (2 * (exponent(per_hertz / (loss * order)) - HELD) - 5 * above) // (5 * order - 2))
-    return power_of_two(e)
 
 
 @inlined

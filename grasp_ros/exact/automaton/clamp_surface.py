@@ -20,7 +20,7 @@ from grasp_ros.physics.layout import Body, Pair
 @kernel
 def surface_side(plant: Plant, state: State, side: Body) -> float:
     """1 + p u', which is positive in contact; within its rounding, where no force acts, what moves u' first; or 0."""
-    factor = surface_factor(plant, state.y, side, SURFACE)
+    factor = surface_factor(plant.pairs, state.y, side, SURFACE)
     if factor != 0.0:
         return float(factor)
     push, pace = impact_beside(plant, state, side)
@@ -43,7 +43,7 @@ def glides(plant: Plant, state: State, side: Body) -> bool:
     beside = other(side)
     if not stays(plant, state, side):
         return False
-    if state.mode[beside] == Pair.CONTACT and surface_factor(plant, state.y, beside, SURFACE) != 0.0:
+    if state.mode[beside] == Pair.CONTACT and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
         return False
     return state.mode[beside] not in (Pair.CONTACT, Pair.CLAMPED) or stays(plant, state, beside)
 
@@ -51,4 +51,4 @@ def glides(plant: Plant, state: State, side: Body) -> bool:
 @kernel
 def has_glided(plant: Plant, state: State, side: Body, roundings: float) -> bool:
     """Whether a pair is at u' = -1/p but for some roundings, and nothing moves it off."""
-    return surface_factor(plant, state.y, side, roundings) == 0.0 and bool(glides(plant, state, side))
+    return surface_factor(plant.pairs, state.y, side, roundings) == 0.0 and bool(glides(plant, state, side))

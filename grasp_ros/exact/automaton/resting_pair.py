@@ -39,7 +39,7 @@ def impact_beside(plant: Plant, state: State, side: Body) -> tuple[float, float]
     hertzian, loss = plant.pairs[beside, Law.HERTZIAN], plant.pairs[beside, Law.DISSIPATION]
     mass = plant.bodies[OBJECT, Of.MASS]
     d, a = relative_motion(plant, state.y, beside)
-    elastic, factor = elastic_force(hertzian, u), surface_factor(plant, state.y, beside, SURFACE)
+    elastic, factor = elastic_force(hertzian, u), surface_factor(plant.pairs, state.y, beside, SURFACE)
     a -= elastic * factor / reduced_mass(plant.bodies, beside)
     pace = elastic_slope(hertzian, u) * d * factor + elastic * loss * a
     return elastic * factor / mass, pace / mass
@@ -146,7 +146,7 @@ def parts(plant: Plant, y: Array, side: Body) -> bool:
     t = y[U.L + side] / -d
     a, jerk = abs(difference(plant, y, side, LOWEST)[0]), abs(difference(plant, y, side, NEXT)[0])
     change = max(t * a, 0.5 * t * (t * jerk))  # in this order, because squares underflow
-    clamps = 0.0 < surface_factor(plant, y, side, SURFACE) < CLAMPS * loss * change
+    clamps = 0.0 < surface_factor(plant.pairs, y, side, SURFACE) < CLAMPS * loss * change
     return bool(TURNS * change < -d and not clamps)
 
 

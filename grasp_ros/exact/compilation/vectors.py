@@ -189,7 +189,7 @@ if not COMPILED:
 
     def numbers_of(vector: Array) -> Lanes:
         """The eight numbers of a vector."""
-        return tuple(vector)  # type: ignore[return-value]
+        return tuple(vector)
 
     def sizes(vector: Array) -> Array:
         """The absolute numbers of a vector."""

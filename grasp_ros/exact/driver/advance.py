@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.modes import make_transitions, settle_pairs
+from grasp_ros.exact.compensated import tick, until
 from grasp_ros.exact.compilation.jit import door, inlined
 from grasp_ros.exact.contact.segment import cut_step, press, step_ends
 from grasp_ros.exact.contact.step_unit import new_settings, within_decay
 from grasp_ros.exact.driver.callback import notify
-from grasp_ros.exact.driver.clock import tick, until
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
 from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
 from grasp_ros.exact.driver.outputs import may_go_on, write_reached
@@ -92,7 +92,7 @@ def advance(
     -------
     int
         Value of a `layout.Outcome`: to make a member of an enum for Python costs a microsecond. If it is none of DONE,
-        EVENTS_FULL, WORK_USED and NO_COMMAND, `rows` holds nothing of the segment that failed.
+        EVENTS_FULL, WORK_BUDGET and NO_COMMAND, `rows` holds nothing of the segment that failed.
     """
     tables, plant, state = tables_in(block, order), plant_in(plant_block), state_in(state_block, mode)
     settings = new_settings(tolerance, order, plant.given)

@@ -11,15 +11,16 @@ import math
 
 from grasp_ros.exact.automaton.modes import begin_interval
 from grasp_ros.exact.compensated import put
-from grasp_ros.exact.compilation.jit import inlined, whole
-from grasp_ros.exact.driver.control import feedback, limited, measured
+from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.driver.user_controller import call
 from grasp_ros.exact.kinematics import arm_of
 from grasp_ros.exact.records import Array, Loop, Output, Plant, State
+from grasp_ros.physics import control
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Answer, Of, Outcome, Place, V
 
 FIRST = whole(0)  # interval
+measured, feedback, limited = kernel(control.measured), kernel(control.feedback), kernel(control.limited)
 
 
 @inlined

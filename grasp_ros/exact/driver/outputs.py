@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.compensated import until
 from grasp_ros.exact.compilation.jit import inlined, kernel
-from grasp_ros.exact.driver.clock import until
 from grasp_ros.exact.records import Array, Output, State
 from grasp_ros.physics.layout import Body, Entry, Filled, Outcome, Transition, Work
 
@@ -58,5 +58,5 @@ def may_go_on(span: float, max_work: int, out: Output) -> Outcome:
     if out.filled[Filled.EVENTS] + SPARE > out.events.shape[0]:
         return Outcome.EVENTS_FULL
     if work[Work.FLIGHTS] + work[Work.CONTACT_STEPS] + work[Work.ROOT_ITERATIONS] >= max_work:
-        return Outcome.WORK_USED
+        return Outcome.WORK_BUDGET
     return Outcome.GO_ON

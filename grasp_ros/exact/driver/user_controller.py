@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import math
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -60,11 +61,6 @@ if numba.config.DISABLE_JIT:
         return float(PROTOTYPE(int(address))(tick, time, x, v))
 
 
-def _nothing(tick: int) -> Sight:
-    """Before a run."""
-    raise RuntimeError(f"no run, tick {tick}")
-
-
 class Foreign:
     """A controller from outside, as the kernels call it.
 
@@ -94,7 +90,8 @@ class Foreign:
     """
 
     def __init__(self, side: str, law: Law) -> None:
-        self.asks, self.sight = asked(law), _nothing
+        self.asks = asked(law)
+        self.sight: Callable[[int], Sight]
         numba_law = is_jitted(law) or isinstance(law, CFunc)
         named, compiled = getattr(law, "__wrapped__", law) if numba_law else law, numba_law and not self.asks
         named = named if hasattr(named, "__qualname__") else type(named)

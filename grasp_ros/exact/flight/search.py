@@ -106,7 +106,7 @@ def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -
     """Time for which g stays below 0: by the bound on |g''|, or for as long as g'' can change little."""
     below = min(g.value, -g.noise)
     step = safe_step(below, g.rate, curvature)
-    reach = 4.0 * max(step, last)
+    reach = min(4.0 * max(step, last), 1.0 / SMALLEST)  # finite: `growth` may be 0
     bend = max(g.second + g.doubt + growth * reach, 0.0)
     if bend < 0.5 * curvature:
         step = max(step, min(reach, safe_step(below, g.rate, bend)))
