@@ -13,7 +13,7 @@ from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import bound, next_derivative, own_acceleration
 from grasp_ros.exact.records import Array, Flight, Regime
 from grasp_ros.observe.sight import POSITION, VELOCITY, Quantity, Sight
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, U, V, X
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of, U, V, X
 
 
 @inlined
@@ -27,17 +27,11 @@ def weights(sight: Sight, q: int) -> tuple[float, float, float]:
 
 
 @inlined
-def state_of(q: int) -> tuple[int, int]:
-    """Places of position and velocity of the body whose quantity it is: the state has them in pairs."""
-    if q == Quantity.INPUT_L:
-        return X.L, V.L
-    return (X.R, V.R) if q == Quantity.INPUT_R else (q - q % 2, q - q % 2 + 1)
-
-
-@inlined
-def row_of(x: int) -> int:
-    """Row of the body whose position stands there."""
-    return OBJECT.value if x == X.O else (LEFT.value if x == X.L else RIGHT.value)
+def owner(q: int) -> Body:
+    """The body whose quantity it is."""
+    if q == X.L or q == V.L or q == Quantity.INPUT_L:
+        return LEFT
+    return RIGHT if q == X.R or q == V.R or q == Quantity.INPUT_R else OBJECT
 
 
 @kernel
@@ -58,14 +52,13 @@ def first_zero(flight: Flight, r: float, r_rate: float) -> float:
 @inlined
 def in_flight(sight: Sight, q: int) -> tuple[float, float]:
     """Least and largest value of a quantity in a flight."""
-    a, b, c = weights(sight, q)
-    place, lane = state_of(q)
-    row = sight.bodies[row_of(place)]
-    x, v = sight.before[place], sight.before[lane]
+    (a, b, c), body = weights(sight, q), owner(q)
+    row, lane = sight.bodies[body], velocity_lane(body)
+    x, v = sight.before[lane - 1], sight.before[lane]
     flight = launch(row, x, v)
     push = own_acceleration(row, x, v)
     jerk = next_derivative(row, v, push)
-    at_begin, at_end = a * x + b * v + c, a * sight.y[place] + b * sight.y[lane] + c
+    at_begin, at_end = a * x + b * v + c, a * sight.y[lane - 1] + b * sight.y[lane] + c
     low, high = min(at_begin, at_end), max(at_begin, at_end)
     first = first_zero(flight, a * v + b * push, a * push + b * jerk)
     if not first < sight.t:

@@ -10,7 +10,7 @@ from grasp_ros.exact.driver.callback import call
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.records import Array
-from grasp_ros.observe.flight_extremes import flight_ranges, state_of, weights
+from grasp_ros.observe.flight_extremes import flight_ranges, owner, weights
 from grasp_ros.observe.losses import add_losses
 from grasp_ros.observe.settling import kept_sight, last_outside, settled_from, watch_bound
 from grasp_ros.observe.sight import (
@@ -65,7 +65,8 @@ def write_ranges(sight: Sight) -> None:
         step_ranges(sight, low, high)
     for q in range(Quantity.INPUT_L, QUANTITIES):
         a, b, c = weights(sight, q)
-        x, v = state_of(q)
+        v = velocity_lane(owner(q))
+        x = v - 1
         low[q] = c + min(a * low[x], a * high[x]) + min(b * low[v], b * high[v])
         high[q] = c + max(a * low[x], a * high[x]) + max(b * low[v], b * high[v])
 

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 import math
 
+from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import rate_lanes
 from grasp_ros.exact.numerics.polynomial import product
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Integers
-from grasp_ros.observe.flight_extremes import in_flight, state_of, weights
+from grasp_ros.observe.flight_extremes import in_flight, owner, weights
 from grasp_ros.observe.sight import Quantity, Sight
 from grasp_ros.physics.layout import LANES, LEFT, RIGHT, Body, Kind, Law, Pair, U, V, X, Z
 
 MOST = 64  # turns of a polynomial in one step
-ROW, RATE, WORK, SQUARE = (whole(row) for row in range(4))  # rows of scratch; typed, or each is compiled anew
+ROW, RATE, WORK = (whole(row) for row in range(3))  # rows of scratch; typed, or each is compiled anew
 FIRST = whole(0)  # coefficient
 
 
@@ -78,35 +80,19 @@ def expand_penetration(sight: Sight, side: Body, row: int) -> None:
 
 
 @kernel
-def expand_force(sight: Sight, side: Body) -> None:
-    """Series of the impact force H w^3 (1 + p u') in a Taylor step, in the first row of scratch."""
-    rows, n, pair = sight.rows, sight.degree, sight.pairs[side]
-    front, back = rate_lanes(side)
-    expand_penetration(sight, side, RATE)
-    product(rows[RATE], rows[WORK], rows[SQUARE], n)
-    for k in range(n + 1):
-        rows[WORK, k] = pair[Law.DISSIPATION] * (sight.c[LANES * k + front] - sight.c[LANES * k + back])
-    rows[WORK, FIRST] += 1.0
-    product(rows[SQUARE], rows[WORK], rows[ROW], n)
-    for k in range(n + 1):
-        rows[ROW, k] *= pair[Law.HERTZIAN]
-
-
-@kernel
 def expand_quantity(sight: Sight, q: int) -> None:
     """Write the series of a quantity to the first row of scratch."""
     rows, n = sight.rows, sight.degree
     if q in (U.L, U.R):
         expand_penetration(sight, LEFT if q == U.L else RIGHT, ROW)
     elif q == Quantity.IMPACT_L or q == Quantity.IMPACT_R:
-        expand_force(sight, LEFT if q == Quantity.IMPACT_L else RIGHT)
+        expand_force(sight.c, sight.pairs, q - Quantity.IMPACT_L, n, rows.reshape(-1))
     elif q == X.O or q == V.L or q == V.O or q == V.R:
         copy_lane(sight, q, ROW)
     else:
-        a, b, c = weights(sight, q)
-        place, lane = state_of(q)
-        sign = 1.0 if place == X.L else -1.0
-        expand_penetration(sight, LEFT if place == X.L else RIGHT, ROW)
+        (a, b, c), side = weights(sight, q), owner(q)
+        sign, lane = 1.0 if side == LEFT else -1.0, velocity_lane(side)
+        expand_penetration(sight, side, ROW)
         for k in range(n + 1):
             x = sight.c[LANES * k + X.O] + sign * rows[ROW, k]
             rows[ROW, k] = a * x + b * sight.c[LANES * k + lane]

@@ -80,7 +80,10 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
         If the run is none of these or cannot be repeated, a number has no derivative, or a sensor measures in steps.
     """
     scene, sampled, system = run.scene, run.sampled, run.scene.system
-    check_run(run)
+    if run.status is not Status.DONE:
+        raise Refused(f"{scene.name}: no derivatives of a run that {run.stop}")
+    if run.method != EXACT or run.controllers:
+        raise Refused(f"{scene.name}: derivatives: allowed: a run of {EXACT} with the scene's own controllers")
     changes, grid, events = directions(scene, keys, sampled), run.t, run.event_table
     both = np.concatenate([grid, events[:, Entry.TIME]])
     order = np.argsort(both, kind="stable")
@@ -100,14 +103,6 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
         event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late])),
         carrier.corner,
     )
-
-
-def check_run(run: Trajectory) -> None:
-    """Refuse a run that has no derivatives."""
-    if run.status is not Status.DONE:
-        raise Refused(f"{run.scene.name}: no derivatives of a run that {run.stop}")
-    if run.method != EXACT or run.controllers:
-        raise Refused(f"{run.scene.name}: derivatives: allowed: a run of {EXACT} with the scene's own controllers")
 
 
 def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array, sampled: bool) -> Carrier:

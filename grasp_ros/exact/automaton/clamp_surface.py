@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-from grasp_ros.exact.automaton.resting_pair import (
-    HIGHEST,
-    LOWEST,
-    NEVER,
-    first_difference,
-    impact_beside,
-    own_difference,
-)
+from grasp_ros.exact.automaton.resting_pair import HIGHEST, NEVER, NEXT, first_difference, impact_beside, own_difference
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.kinematics import other, surface_factor
 from grasp_ros.exact.records import Plant, State
@@ -24,14 +17,14 @@ def surface_side(plant: Plant, state: State, side: Body) -> float:
     if factor != 0.0:
         return float(factor)
     push, pace = impact_beside(plant, state, side)
-    highest = HIGHEST if push == 0.0 and pace == 0.0 else LOWEST + 1  # of an impact no more is known
-    return float(first_difference(plant, state.y, side, push, pace, LOWEST, highest).value)
+    highest = HIGHEST if push == 0.0 and pace == 0.0 else NEXT  # of an impact no more is known
+    return float(first_difference(plant, state.y, side, push, pace, highest).value)
 
 
 @kernel
 def stays(plant: Plant, state: State, side: Body) -> bool:
     """Whether the bodies of a pair never move apart or together by themselves, but for its u'."""
-    return bool(own_difference(plant, state.y, side, LOWEST).order == NEVER)
+    return bool(own_difference(plant, state.y, side).order == NEVER)
 
 
 @kernel

@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.compilation.jit import inlined, kernel, whole
+from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
-from grasp_ros.exact.numerics.polynomial import product, values
+from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
 from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
 from grasp_ros.exact.tolerances import FRICTION
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, Slide, U, V, Z
-
-FIRST = whole(0)  # coefficient
 
 
 @kernel
@@ -103,28 +102,18 @@ def slide_in_flight(plant: Plant, state: State) -> SlideCandidate:
 
 @kernel
 def impact_series(tables: Tables, plant: Plant, mode: Integers, n: int) -> None:
-    """Write the series of the impact forces on the object, H w^3 (1 + p u'), up to the order n, to `tables.row`.
+    """Write the series of the impact forces on the object up to the order n to `tables.row`.
 
-    The table of factors is free after the expansion and holds the series on the way.
+    The table of factors is free after the expansion.
     """
-    f, row, part = tables.f, tables.row, n + 1
-    w, e, square, cube = f[:part], f[part : 2 * part], f[2 * part : 3 * part], f[3 * part : 4 * part]
+    f, row = tables.f, tables.row
     for k in range(n + 1):
         row[k] = 0.0
     for side in (LEFT, RIGHT):
-        if mode[side] != Pair.CONTACT:
-            continue
-        front, back = rate_lanes(side)
-        for k in range(n + 1):
-            w[k] = tables.c[LANES * k + Z.L + side]
-            e[k] = plant.pairs[side, Law.DISSIPATION] * (tables.c[LANES * k + front] - tables.c[LANES * k + back])
-        e[FIRST] += 1.0
-        product(w, w, square, n)
-        product(square, w, cube, n)
-        product(cube, e, square, n)
-        hertzian = plant.pairs[side, Law.HERTZIAN] if side == LEFT else -plant.pairs[side, Law.HERTZIAN]
-        for k in range(n + 1):
-            row[k] += hertzian * square[k]
+        if mode[side] == Pair.CONTACT:
+            expand_force(tables.c, plant.pairs, side, n, f)
+            for k in range(n + 1):
+                row[k] += f[k] if side == LEFT else -f[k]
 
 
 @kernel

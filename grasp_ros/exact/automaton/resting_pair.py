@@ -56,19 +56,18 @@ def leaning(plant: Plant, state: State, side: Body) -> Leaning:
     closed = state.mode[beside] in (Pair.CONTACT, Pair.BEGINNING) and plant.bodies[OBJECT, Of.MASS] < math.inf
     if closed and state.mode[beside] == Pair.CONTACT and y[U.L + beside] > 0.0:
         push, pace = impact_beside(plant, state, side)
-        found = first_difference(plant, y, side, push, pace, LOWEST, NEXT)
+        found = first_difference(plant, y, side, push, pace, NEXT)
         return found if found.order < NEVER else Leaning(UNDECIDED, 0.0)
-    found = own_difference(plant, y, side, LOWEST)
-    begins = closed and own_motion(plant, y, beside).order < NEVER
+    found = own_difference(plant, y, side)
+    begins = closed and (approach(y, beside) != 0.0 or own_difference(plant, y, beside).order < NEVER)
     return Leaning(UNDECIDED, math.inf) if found.order == NEVER and begins else found
 
 
 @kernel
-def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, lowest: int, highest: int
-                     ) -> Leaning:
+def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: float, highest: int) -> Leaning:
     """The first derivative of u beyond its rounding, with an acceleration of the object and its rate added; NEVER."""
     drag = plant.bodies[OBJECT, Of.DAMPING] / plant.bodies[OBJECT, Of.MASS]
-    for order in range(lowest, highest + 1):
+    for order in range(LOWEST, highest + 1):
         value, size = difference(plant, y, side, order)
         added = push if order == 2 else (pace - drag * push if order == 3 else 0.0)
         value += added
@@ -78,16 +77,9 @@ def first_difference(plant: Plant, y: Array, side: Body, push: float, pace: floa
 
 
 @kernel
-def own_difference(plant: Plant, y: Array, side: Body, lowest: int) -> Leaning:
-    """`first_difference` of arm and object by themselves, from an order on."""
-    return first_difference(plant, y, side, 0.0, 0.0, lowest, HIGHEST)
-
-
-@kernel
-def own_motion(plant: Plant, y: Array, side: Body) -> Leaning:
-    """The first derivative of u by which arm and object part or meet by themselves, that of order 1 included."""
-    d = approach(y, side)
-    return Leaning(1.0, d) if d != 0.0 else own_difference(plant, y, side, LOWEST)
+def own_difference(plant: Plant, y: Array, side: Body) -> Leaning:
+    """`first_difference` of arm and object by themselves."""
+    return first_difference(plant, y, side, 0.0, 0.0, HIGHEST)
 
 
 @kernel
@@ -163,7 +155,7 @@ def short_time(plant: Plant, side: Body) -> float:
 @kernel
 def parting_time(plant: Plant, state: State, side: Body, span: float) -> float:
     """How long, in s, a pair at rest keeps the sign of u in a flight, for certain; it is a short flight."""
-    order, value = own_difference(plant, state.y, side, LOWEST)
+    order, value = own_difference(plant, state.y, side)
     if order == NEVER:
         return math.inf
     return min(certain_time(plant, state.y, side, int(order), value, span), short_time(plant, side))

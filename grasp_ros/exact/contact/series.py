@@ -19,6 +19,7 @@ import numpy as np
 from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.compilation.vectors import add_product, load, numbers_of, spread
+from grasp_ros.exact.numerics.polynomial import product
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.records import FACTORS, Array, Lanes, PerMass
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Lane, Law, Of, V, X, Z
@@ -193,3 +194,23 @@ def expand_both(c: Array, f: Array, bodies: Array, pairs: Array, unit: float, n:
         v_l, v_r = twice * fma(-left[0], z_l, gl), twice * fma(right[0], z_r, gr)
         v_o = twice * fma(middle[0], z_l - z_r, go)
         put(c, LANES * (k + 1), (twice * g, v_l, x_o, v_o, 0.0, v_r, w_l, w_r))
+
+
+@kernel
+def expand_force(c: Array, pairs: Array, side: int, n: int, room: Array) -> None:
+    """Write the series of an impact force, H w^3 (1 + p u') in N, of a finished table to the begin of `room`.
+
+    That has places for four series; those behind the force are scratch.
+    """
+    hertzian, loss = pairs[side, Law.HERTZIAN], pairs[side, Law.DISSIPATION]
+    force, w, square, e = room[: n + 1], room[n + 1 : 2 * n + 2], room[2 * n + 2 : 3 * n + 3], room[3 * n + 3 :]
+    front, back = (V.L, V.O) if side == LEFT else (V.O, V.R)
+    for k in range(n + 1):
+        w[k] = c[LANES * k + Z.L + side]
+        e[k] = loss * (c[LANES * k + front] - c[LANES * k + back])
+    e[FIRST] += 1.0
+    product(w, w, square, n)
+    product(square, w, force, n)
+    product(force, e, square, n)
+    for k in range(n + 1):
+        force[k] = hertzian * square[k]
