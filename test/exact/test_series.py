@@ -61,14 +61,14 @@ def expand(name: str, n: int, pairs: Any = PAIRS, bodies: Any = BODIES, unit: fl
 
 def at(table: Array, s: float) -> Array:
     """The lanes' values at s."""
-    out = np.zeros(LANES)
+    out = np.zeros(2 * LANES)
     values(table.ravel(), len(table) - 1, s, out)
-    return out
+    return out[:LANES]
 
 
 def tables_of(table: Array, value: Array | None = None, size: Array | None = None) -> Tables:
     """A workspace with a finished table, and what was computed from it."""
-    empty = np.zeros(LANES)
+    empty = np.zeros(2 * LANES)
     value, size = (empty if given is None else given for given in (value, size))
     return Tables(table.ravel(), empty, value, size, empty, empty)
 

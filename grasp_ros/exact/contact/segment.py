@@ -13,7 +13,7 @@ from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
 from grasp_ros.exact.flight.closed_form import fly, free_flights
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.kinematics import rate_lanes
-from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values, values_and_ways
+from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
 from grasp_ros.exact.records import (
@@ -148,7 +148,7 @@ def step_ends(tables: Tables, plant: Plant, state: State, segment: Segment, work
     s = clear_end(tables, plant, n, left, right, h)
     if state.mode[OBJECT] != Slide.FREE:
         if s < h:
-            values_and_ways(tables.c, n, s, tables.at)
+            values(tables.c, n, s, tables.at)
         slide = slide_in_contact(tables, plant, state, n, s, work)
     return Ends(left, right, slide, math.nan if math.isnan(slide.when) else min(s, slide.when))
 
@@ -163,14 +163,14 @@ def cut_step(tables: Tables, plant: Plant, state: State, segment: Segment, ends:
     if math.isnan(s):
         return Segment(segment.kind, math.nan, math.nan, step, segment.flights)
     if s < segment.s or state.mode[OBJECT] != Slide.FREE:  # the search for a slip leaves another state in `at`
-        values_and_ways(c, step.order.number, s, at)
+        values(c, step.order.number, s, at)
     if state.mode[LEFT] == Pair.BEGINNING or state.mode[RIGHT] == Pair.BEGINNING:
         s = force_free_length(tables, plant, state, step.order.number, s)
-        values_and_ways(c, step.order.number, s, at)
+        values(c, step.order.number, s, at)
     t = at[Lane.TIME]
     if t > span:
         s, t = invert_time(tables, step, span, s, t), span
-        values_and_ways(c, step.order.number, s, at)
+        values(c, step.order.number, s, at)
     return Segment(segment.kind, t, s, step, segment.flights)
 
 
@@ -220,8 +220,7 @@ def move_by_step(tables: Tables, segment: Segment, state: State) -> None:
 def state_in_step(tables: Tables, segment: Segment, tau: float, row: Array) -> None:
     """Write positions and velocities after tau s of a step."""
     at = tables.at
-    values_and_ways(
-        tables.c, segment.step.order.number, invert_time(tables, segment.step, tau, segment.s, segment.t), at)
+    values(tables.c, segment.step.order.number, invert_time(tables, segment.step, tau, segment.s, segment.t), at)
     row[X.O], row[V.O] = at[X.O], at[V.O]
     if segment.step.left:
         row[X.L], row[V.L] = at[X.O] + at[Z.L] * at[Z.L], at[V.L]

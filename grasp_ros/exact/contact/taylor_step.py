@@ -12,7 +12,7 @@ from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.compilation.vectors import highest, larger, load, numbers_of, sizes, vector_of
 from grasp_ros.exact.contact.series import expand_both, expand_one, scale_of
 from grasp_ros.exact.kinematics import own_size
-from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values, values_and_ways
+from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
 from grasp_ros.exact.records import Array, Integers, Lanes, Order, Plant, Settings, State, Step, Tables
 from grasp_ros.exact.tolerances import STILL
@@ -183,7 +183,7 @@ def accepted_length(tables: Tables, step: Step, h: float, settings: Settings, wo
     Shortening it costs no new expansion.
     """
     for _ in range(60):
-        values_and_ways(tables.c, step.order.number, h, tables.at)
+        values(tables.c, step.order.number, h, tables.at)
         curvatures(tables.c, step.order.number, h, tables.size)
         if is_exact(tables, step, h, settings.tolerance):
             return h

@@ -32,16 +32,10 @@ def ways(c: Array, n: int, s: float) -> Array:
 
 @inlined
 def values(c: Array, n: int, s: float, at: Array) -> None:
-    """Write the lanes' values at s, of the even degree n, to `at`.
+    """Write the lanes' values at s, of the even degree n, to `at` (2 LANES,), and behind them how far they have come.
 
     The constant comes last and is rounded with one sum, so that many short steps lose nothing systematically.
     """
-    store(at, 0, ways(c, n, s) + load(c, 0))
-
-
-@inlined
-def values_and_ways(c: Array, n: int, s: float, at: Array) -> None:
-    """Write the lanes' values at s, of the even degree n, to `at`, and behind them how far they have come."""
     way = ways(c, n, s)
     store(at, 0, way + load(c, 0))
     store(at, LANES, way)
