@@ -40,11 +40,12 @@ class Watcher:
         self.seen, switches = self.memory.seen, self.memory.switches
         switches[Switch.WANTED] = wanted
         switches[Switch.LOSSES] = address_of(observe_losses) if wanted & Wanted.LOSSES else 0
-        self._block = block_of(self.memory)
+        self._tables, self._block = self.memory.c, block_of(self.memory)
 
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""
-        self._block = block_of(self.memory._replace(c=tables.c, size=tables.size))
+        if tables.c is not self._tables:  # a run in many pieces brings the same ones
+            self._tables, self._block = tables.c, block_of(self.memory._replace(c=tables.c, size=tables.size))
         return np.array([address_of(observe), self._block.ctypes.data])
 
     def begin(self, bound: float) -> None:
