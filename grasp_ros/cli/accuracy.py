@@ -39,7 +39,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     wished = options.error is not None or options.budget is not None
     if wished:
         check_wish(options.error, options.budget)
-    check_output(options.output, images(), options.force, [options.scene])
+    check_output(options.output, images(options.output), options.force, [options.scene])
     contenders, others = own_contenders(scene)
     prepare()
     truth = finest(scene)

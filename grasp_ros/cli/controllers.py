@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import select
+import signal
 from collections.abc import Sequence
+from contextlib import suppress
 
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.own_law import find_law
+
+MOST_BYTES = 2**16  # of a refusal
 
 
 def sides_of(words: Sequence[str]) -> dict[str, str]:
@@ -27,3 +33,40 @@ def sides_of(words: Sequence[str]) -> dict[str, str]:
 def load_controllers(words: Sequence[str]) -> dict[str, Law | type]:
     """The callables by side."""
     return {side: find_law(place, f"--controller: {side}={place}") for side, place in sides_of(words).items()}
+
+
+def check_controllers(words: Sequence[str], seconds: float) -> None:
+    """Refuse what `load_controllers` refuses, from a process of its own.
+
+    What a user's module opens, or changes, when it is imported belongs to the node that runs it. One that ends its
+    process, or takes longer than so many seconds, is left to that node.
+    """
+    if not words:
+        return
+    reader, writer = os.pipe()
+    if (child := os.fork()) == 0:
+        try:
+            nothing = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nothing, 1)
+            os.dup2(nothing, 2)
+            os.write(writer, _refusal(words).encode())
+        finally:
+            os._exit(0)
+    os.close(writer)
+    try:
+        refusal = os.read(reader, MOST_BYTES).decode() if select.select([reader], [], [], seconds)[0] else ""
+    finally:
+        os.close(reader)
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+    if refusal:
+        raise Refused(refusal)
+
+
+def _refusal(words: Sequence[str]) -> str:
+    try:
+        load_controllers(words)
+    except Refused as error:
+        return str(error)
+    return ""

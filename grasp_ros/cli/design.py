@@ -50,7 +50,7 @@ def _design(options: argparse.Namespace) -> int:
     problem = Problem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
                       [read_bound(text) for text in options.bounds], setup)
     check_output(options.output, YAML, options.force, [options.scene])
-    check_output(options.figure, images(), options.force, [options.scene])
+    check_output(options.figure, images(options.figure), options.force, [options.scene])
     several = len(options.minimise) == 2
     if several and options.output is not None:
         raise Refused("-o: allowed: with one --minimise, which has one best choice; the table has the numbers of all")

@@ -37,7 +37,7 @@ def add_to(commands: Any) -> None:
 
 
 def _fit(options: argparse.Namespace) -> int:
-    check_output(options.output, (*YAML, *images()), options.force, [options.source])
+    check_output(options.output, (*YAML, *images(options.output)), options.force, [options.source])
     scene = None
     if options.scene is not None:
         scene = load_scene(options.scene, options.settings)

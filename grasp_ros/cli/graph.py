@@ -16,10 +16,10 @@ from typing import Any
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_output, add_scene
 from grasp_ros.cli.bags import add_limits, check_limits, keeps
 from grasp_ros.cli.checks import load_scene, prepare
-from grasp_ros.cli.controllers import load_controllers, sides_of
+from grasp_ros.cli.controllers import check_controllers, sides_of
 from grasp_ros.exact.compilation.kernel_cache import kernels_on_disk
 from grasp_ros.graph.host import check_reach, hold, network
-from grasp_ros.graph.parameters import PEER_SECONDS, quoted
+from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, quoted
 from grasp_ros.graph.processes import Graph, GraphError, become
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
@@ -102,7 +102,7 @@ def _reach(options: argparse.Namespace) -> None:
 def _run(options: argparse.Namespace) -> int:
     _reach(options)
     laws = {f"{side}_controller": place for side, place in sides_of(options.laws).items()}
-    load_controllers(options.laws)  # the nodes do it again
+    check_controllers(options.laws, START_SECONDS)
     scene = load_scene(options.scene, options.settings)
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)

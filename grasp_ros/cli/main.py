@@ -71,12 +71,13 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         raise_on_signals()
         begin = time.monotonic()
         try:
-            os.getcwd()
             options = parser().parse_args(words)
-        except FileNotFoundError:
-            raise Refused("the working directory is gone; allowed: one that is there") from None
+        except FileNotFoundError:  # of an import
+            check_directory()
+            raise
         except SystemExit as stop:  # of argparse, which has said why
             return stop.code if isinstance(stop.code, int) else 0
+        check_directory()
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
@@ -93,6 +94,14 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
     except KeyboardInterrupt:
         print("grasp: interrupted", file=sys.stderr)
         return 130
+
+
+def check_directory() -> None:
+    """Refuse a working directory that has been removed."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        raise Refused("the working directory is gone; allowed: one that is there") from None
 
 
 def complete(parser: Callable[[Sequence[str]], argparse.ArgumentParser]) -> None:

@@ -85,8 +85,10 @@ def write_scene(scene: Scene, path: Path) -> None:
         file.write(scene.to_yaml().encode())
 
 
-def images() -> list[str]:
-    """Endings of figures."""
+def images(output: Path | None) -> list[str]:
+    """Endings of figures; none, and no matplotlib, without an output."""
+    if output is None:
+        return []
     from grasp_ros.simulation.canvas import formats
 
     return formats()

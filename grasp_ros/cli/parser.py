@@ -39,7 +39,10 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, shortened(f"{self.prog}: error: {message}") + "\n")
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        (file or sys.stderr).write(message)  # argparse keeps to itself that this failed
+        if file is sys.stdout:
+            file.write(message)  # argparse keeps to itself that this failed
+        else:
+            super()._print_message(message, file)
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Arguments; what nobody knows is an error of the command, and not of `grasp`."""

@@ -49,7 +49,7 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
-    check_output(output, WRITERS if options.animate else images(), options.force, options.sources)
+    check_output(output, WRITERS if options.animate else images(output), options.force, options.sources)
     if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]
@@ -89,14 +89,15 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
     path = Path(source)
     with reading(path):
         directory = path.is_dir()
-    recorded = directory or path.suffix in (".npz", ".mcap")
+    ending = path.suffix.lower()
+    recorded = directory or ending in (".npz", ".mcap")
     if recorded and (options.settings or options.sampled or options.method != EXACT or options.step is not None
                      or options.sensitivity):
         raise Refused(f"{source}: --set, --sampled, --method, --step, --sensitivity are not allowed; allowed for"
                       " scenes")
     if not recorded:
         return _simulated(source, options, span)
-    motion: Motion = load(path) if path.suffix == ".npz" else bag.read(path)
+    motion: Motion = load(path) if ending == ".npz" else bag.read(path)
     warn(motion.scene)
     return motion
 

@@ -71,14 +71,14 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         path = Path(source)
         with reading(path):
             directory = path.is_dir()
-        source = bag.read(path) if directory or path.suffix == ".mcap" else path
+        source = bag.read(path) if directory or path.suffix.lower() == ".mcap" else path
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")
     if isinstance(source, Recording):
         found = _of_recording(source, by_sensors)
     elif isinstance(source, Trajectory):
         found = _of_trajectory(source, "run")
-    elif Path(source).suffix == ".csv":
+    elif Path(source).suffix.lower() == ".csv":
         if scene is None:
             raise Refused(f"{source}: a table does not name its scene; allowed: a scene beside it, --scene")
         return _checked(_of_table(Path(source), scene))

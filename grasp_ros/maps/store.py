@@ -172,7 +172,7 @@ def read(path: str | os.PathLike[str]) -> Any:
         for name in _axes(group):
             data[name].load()
     for name in names:
-        with decoding(path / name, "a whole column; delete its `c`, and the same command computes it again"):
+        with decoding(path / name, "a whole column; delete its `c`, and the same command computes the map again"):
             data[name].load()
     for i in _undone(group, path):
         for name in names:

@@ -74,7 +74,7 @@ def answered(answer: object, who: str, tick: int, time: float) -> float:
     try:
         force = float(answer) if isinstance(answer, Real) else math.nan
     except OverflowError:
-        force = answer = math.inf  # nearer to it than to any float, and with too many digits to print
+        force = answer = math.inf if answer > 0 else -math.inf  # type: ignore[operator]  # too long to be printed
     if not math.isfinite(force):
         raise Refused(f"{who}: it answered {answer!r} at tick {tick}, t = {time!r} s; allowed: a finite number of N")
     return force

@@ -88,7 +88,8 @@ def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
     """
     ending = Path(path).suffix.lower()
     if ending not in allowed:
-        raise Refused(f"{path}: {ending or 'no ending'} is not allowed; allowed: {', '.join(allowed)}")
+        wrong = f"{ending} is not allowed; allowed: " if ending else "needs an ending, one of "
+        raise Refused(f"{path}: {wrong}{', '.join(allowed)}")
     return ending
 
 

@@ -60,7 +60,7 @@ def read_npz(path: Path, fields: Mapping[str, Field]) -> dict[str, np.ndarray]:
         If the file is damaged, or holds anything else.
     """
     fields = {**fields, DIGEST: Field(TEXT)}
-    with path.open("rb") as file, np.lib.npyio.NpzFile(file, allow_pickle=False) as archive:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
         if sorted(archive.files) != sorted(fields):
             raise Refused(f"arrays {', '.join(sorted(archive.files))}; allowed: {', '.join(sorted(fields))}")
         total = sum(member.file_size for member in ZipFile(file).infolist())

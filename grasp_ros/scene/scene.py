@@ -219,7 +219,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
     """
     reference, settings = os.fspath(reference), [settings] if isinstance(settings, str) else settings
     path = Path(reference)
-    if path.suffix in YAML:
+    if path.suffix.lower() in YAML:
         with reading(reference, SceneError):
             if not path.is_file():
                 raise SceneError(f"{reference}: {'is no file' if path.exists() else 'no such file'}")

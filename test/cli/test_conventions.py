@@ -165,6 +165,17 @@ def test_a_working_directory_that_is_gone_is_refused_in_a_line(tmp_path: Path) -
     result = shell(f"cd {tmp_path} && rmdir {tmp_path} && $GRASP simulate case_01")
     assert result.returncode == 2
     assert result.stderr == "grasp: the working directory is gone; allowed: one that is there\n"
+    assert shell(f"mkdir {tmp_path} && cd {tmp_path} && rmdir {tmp_path} && $GRASP --help").returncode == 0
+
+
+def test_wrong_words_are_refused_where_nobody_can_read_why() -> None:
+    assert shell("$GRASP bogus 2> /dev/full").returncode == 2
+
+
+def test_what_is_written_under_a_name_in_capitals_is_read_under_it(command: Any) -> None:
+    for line in ("new A.YAML", "simulate A.YAML -o A.NPZ", "plot A.NPZ -o A.PNG"):
+        result = command(*line.split())
+        assert result.returncode == 0, result.stderr
 
 
 @pytest.mark.parametrize("name", scene.names())

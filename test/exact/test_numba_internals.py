@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 import pytest
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
+from numba.core.datamodel import default_manager
 from numba.core.registry import CPUDispatcher, cpu_target
 
 from grasp_ros.exact.compilation import jit, kernel_cache
@@ -55,6 +57,12 @@ def damaged(whole: bytes) -> list[bytes]:
         flipped[place] ^= 0b101
         found.append(bytes(flipped))
     return found
+
+
+def test_arrays_are_to_kernels_what_an_observer_takes_them_for() -> None:
+    """`callback.block_of` writes them as numba has them in memory."""
+    fields = default_manager[numba.typeof(np.zeros(3))]._fields
+    assert fields == ("meminfo", "parent", "nitems", "itemsize", "data", "shape", "strides")
 
 
 @pytest.mark.slow

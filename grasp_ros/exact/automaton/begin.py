@@ -48,7 +48,10 @@ def time_of_impulse(per_hertz: float, loss: float, order: float, a: float) -> fl
 
 @kernel
 def time_of_force(reach: float, loss: float, order: int, a: float, power: int) -> float:
-    """The same for a force, times t where it is its impulse: u^(3/2) (1 + p u') t^(power / 2) = 2^-HELD reach."""
+    """The time t at which u^(3/2) (1 + p u') t^(power / 2) has come to 2^-HELD `reach`, a power of two.
+
+    With power FORCE a force has come to a part of another one, with IMPULSE its impulse to a part of a motion.
+    """
     if reach == 0.0:
         return 0.0
     above = exponent(a) + 1

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 from llvmlite import ir
@@ -38,6 +39,7 @@ def block_of(record: Any) -> Integers:
     block = np.array([*_words(record)])
     if not COMPILED:
         _RECORDS[block.ctypes.data] = record
+        finalize(block, _RECORDS.pop, block.ctypes.data)
     return block
 
 

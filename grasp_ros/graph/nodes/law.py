@@ -22,7 +22,10 @@ class OwnLaw:
 
     def __init__(self, words: str) -> None:
         self.words = words
-        self._found = find_law(words, f"law: {words}")
+        try:
+            self._found = find_law(words, f"law: {words}")
+        except KeyboardInterrupt as error:  # of the module itself: a node notes signals, they raise none
+            raise Refused(f"law: {words}: {described(error)}") from error
         self.reset()
 
     def reset(self) -> None:
