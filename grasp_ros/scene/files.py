@@ -26,13 +26,7 @@ DAMAGE: tuple[type[Exception], ...] = (  # what decoders raise for files that we
 
 @contextmanager
 def reading(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
-    """Refuse a path that the system does not let us read, or a text that is not UTF-8.
-
-    Raises
-    ------
-    Refused
-        Of the given type; names the path and the reason.
-    """
+    """Refuse a path that the system does not let us read, or a text that is not UTF-8."""
     try:
         yield
     except OSError as error:
@@ -42,13 +36,7 @@ def reading(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
 
 
 def read_text(path: Path, refusal: type[Refused] = Refused, most: int = TEXT_BYTES) -> str:
-    """All of a text file that is not larger than such files are.
-
-    Raises
-    ------
-    Refused
-        Of the given type, if the file cannot be read, is larger, or is not UTF-8.
-    """
+    """All of a text file; it is refused if it is larger than such files are."""
     with reading(path, refusal):
         with path.open("rb") as file:
             content = file.read(most + 1)
@@ -59,15 +47,7 @@ def read_text(path: Path, refusal: type[Refused] = Refused, most: int = TEXT_BYT
 
 @contextmanager
 def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
-    """Refuse a path that the system does not let us write.
-
-    Raises
-    ------
-    Refused
-        Of the given type; names the path and the reason.
-    BrokenPipeError
-        As it comes: a reader that has had enough is no refusal.
-    """
+    """Refuse a path that the system does not let us write; a reader that has had enough is no refusal."""
     try:
         yield
     except BrokenPipeError:
@@ -79,13 +59,7 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
 
 
 def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
-    """The ending of a file that is to be written, in small letters: it decides the format.
-
-    Raises
-    ------
-    Refused
-        If it is none of those that are allowed.
-    """
+    """The ending of a file that is to be written, in small letters: it decides the format."""
     ending = Path(path).suffix.lower()
     if ending not in allowed:
         wrong = f"{ending} is not allowed; allowed: " if ending else "needs an ending, one of "
@@ -95,13 +69,7 @@ def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
 
 @contextmanager
 def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A file to write that takes the place of what was there only when it is whole.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written; what was there is still there.
-    """
+    """A file to write that takes the place of what was there only when it is whole."""
     path = Path(path)
     with writing(path):
         if path.exists() and not path.is_file():  # a device, a pipe; a directory refuses by itself
@@ -114,13 +82,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """The name of a file or a directory, with the same ending, that takes the place of another when it is whole.
-
-    Raises
-    ------
-    Refused
-        If it cannot be written; what was there is still there.
-    """
+    """The name of a file or a directory, with the same ending, that takes the place of another when it is whole."""
     part = path.with_name(f".{path.stem[:200]}.{os.getpid()}.part{path.suffix}")
     with writing(path):
         try:
@@ -140,19 +102,7 @@ def decoding(path: object, kind: str, refusal: type[Refused] = Refused, also: tu
              ) -> Iterator[None]:
     """Refuse a file that is not what it should be, damaged or of another kind.
 
-    Parameters
-    ----------
-    path : object
-    kind : str
-        What it should be, with its article.
-    refusal : type of Refused
-    also : tuple of exception types
-        What its decoder raises beside DAMAGE.
-
-    Raises
-    ------
-    Refused
-        Of the given type; names the path and the reason.
+    `kind` says what it should be, with its article; `also` what its decoder raises beside DAMAGE.
     """
     try:
         yield

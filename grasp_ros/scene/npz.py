@@ -46,18 +46,9 @@ def _digest(arrays: Mapping[str, np.ndarray]) -> str:
 
 
 def read_npz(path: Path, fields: Mapping[str, Field]) -> dict[str, np.ndarray]:
-    """All arrays of a file.
+    """All arrays of a file that holds these fields, the checksum of `signed`, and no others.
 
-    Parameters
-    ----------
-    path : Path
-    fields : mapping of str to Field
-        Every array by its name; the file must hold these, the checksum of `signed`, and no others.
-
-    Raises
-    ------
-    Refused, OSError, zipfile.BadZipFile, or what else `files.DAMAGE` lists
-        If the file is damaged, or holds anything else.
+    What is wrong with it is refused, or raises what `files.DAMAGE` lists.
     """
     fields = {**fields, DIGEST: Field(TEXT)}
     with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:

@@ -17,20 +17,9 @@ FAULTS = (Exception, SystemExit, GeneratorExit)  # of a user's code; a KeyboardI
 
 
 def find_law(place: str, what: str) -> Law | type:
-    """The object that `module:object` names.
+    """The object that `module:object` names; `what` begins a refusal.
 
-    Parameters
-    ----------
-    place : str
-        "module:object"; a module of the working directory, or one that is installed, which goes first.
-    what : str
-        What a refusal begins with.
-
-    Raises
-    ------
-    Refused
-        If the words have another form, the module cannot be imported, or what they name is not there or cannot be
-        called.
+    The module is one of the working directory, or one that is installed, which goes first.
     """
     if not all(place.partition(":")) or place.startswith("."):
         raise Refused(f"{what} is not allowed; allowed: module:object")
@@ -61,17 +50,7 @@ def find_law(place: str, what: str) -> Law | type:
 def begin(law: Law | type, what: str) -> Law:
     """What answers in a run that begins: a new object of a class; any other object itself, after its `reset`, if any.
 
-    Parameters
-    ----------
-    law : callable, or a class of such
-    what : str
-        What a refusal begins with.
-
-    Raises
-    ------
-    Refused
-        If it cannot be called with what `physics.sight.asked` says, is a class that cannot be called without, or does
-        not begin.
+    What cannot be called as `physics.sight.asked` says is refused; `what` begins the refusal.
     """
     begun: Any = law
     if isinstance(law, type):

@@ -13,19 +13,9 @@ from grasp_ros.scene.validation import SceneError
 
 
 def apply(setting: str, document: dict[Any, Any]) -> None:
-    """Put a setting into the document of a scene, before it is validated.
+    """Put a setting into the document of a scene, which is changed in place, before it is validated.
 
-    Parameters
-    ----------
-    setting : str
-        "section.key=value" gives a number; "section={}" names a section without numbers, or leaves it as it is.
-    document : dict
-        Changed in place.
-
-    Raises
-    ------
-    SceneError
-        If it is neither, or names what no scene has.
+    "section.key=value" gives a number; "section={}" names a section without numbers, or leaves it as it is.
     """
     match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
     if match is None:

@@ -93,14 +93,7 @@ _Loader.add_constructor("tag:yaml.org,2002:map", _mapping)
 
 
 def load(text: str) -> Any:
-    """Read one document.
-
-    Raises
-    ------
-    Refused
-        If the text is not YAML or too large, a key stands twice or is a list or a mapping, or there is a tag, an
-        anchor, an alias or a directive.
-    """
+    """Read one document; what is not strict YAML, or too large, is refused."""
     if len(text) > TEXT_BYTES:
         raise Refused(f"larger than {TEXT_BYTES} characters; allowed: at most that")
     try:

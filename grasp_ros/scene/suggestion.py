@@ -15,15 +15,7 @@ def _alike(word: str, name: str) -> float:
 
 
 def allowed(word: str, known: Collection[str], other: str = "") -> str:
-    """The end of a refusal: the known word that is meant, or the first of all that are allowed.
-
-    Parameters
-    ----------
-    word : str
-    known : collection of str
-    other : str, optional
-        What is allowed beside them, in words.
-    """
+    """The end of a refusal: the known word that is meant, or the first that are allowed, behind `other` words."""
     close = get_close_matches(str(word), known, MOST_MEANT, ALIKE)
     best = [name for name in close if _alike(word, name) >= _alike(word, close[0]) - TIE]
     if best:

@@ -28,13 +28,7 @@ def is_text(value: Any) -> bool:
 
 def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequence[str], needed: Sequence[str]
                ) -> None:
-    """Refuse unknown keys and missing ones.
-
-    Raises
-    ------
-    SceneError
-        Names the first of them.
-    """
+    """Refuse unknown keys and missing ones."""
     for key in found:
         if key not in allowed:
             meant = what_is_allowed(f"{prefix}{key}", [f"{prefix}{known}" for known in allowed])
@@ -47,13 +41,7 @@ def check_keys(source: str, prefix: str, found: Mapping[Any, Any], allowed: Sequ
 
 
 def read_texts(source: str, document: Mapping[Any, Any]) -> tuple[str, tuple[str, ...], str]:
-    """Title, readings and what to watch for.
-
-    Raises
-    ------
-    SceneError
-        If one is not a text.
-    """
+    """Title, readings and what to watch for."""
     title, readings, watch = document["title"], document["readings"], document.get("watch", "")
     for key, value in (("title", title), ("watch", watch)):
         if not is_text(value):
@@ -64,13 +52,7 @@ def read_texts(source: str, document: Mapping[Any, Any]) -> tuple[str, tuple[str
 
 
 def read_sections(source: str, document: Mapping[Any, Any]) -> dict[str, dict[str, Any]]:
-    """Numbers of all sections of a document, each within its range.
-
-    Raises
-    ------
-    SceneError
-        If a key or a value is not allowed.
-    """
+    """Numbers of all sections of a document, each within its range."""
     return {section: _section(source, BY_SECTION[section], found) for section, found in document.items()
             if section in BY_SECTION}
 
@@ -92,13 +74,7 @@ def _section(source: str, effect: Effect, found: Any) -> dict[str, Any]:
 
 
 def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None:
-    """Refuse sections that do not go together.
-
-    Raises
-    ------
-    SceneError
-        Names the first that does not.
-    """
+    """Refuse sections that do not go together."""
     if not SOMETHING & values.keys():
         raise SceneError(f"{source}: no body; allowed: at least one of {', '.join(sorted(SOMETHING))}")
     effects = named(values)
@@ -112,13 +88,7 @@ def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None
 
 
 def check_domain(source: str, values: Mapping[str, Mapping[str, Any]], system: System) -> None:
-    """Refuse a scene outside the domain, see `physics.domain`.
-
-    Raises
-    ------
-    SceneError
-        Names the first rule that it breaks.
-    """
+    """Refuse a scene outside the domain, see `physics.domain`."""
     found = outside(system, values["time"]["duration_s"])
     if found is not None:
         section, _, key = found.key.partition(".")

@@ -53,47 +53,20 @@ def nothing(*_: object) -> Iterable[Any]:
 
 @dataclass(frozen=True)
 class Effect:
-    """One section of a scene.
+    """One section of a scene."""
 
-    Attributes
-    ----------
-    section : str
-        Its name in a scene; the effect is there if the scene names it.
-    text : str
-        What it simulates, in one line.
-    parameters : tuple of Parameter
-    build : callable
-        Adds its terms to the system.
-    certificate : str
-        What it does to V_c, in words.
-    needs : tuple of str
-        Sections that must be there as well.
-    node : str
-        The executable that declares its parameters.
-    commands : Topic, optional
-        Topic of the controller that it brings.
-    outputs : tuple of Output
-        What the plant publishes about it.
-    problems : callable
-        Finds what is wrong beyond ranges.
-    oddities : callable
-        Finds suspicious settings, in the sections and the system that they have built.
-    example : mapping of str to numbers
-        Keys to add to a scene to see what it does; `python -m lab effects` does. Empty for what the paper's grasp has.
-    """
-
-    section: str
-    text: str
+    section: str  # its name in a scene; the effect is there if the scene names it
+    text: str  # what it simulates, in one line
     parameters: tuple[Parameter, ...]
-    build: Callable[[Sections, System], None]
-    certificate: str
-    needs: tuple[str, ...] = ()
-    node: str = "plant"
-    commands: Topic | None = None
-    outputs: tuple[Output, ...] = ()
-    problems: Callable[[Sections], Iterable[Problem]] = nothing
-    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing
-    example: Numbers = field(default_factory=dict)
+    build: Callable[[Sections, System], None]  # adds its terms to the system
+    certificate: str  # what it does to V_c, in words
+    needs: tuple[str, ...] = ()  # sections that must be there as well
+    node: str = "plant"  # the executable that declares its parameters
+    commands: Topic | None = None  # topic of the controller that it brings
+    outputs: tuple[Output, ...] = ()  # what the plant publishes about it
+    problems: Callable[[Sections], Iterable[Problem]] = nothing  # what is wrong beyond ranges
+    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing  # suspicious settings, and what they have built
+    example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it
 
 
 def period_ns(sections: Sections) -> int:
