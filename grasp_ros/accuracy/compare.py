@@ -29,19 +29,9 @@ def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort:
             seconds: float = SECONDS, progress: Callable[[float], object] | None = None) -> list[Record]:
     """Measure solvers from their loosest setting on until the time is over: next is who has had the least of it.
 
-    Nobody begins before those ahead have had as much as the patience, so that a fast solver is through at once.
-
-    Parameters
-    ----------
-    scene : Scene
-    contenders : sequence of Contender
-        One that takes longer than the patience climbs no further.
-    truth : Truth
-    effort : Effort
-    seconds : float
-        After which no measurement begins.
-    progress : callable, optional
-        Called with the time that went by, in s.
+    Nobody begins before those ahead have had as much as the patience, so that a fast solver is through at once; who
+    takes longer than that climbs no further. No measurement begins after so many seconds; the progress is told those
+    gone by.
     """
     begin = time.monotonic()
     records: list[Record] = []
@@ -96,22 +86,9 @@ def fastest(records: Iterable[Record], error: float) -> Record | None:
 
 
 def advise(records: Iterable[Record], error: float | None = None, budget: float | None = None) -> Advice:
-    """The fastest setting that reaches an error, or the most accurate one within a budget.
+    """The fastest setting that reaches an error in m and m/s, or the most accurate one within a budget in s.
 
-    Runs that miss touches or stop early are no choice.
-
-    Parameters
-    ----------
-    records : iterable of Record
-        Of one scene.
-    error : float, m and m/s
-    budget : float, s
-        Exactly one of the two is given, and positive.
-
-    Raises
-    ------
-    Refused
-        If it is not so, or nothing has a result.
+    Runs of one scene are given; those that miss touches or stop early are no choice.
     """
     check_wish(error, budget)
     sound = [record for record in records if record.sound]

@@ -56,13 +56,7 @@ def own_contenders(scene: Scene) -> tuple[list[Contender], dict[str, str]]:
 
 
 def simulated(name: str, scene: Scene, setting: float) -> Solve:
-    """A method of `grasp simulate` as a contender builds it.
-
-    Raises
-    ------
-    ImportError
-        If the package that it needs is not installed.
-    """
+    """A method of `grasp simulate` as a contender builds it; ImportError if its package is not installed."""
     package = METHODS[name].package
     if package is not None and importlib.util.find_spec(package) is None:
         raise ImportError(package)

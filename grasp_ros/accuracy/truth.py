@@ -35,13 +35,7 @@ class Truth(NamedTuple):
 
 
 def finest(scene: Scene) -> Truth:
-    """The motion of a scene, and how well it is known.
-
-    Raises
-    ------
-    Refused
-        If the run does not reach its end.
-    """
+    """The motion of a scene to its end, and how well it is known."""
     grid = np.linspace(0.0, scene.duration, GRID_POINTS)
     run = simulate(scene, grid=grid, accuracy=FINEST)
     if run.status is not Status.DONE:

@@ -7,13 +7,7 @@ from grasp_ros.methods.contract import Problem, Solution
 
 
 def solve(problem: Problem) -> Solution:
-    """Integrate from event to event; inputs that change on the way are driven from outside.
-
-    Raises
-    ------
-    Refused
-        If the accuracy is outside its range or the initial state is not finite.
-    """
+    """Integrate from event to event; inputs that change on the way are driven from outside."""
     integrator = Integrator(
         problem.system, continuous=not problem.sampled, accuracy=problem.setting, max_events=problem.max_events,
         max_work=problem.max_work,

@@ -56,14 +56,7 @@ STEPS, RIGHT_HAND_SIDES, EVENT_EVALUATIONS = (
 
 
 def solve(rule: int, problem: Problem) -> Solution:
-    """Integrate with a fixed step; outputs between the steps by cubic Hermite interpolation.
-
-    Parameters
-    ----------
-    rule : int
-        PLAIN, PAPER or LOCATED.
-    problem : Problem
-    """
+    """Integrate with a fixed step; outputs between the steps by cubic Hermite interpolation."""
     q, y = parameters(problem.system), tuple(problem.system.state.tolist())
     out, work = np.empty((len(problem.grid), 6)), np.zeros(len(Work), dtype=np.int64)
     events = np.empty((0 if rule == PLAIN else min(problem.max_events, MOST_EVENTS), 5))

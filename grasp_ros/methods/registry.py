@@ -87,13 +87,7 @@ METHODS: dict[str, Method] = {
 
 
 def find(name: str) -> Method:
-    """A method by its name.
-
-    Raises
-    ------
-    Refused
-        If there is none.
-    """
+    """A method by its name."""
     if name not in METHODS:
         raise Refused(f"method {name!r} is not allowed; {allowed(name, METHODS)}")
     return METHODS[name]
@@ -104,22 +98,8 @@ def check(
 ) -> float:
     """The setting of a method, if it can do what is asked; the one place that refuses what it cannot.
 
-    Parameters
-    ----------
-    name : str
-    scene : Scene
-    setting : float or None
-        None: the method's default, or the whole horizon as a step if that is shorter.
-    sampled : bool
-        Whether commands are held over control periods.
-    max_work : int
-        Another than MAX_WORK is a budget that someone has set.
-
-    Raises
-    ------
-    Refused
-        If the name or the setting is not allowed, a package is missing, or the scene or the run needs what the method
-        does not declare.
+    No setting is the method's default, or the whole horizon as a step if that is shorter; another budget of work than
+    MAX_WORK is one that someone has set.
     """
     method = find(name)
     value = method.default if setting is None else number(f"{name}: {method.knob}", setting)

@@ -33,26 +33,10 @@ COILS = np.array([0.0, 0.0, *([1.0, -1.0] * 5), 0.0, 0.0])
 
 def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float, float] | None = None,
             width_mm: float | None = None) -> None:
-    """Write a motion as a moving picture.
+    """Write a motion as a moving picture: .gif, .html (with its pictures inside) or .mp4.
 
-    Parameters
-    ----------
-    motion : Motion
-        Between its output times states are interpolated linearly.
-    path : Path
-        .gif, .html (with its pictures inside) or .mp4.
-    speed : float
-        Seconds of the motion in a second.
-    span : tuple of float, optional
-        First and last time in s; default: the whole motion.
-    width_mm : float, optional
-        Default: 150 mm.
-
-    Raises
-    ------
-    Refused
-        If the ending is another, its program is not there, the motion is empty, the speed is not allowed, or the file
-        cannot be written.
+    Between its output times states are interpolated linearly. `speed` is in seconds of the motion in a second, `span`
+    its first and last time in s; by default it is the whole motion, 150 mm wide.
     """
     times = _times(motion, speed, span)
     writer = _writer(path)

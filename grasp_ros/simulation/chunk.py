@@ -7,7 +7,6 @@ plain one that stops, is driven as `simulate` drives a scene. Both give the same
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -67,32 +66,16 @@ class Setup(NamedTuple):
     max_work: int = MAX_WORK
 
 
-@dataclass(frozen=True)
-class Chunk:
-    """Outcomes of some rows.
+class Chunk(NamedTuple):
+    """Outcomes of n rows."""
 
-    Attributes
-    ----------
-    columns : dict of str to array (n,)
-    status : array (n,)
-        Places in `STATUSES`.
-    stops : dict of int to str
-        Why and where a row was refused or stopped, by its place among these rows.
-    """
-
-    columns: dict[str, Array]
-    status: np.ndarray
-    stops: dict[int, str]
+    columns: dict[str, Array]  # (n,)
+    status: np.ndarray  # (n,) places in `STATUSES`
+    stops: dict[int, str]  # why and where a row was refused or stopped, by its place among these rows
 
 
 def checked(setup: Setup) -> Setup:
-    """A setup with numbers of Python's own.
-
-    Raises
-    ------
-    Refused
-        If one is none, or outside its range.
-    """
+    """A setup with numbers of Python's own."""
     outcomes = (setup.outcomes,) if isinstance(setup.outcomes, str) else tuple(setup.outcomes)
     return Setup(
         outcomes, check_accuracy(setup.accuracy), bool(setup.sampled), number("settled", setup.settled),
@@ -100,13 +83,7 @@ def checked(setup: Setup) -> Setup:
 
 
 def check(scene: Scene, setup: Setup) -> list[Outcome]:
-    """The columns that are asked for.
-
-    Raises
-    ------
-    Refused
-        If an outcome is unknown or not to be had, or a setting is outside its range.
-    """
+    """The columns that are asked for, if they are to be had and the setting is allowed."""
     columns = find(setup.outcomes)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")

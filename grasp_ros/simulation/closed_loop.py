@@ -33,13 +33,7 @@ Changes = Mapping[int, Mapping[str, float]]
 
 
 def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> dict[int, Foreign]:
-    """Controllers from outside by side, as the kernels call them, at the beginning of a run.
-
-    Raises
-    ------
-    Refused
-        If there is no such arm, or what is to control it cannot be called or asks for what is not there.
-    """
+    """Controllers from outside by side, as the kernels call them, at the beginning of a run."""
     found: dict[int, Foreign] = {}
     if not controllers:
         return found
@@ -54,13 +48,7 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> 
 
 
 def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[str] = ()) -> None:
-    """Refuse changes that a running graph would refuse.
-
-    Raises
-    ------
-    Refused
-        Names the first of them.
-    """
+    """Refuse changes that a running graph would refuse."""
     if not changes:
         return
     if not held:
@@ -80,20 +68,8 @@ def drive_sampled(
 ) -> Array:
     """States (n, 6) under controllers that answer at every tick; only the rows reached, if the integrator stops.
 
-    Parameters
-    ----------
-    scene : Scene
-    grid : array (m,), s
-        Ascending output times within the horizon.
-    loop : Loop
-        Filled with what was answered and what acted, at the output times that are reached.
-    changes : mapping of int to mapping of str to float
-        Numbers of the controllers that are set while it runs, by the tick from which they act.
-    foreign : mapping of int to Foreign
-        Controllers from outside, by side.
-    progress : callable or None
-        Called with the time reached, in s.
-    integrator : Integrator
+    `loop` is filled with what was answered and what acted, at the output times that are reached. `changes` are numbers
+    of the controllers that are set while it runs, by the tick from which they act.
     """
     plant, states, done = SampledPlant(scene.system, scene.period_ns, integrator), np.empty((len(grid), 6)), 0
     for ticks in _blocks(scene.ticks, changes):

@@ -37,15 +37,7 @@ def intervals(event_table: Array, side: int, end: float) -> Array:
 def contact_table(system: System, event_table: Array, side: int, breaks: Array, states: States) -> np.ndarray:
     """The contacts of one side, see `trajectory.Trajectory.contacts`.
 
-    Parameters
-    ----------
-    system : System
-    event_table : array (m, 5)
-    side : int
-    breaks : array (k,), s
-        Begin and end of the run, and between them all times at which the motion is not smooth.
-    states : callable
-        Dense output.
+    `breaks` (k,) in s are begin and end of the run, and between them all times at which the motion is not smooth.
     """
     found = intervals(event_table, side, float(breaks[-1]))
     found = found[found[:, 1] > found[:, 0]]

@@ -63,21 +63,10 @@ class Sensitivity:
 
 
 def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
-    """Repeat a run of `exact`, and carry its derivatives along.
+    """Repeat a run of `exact`, and carry its derivatives along; the motion is that of the run, bit for bit.
 
-    The motion is that of the run, bit for bit.
-
-    Parameters
-    ----------
-    run : Trajectory
-        To the end of the horizon, with the scene's own controllers.
-    keys : sequence of str
-        "section.key": initial values, and any number of the scene that enters smoothly.
-
-    Raises
-    ------
-    Refused
-        If the run is none of these or cannot be repeated, a number has no derivative, or a sensor measures in steps.
+    What has no derivatives is refused: a run that was not to its end or had controllers from outside, numbers that do
+    not enter smoothly, sensors that measure in steps.
     """
     scene, sampled, system = run.scene, run.sampled, run.scene.system
     if run.status is not Status.DONE:
@@ -115,13 +104,7 @@ def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array
 
 
 def complete(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
-    """Run a scene to its end, as `simulate` does; states (m, 6) at the output times.
-
-    Raises
-    ------
-    Refused
-        If the run does not get there.
-    """
+    """Run a scene to its end, as `simulate` does, or refuse; states (m, 6) at the output times."""
     states = drive(scene, integrator, sampled, grid)
     if integrator.status is not Status.DONE:
         raise Refused(f"{scene.name}: no derivatives of a run that {integrator.stop}")

@@ -59,11 +59,6 @@ def running_losses(run: Trajectory) -> tuple[Array, Losses]:
 
     The times are those of outputs and events of an exact run, and its begin and end; those of outputs and control
     periods of any other, whose sums follow the trapezoidal rule.
-
-    Raises
-    ------
-    Refused
-        If the output times of such a run leave control periods out, and it cannot be repeated, see `Trajectory.at`.
     """
     if not by_output_times(run):
         times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
@@ -98,7 +93,7 @@ def losses(run: Trajectory) -> Losses:
     Raises
     ------
     Refused
-        As `running_losses`.
+        If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
     if by_output_times(run):
         run = at_every_tick(run)

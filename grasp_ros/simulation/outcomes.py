@@ -119,13 +119,7 @@ def of_one(outcomes: Iterable[Outcome], seen: Array, state: Array) -> list[float
 
 
 def find(names: Iterable[str]) -> list[Outcome]:
-    """Outcomes by the names of columns or groups, each once.
-
-    Raises
-    ------
-    Refused
-        If there is no such name.
-    """
+    """Outcomes by the names of columns or groups, each once."""
     found: dict[str, Outcome] = {}
     for name in names:
         if name not in GROUPS and name not in OUTCOMES:

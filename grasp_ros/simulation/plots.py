@@ -89,24 +89,9 @@ def compose(
     motions: Sequence[Motion], captions: Sequence[str], *, width_mm: float | None = None,
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
-    """A figure of motions side by side, with common axes.
+    """A figure of motions side by side, with common axes; captions are second lines of their titles.
 
-    Parameters
-    ----------
-    motions : sequence of Motion
-    captions : sequence of str
-        Second lines of their titles.
-    width_mm : float, optional
-        Of the page; default: 230 mm, and 150 mm for each of several motions.
-    span : tuple of float, optional
-        First and last time in s; default: the whole motions.
-    panels : sequence of Panel, optional
-        From top to bottom; default: all of PANELS.
-
-    Raises
-    ------
-    Refused
-        If a motion is empty, or the width is not allowed.
+    By default it is 230 mm wide, or 150 mm for each of several motions, and has the whole motions and all of PANELS.
     """
     if any(not len(motion.t) for motion in motions):
         raise Refused("nothing to draw: the motion has no output times")
@@ -224,26 +209,14 @@ def shade_contacts(axes: Axes, motion: Motion) -> None:
 
 
 def save(figure: Figure, path: str | os.PathLike[str], dpi: int = 150) -> None:
-    """Write a figure into a file.
-
-    Raises
-    ------
-    Refused
-        If matplotlib does not know the format, or the file cannot be written.
-    """
+    """Write a figure into a file."""
     ending = format_of(path, canvas.formats())
     with replacing(path) as file:
         write(figure, file, ending, dpi)
 
 
 def write(figure: Figure, file: BinaryIO, ending: str, dpi: int = 150) -> None:
-    """Write a figure into an open file.
-
-    Raises
-    ------
-    Refused
-        If matplotlib cannot draw this format here.
-    """
+    """Write a figure into an open file."""
     try:
         with canvas.style():
             figure.savefig(file, format=ending[1:], dpi=dpi)

@@ -15,14 +15,7 @@ DELAY_S = 0.5  # a computation that is over by then needs no bar
 def showing(progress: Told | bool | None, total: float | None, unit: str, name: str) -> Iterator[Told | None]:
     """What is to be told how far a computation is: what a caller gave, a bar in place of True, or nothing.
 
-    Parameters
-    ----------
-    progress : callable, bool or None
-    total : float, optional
-        What the last call says, where it is known.
-    unit : str
-    name : str
-        Stands in front of the bar.
+    `total` is what the last call says, where it is known; the name stands in front of the bar.
     """
     if not isinstance(progress, bool):
         yield progress

@@ -72,13 +72,7 @@ def check_same(run: Trajectory, grid: Array, states: Array, events: Array | None
 
 
 def at_every_tick(run: Trajectory) -> Trajectory:
-    """A run with every control period among its output times, up to the last of these.
-
-    Raises
-    ------
-    Refused
-        If it has not, and cannot be repeated, see `states_at`.
-    """
+    """A run with every control period among its output times, up to the last of these."""
     if not len(run.t) or _every_tick(run, run.t[-1:]):
         return run
     ticks = tick_times(run.scene)

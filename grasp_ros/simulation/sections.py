@@ -28,13 +28,7 @@ class Section(NamedTuple):
 
 
 def as_function(section: Function | ArrayLike, level: float) -> Function:
-    """A function whose zeros are wanted, of weights (6,) of the state or of a callable.
-
-    Raises
-    ------
-    Refused
-        If it is neither.
-    """
+    """A function whose zeros are wanted, of weights (6,) of the state or of a callable."""
     if callable(section):
         return lambda t, state: np.asarray(section(t, state), dtype=float) - level
     weights = np.asarray(section, dtype=float)
@@ -48,20 +42,7 @@ def as_function(section: Function | ArrayLike, level: float) -> Function:
 def crossings(function: Function, direction: int, breaks: Array, states: States) -> Section:
     """Where a function of time and state changes its sign, see `trajectory.Trajectory.section`.
 
-    Parameters
-    ----------
-    function : callable
-    direction : int
-        +1, -1, or 0 for both.
-    breaks : array (k,), s
-        Begin and end of the run, and between them all times at which the motion is not smooth.
-    states : callable
-        Dense output.
-
-    Raises
-    ------
-    Refused
-        If the direction is another, or the function gives no number for each time, or none that is finite.
+    `breaks` (k,) in s are begin and end of the run, and between them all times at which the motion is not smooth.
     """
     if direction not in (-1, 0, 1):
         raise Refused(f"direction: {direction!r} is not allowed; allowed: -1, 0 or 1")

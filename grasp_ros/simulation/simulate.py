@@ -33,12 +33,7 @@ GRID_POINTS = 2001
 
 
 def check_scene(scene: object) -> None:
-    """Refuse what is no scene.
-
-    Raises
-    ------
-    Refused
-    """
+    """Refuse what is no scene."""
     if not isinstance(scene, Scene):
         hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
         raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")

@@ -77,18 +77,14 @@ def real_roots(series: Array) -> Array:
 
 
 def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group: NDArray[np.int64]) -> Pieces:
-    """Pieces of a motion, halved until they are resolved.
+    """Pieces of a motion, halved until they are resolved relative to the largest value of their group.
 
     Parameters
     ----------
-    states : callable
-        Dense output, from times (n,) to states (n, 6).
-    quantity : callable
-        What is wanted.
     begins, ends : arrays (k,), s
         Of pieces without an event or a change of an input within.
     group : array (k,)
-        What a piece belongs to: 0, 1, ...; values count as resolved relative to the largest of their group.
+        What a piece belongs to: 0, 1, ...
     """
     done: list[Pieces] = []
     begin, length = begins, ends - begins

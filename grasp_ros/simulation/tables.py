@@ -147,13 +147,7 @@ def _attributes_of(motion: Motion) -> dict[str, Any]:
 
 
 def frame_of(columns: Mapping[str, np.ndarray]) -> Any:
-    """A `pandas.DataFrame`.
-
-    Raises
-    ------
-    Refused
-        If pandas is not installed.
-    """
+    """A `pandas.DataFrame`; without pandas it is refused."""
     try:
         import pandas
     except ModuleNotFoundError as error:

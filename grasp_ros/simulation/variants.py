@@ -72,19 +72,7 @@ class Block:
 
 
 class Variants:
-    """Rows of a scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    changes : mapping of str to array (n,)
-        Numbers by "section.key", one for each row.
-
-    Raises
-    ------
-    Refused
-        If a key is not a number of this scene, or the arrays are not as long as each other.
-    """
+    """Rows of a scene: changes of its numbers by "section.key", arrays (n,) of one length."""
 
     def __init__(self, scene: Scene, changes: Mapping[str, ArrayLike]) -> None:
         self.scene = scene
@@ -103,13 +91,7 @@ class Variants:
         return part
 
     def row(self, i: int) -> Scene:
-        """One row as a scene.
-
-        Raises
-        ------
-        SceneError
-            If it cannot be run.
-        """
+        """One row as a scene."""
         return self.scene.changed({name: float(column[i]) for name, column in self.changes.items()})
 
     @cached_property
@@ -160,13 +142,7 @@ class Variants:
 
 
 def parameter_of(scene: Scene, name: str) -> Parameter:
-    """What a number of a scene is, by "section.key".
-
-    Raises
-    ------
-    Refused
-        If the scene does not name it, or if it is a list.
-    """
+    """What a number of a scene is, by "section.key"; lists are none."""
     known = {f"{own}.{parameter.key}": parameter for own in scene.values for parameter in BY_SECTION[own].parameters
              if parameter.key in scene.values[own] and not parameter.several}
     if name not in known:
