@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from operator import attrgetter
+from typing import NamedTuple
 
 from grasp_ros.accuracy.contender import Contender
 from grasp_ros.accuracy.measure import NOT_INSTALLED, Effort, Record, attempt
@@ -15,6 +16,7 @@ from grasp_ros.scene import Scene
 QUICK = Effort(patience=0.8, budget=0.03, most=5)
 SECONDS = 40.0
 OTHERS = 3
+TIME, ERROR, ERROR_THEN_TIME = attrgetter("time"), attrgetter("error"), attrgetter("error", "time")
 
 
 class Advice(NamedTuple):
@@ -82,7 +84,7 @@ def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:
 
 def fastest(records: Iterable[Record], error: float) -> Record | None:
     """The sound record that reaches an error in the least time."""
-    return min((record for record in records if record.sound and _error(record) <= error), key=_time, default=None)
+    return min((record for record in records if record.sound and ERROR(record) <= error), key=TIME, default=None)
 
 
 def advise(records: Iterable[Record], error: float | None = None, budget: float | None = None) -> Advice:
@@ -94,26 +96,10 @@ def advise(records: Iterable[Record], error: float | None = None, budget: float 
     sound = [record for record in records if record.sound]
     if not sound:
         raise Refused("no method has a result on this scene")
-    best: Callable[[Record], Any] = _time
-    if error is not None:
-        fit, closest = [record for record in sound if _error(record) <= error], min(sound, key=_error)
-    else:
-        fit, closest = [record for record in sound if record.time <= (budget or 0.0)], min(sound, key=_time)
-        best = _error_then_time
+    limit, limited, best = (error, ERROR, TIME) if error is not None else (budget, TIME, ERROR_THEN_TIME)
+    fit = [record for record in sound if limited(record) <= limit]
     found = sorted((min(group, key=best) for group in by_method(fit).values()), key=best)
-    return Advice(found[0] if found else None, found[1 : 1 + OTHERS], closest)
-
-
-def _time(record: Record) -> float:
-    return record.time
-
-
-def _error(record: Record) -> float:
-    return record.error or 0.0
-
-
-def _error_then_time(record: Record) -> tuple[float, float]:
-    return _error(record), record.time
+    return Advice(found[0] if found else None, found[1 : 1 + OTHERS], min(sound, key=limited))
 
 
 def check_wish(error: float | None, budget: float | None) -> None:

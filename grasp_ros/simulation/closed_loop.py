@@ -1,4 +1,4 @@
-"""What closes the loop around `exact`: sampled controllers, and external forces under continuous feedback."""
+"""One scene through one method, and what closes the loop around `exact`: sampled controllers and external forces."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from heapq import merge
 from itertools import groupby, islice
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,8 @@ from grasp_ros.exact.driver.user_controller import Foreign
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
+from grasp_ros.methods.contract import Problem, Solution
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
@@ -30,6 +33,8 @@ Progress = Callable[[float], object] | None
 PATIENCE = 0.1  # s that a block of ticks may take
 SHORTEST, LONGEST = 16, 8192  # ticks of the first block, and of any
 Changes = Mapping[int, Mapping[str, float]]
+NO_CHANGES: Changes = MappingProxyType({})
+NO_FOREIGN: Mapping[int, Foreign] = MappingProxyType({})
 
 
 def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> dict[int, Foreign]:
@@ -147,10 +152,31 @@ def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tup
     return Outputs(offsets, bounds - bounds[0]), interval
 
 
-def drive(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
-    """States (n, 6) at the output times of a run to its end, as `simulate` drives it; fewer rows if it stops."""
+def drive(
+    scene: Scene, integrator: Integrator, sampled: bool, grid: Array, loop: Loop | None = None,
+    changes: Changes = NO_CHANGES, foreign: Mapping[int, Foreign] = NO_FOREIGN, progress: Progress = None,
+) -> Array:
+    """States (n, 6) at the output times of a run to its end; fewer rows if it stops."""
     if sampled:
-        return drive_sampled(scene, grid, new_loop(len(grid)), {}, {}, None, integrator)
+        return drive_sampled(scene, grid, loop or new_loop(len(grid)), changes, foreign, progress, integrator)
     if scene.system.external:
         return drive_external(scene, grid, integrator)
     return integrator.advance(scene.duration, grid)
+
+
+def solve(
+    scene: Scene, grid: Array, method: str, setting: float, sampled: bool, max_events: int, max_work: int,
+    changes: Changes = NO_CHANGES, foreign: Mapping[int, Foreign] = NO_FOREIGN, progress: Progress = None,
+) -> tuple[Solution, Loop | None]:
+    """States at ascending output times (n,), events and counters, and what went through a sampled loop.
+
+    All arguments have been checked. Columns of bodies that are not there are NaN.
+    """
+    loop = new_loop(len(grid)) if sampled else None
+    found = METHODS[method].solve(Problem(
+        scene.system, scene.duration, grid, setting, max_events, max_work, sampled,
+        lambda integrator: drive(scene, integrator, sampled, grid, loop, changes, foreign, progress),
+        None if sampled else progress,
+    ))
+    found.state[:, scene.system.absent_columns] = np.nan
+    return found, None if loop is None else Loop(*(rows[: len(found.state)] for rows in loop))

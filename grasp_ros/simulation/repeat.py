@@ -19,9 +19,8 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Entry
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.simulation.closed_loop import outputs_within
+from grasp_ros.simulation.closed_loop import outputs_within, solve
 from grasp_ros.simulation.sampled_plant import SampledPlant
-from grasp_ros.simulation.solve import How, solve
 from grasp_ros.simulation.ticks import Loop, tick_of, tick_times
 
 if TYPE_CHECKING:  # it imports this file
@@ -108,7 +107,7 @@ def _solved(run: Trajectory, grid: Array) -> tuple[Solution, Loop | None]:
         raise Refused(f"{run.scene.name}: its controllers cannot be asked again; allowed: output times at every control"
                       " period, as without a grid")
     most = UNLIMITED if run.method == EXACT else MAX_WORK
-    return solve(run.scene, grid, How(run.method, run.setting, run.sampled, UNLIMITED, most))
+    return solve(run.scene, grid, run.method, run.setting, run.sampled, UNLIMITED, most)
 
 
 def _every_tick(run: Trajectory, last: Array) -> bool:

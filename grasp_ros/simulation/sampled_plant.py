@@ -31,10 +31,7 @@ class Outputs(NamedTuple):
     bounds: NDArray[np.int64]  # (n + 1,) how many of them come before each interval, and in all
 
 
-NO_INTERVAL = Outputs(NO_TIMES, np.zeros(1, dtype=np.int64))
-
-
-BARE = Loop(NO_TIMES, NO_TIMES, NO_INTERVAL.bounds, new_place())  # answers are given
+BARE = Loop(NO_TIMES, NO_TIMES, np.zeros(1, dtype=np.int64), new_place())  # answers are given
 
 
 class Record(NamedTuple):

@@ -23,9 +23,8 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import check_keys
-from grasp_ros.simulation.closed_loop import Changes, Progress, check_changes, foreign_controllers
+from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, foreign_controllers, solve
 from grasp_ros.simulation.progress import showing
-from grasp_ros.simulation.solve import How, solve
 from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
@@ -49,7 +48,7 @@ def simulate(
     setting: float | None = None,
     max_events: int = MAX_EVENTS,
     max_work: int = MAX_WORK,
-    changes: Changes = MappingProxyType({}),
+    changes: Changes = NO_CHANGES,
     controllers: Mapping[str, Law | type] = MappingProxyType({}),
     sensitivity: Sequence[str] | None = None,
     progress: Progress | bool = None,
@@ -117,7 +116,7 @@ def simulate(
     _check_ticks(scene, sampled, max_work)
     foreign = foreign_controllers(scene, controllers)
     with showing(progress, scene.duration, "s", scene.name) as told:
-        found, loop = solve(scene, grid, How(method, setting, sampled, max_events, max_work), changes, foreign, told)
+        found, loop = solve(scene, grid, method, setting, sampled, max_events, max_work, changes, foreign, told)
         if told is not None and found.status is Status.DONE:
             told(scene.duration)
     run = Trajectory(
