@@ -31,6 +31,7 @@ from grasp_ros.physics.model import Array
 
 TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's event is an event of both
 MAX_IDLE = 100  # events without progress in time
+AT_END, AT_EVENT = 0, 1  # where scipy says that it stopped; negative: it failed
 IMPLICIT = ("Radau", "LSODA")  # solvers that take a Jacobian
 SIDES = (int(LEFT), int(RIGHT))
 
@@ -91,7 +92,8 @@ def restarted(name: str, problem: Problem) -> Solution:
         result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active, work)
         states.append(_rows(result))
         row += len(states[-1])
-        if status := _status(result, idle > MAX_IDLE):
+        if result.status != AT_EVENT or idle > MAX_IDLE:
+            status = Status.DONE if result.status == AT_END else Status.STALLED
             break
         first = next(gap for gap, times in zip(active, result.t_events, strict=True) if len(times))
         at = result.t_events[active.index(first)][0]
@@ -104,13 +106,6 @@ def restarted(name: str, problem: Problem) -> Solution:
             mode[gap.side] = gap.after
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
     return Solution(_spread(np.concatenate(states), place), np.array(events).reshape(-1, 5), work, status)
-
-
-def _status(result: Any, idle: bool) -> Status | None:
-    """How the integration ended; None if it goes on behind an event."""
-    if result.status == 0:
-        return Status.DONE
-    return Status.STALLED if result.status < 0 or idle else None
 
 
 class _Gap:

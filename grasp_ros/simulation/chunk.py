@@ -87,8 +87,7 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
     columns = find(setup.outcomes)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
-    inputs = setup.sampled or scene.sampled or scene.system.external  # that are no law of the state
-    if inputs and any(column.name == LYAPUNOV for column in columns):
+    if has_inputs(scene, setup) and any(column.name == LYAPUNOV for column in columns):
         raise Refused(f"{scene.name}: outcome lyapunov: allowed: continuous feedback, no external force")
     return columns
 
@@ -101,7 +100,8 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
     for i in stops:
         status[i] = STATUSES.index(REFUSED)
     left = np.flatnonzero(status == 0)
-    if _is_plain(variants, setup, columns):
+    plain = COMPILED and variants.is_plain and not has_inputs(variants.scene, setup)  # rows need no interpreter
+    if plain and all(column.name != LYAPUNOV for column in columns):
         left = _run_plain(variants, setup, wanted_by(columns), runs, left, stop)
     for i in left.tolist():
         if stop[0]:
@@ -120,11 +120,9 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
     return Chunk(found, status, stops)
 
 
-def _is_plain(variants: Variants, setup: Setup, columns: Sequence[Outcome]) -> bool:
-    """Whether rows can be integrated without the interpreter: compiled, continuous feedback alone, arrays for all."""
-    scene = variants.scene
-    inputs = setup.sampled or scene.sampled or scene.system.external
-    return COMPILED and variants.is_plain and not inputs and all(column.name != LYAPUNOV for column in columns)
+def has_inputs(scene: Scene, setup: Setup) -> bool:
+    """Whether something acts that is no law of the state: commands that are held, or forces from outside."""
+    return setup.sampled or scene.sampled or bool(scene.system.external)
 
 
 def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, which: NDArray[np.int64],

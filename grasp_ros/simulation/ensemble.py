@@ -26,7 +26,7 @@ from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
-from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute
+from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.simulate import check_scene
@@ -162,7 +162,7 @@ def ensemble(
 
 def chunk_rows(scene: Scene, setup: Setup) -> int:
     """Rows of one chunk, for about `CHUNK_S` of work."""
-    ticks = scene.ticks if setup.sampled or scene.sampled or scene.system.external else 1
+    ticks = scene.ticks if has_inputs(scene, setup) else 1
     return max(1, int(CHUNK_S / (ROW_S + ticks * TICK_S)))
 
 

@@ -57,7 +57,8 @@ def states_at(run: Trajectory, times: Array) -> Array:
         odd = wanted[~((wanted >= 0.0) & (wanted <= end))].flat[0]
         raise Refused(f"time {float(odd)!r} is not allowed; allowed: 0 to {end!r} s")
     grid, place = np.unique(np.concatenate([wanted.ravel(), run.t]), return_inverse=True)
-    states = _again(run, grid)
+    recorded = run.sampled and _every_tick(run, grid[-1:])
+    states = _with_commands(run, grid) if recorded else _solved(run, grid)[0].state
     check_same(run, grid, states)
     return np.asarray(states[place[: wanted.size]].reshape(*wanted.shape, 6))
 
@@ -94,13 +95,6 @@ def breaks_of(run: Trajectory) -> Array:
     return np.asarray(found[found <= end])
 
 
-def _again(run: Trajectory, grid: Array) -> Array:
-    """States (n, 6) at ascending times; fewer if the run stops."""
-    if run.sampled and _every_tick(run, grid[-1:]):
-        return _with_commands(run, grid)
-    return _solved(run, grid)[0].state
-
-
 def _solved(run: Trajectory, grid: Array) -> tuple[Solution, Loop | None]:
     """A run again, with the laws of its scene."""
     if run.controllers:
@@ -117,7 +111,7 @@ def _every_tick(run: Trajectory, last: Array) -> bool:
 
 
 def _with_commands(run: Trajectory, grid: Array) -> Array:
-    """The same under the commands that were recorded."""
+    """States (n, 6) at ascending times under the commands that were recorded; fewer if the run stops."""
     scene, last = run.scene, int(tick_of(run.scene, grid[-1:]).max(initial=0))
     count = min(last + 1, scene.ticks)
     answers = np.zeros((count, 3))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import scene_of
+from documents import horizon, scene_of
 from oracles import flight_array
 
 from grasp_ros import scene as scenes
@@ -22,13 +22,9 @@ COARSE = {STEP: 0.1, TOLERANCE: 1e-6, ACCURACY_KNOB: 1e-16}  # steps in which a 
 TIMES = np.array([0.0, 0.1, 0.3, 0.3, 0.5123, 1.0, 1.5])
 
 
-def case_01(seconds: float, *settings: str) -> scenes.Scene:
-    return scenes.load("case_01", [f"time.duration_s={seconds}", *settings])
-
-
 def ask(name: str, grid: Any = TIMES, seconds: float = 1.5, **options: Any) -> Solution:
     """Case 1 over some contacts, from a start that is not symmetric."""
-    method, scene = METHODS[name], case_01(seconds, "left_arm.position_m=-0.25")
+    method, scene = METHODS[name], horizon("case_01", seconds, "left_arm.position_m=-0.25")
     return method.solve(Problem(scene.system, scene.duration, np.array(grid), COARSE[method.knob], **options))
 
 
@@ -40,7 +36,7 @@ def steps_of(name: str, solution: Solution) -> list[int]:
 
 @pytest.mark.parametrize("name", METHODS)
 def test_1_and_2_a_problem_is_only_read_and_its_solution_is_new(name: str) -> None:
-    scene, method = case_01(1.0), METHODS[name]
+    scene, method = horizon("case_01", 1.0), METHODS[name]
     arrays = (scene.system.bodies, scene.system.pairs, scene.system.state, np.array([0.2, 1.0]))
     before = [array.tobytes() for array in arrays]
     problem = Problem(scene.system, scene.duration, arrays[-1], COARSE[method.knob])
@@ -114,7 +110,7 @@ def test_6_counters_are_whole_numbers_with_names(name: str) -> None:
 
 @pytest.mark.parametrize("name", METHODS)
 def test_7_and_9_settings_are_in_their_range_or_refused(name: str) -> None:
-    method, scene = METHODS[name], case_01(2.0)
+    method, scene = METHODS[name], horizon("case_01", 2.0)
     assert check(name, scene, None) == method.default
     assert [check(name, scene, setting) for setting in method.ladder] == list(method.ladder)
     assert list(method.ladder) == sorted(method.ladder, reverse=True)
@@ -125,7 +121,7 @@ def test_7_and_9_settings_are_in_their_range_or_refused(name: str) -> None:
 
 @pytest.mark.parametrize("name", METHODS)
 def test_8_and_9_what_a_method_does_not_declare_is_refused(name: str) -> None:
-    method, scene = METHODS[name], case_01(0.02)
+    method, scene = METHODS[name], horizon("case_01", 0.02)
     offset = scenes.load("preload").changed({"time.duration_s": 0.02})
     pushed = scenes.load("pulse").changed({"time.duration_s": 0.02, "object_pulse.start_s": 0.01})
     for able, asked, options in (

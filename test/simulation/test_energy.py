@@ -9,6 +9,7 @@ from oracles import energy
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.energy import EnergyBalance, energy_balance
+from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
 
 
@@ -56,39 +57,29 @@ def test_a_weak_spring_under_a_constant_force_raises_no_alarm() -> None:
         assert not balance(motion).alarm.any()
 
 
+def gained_and_work(scene: scenes.Scene) -> tuple[Array, Array]:
+    """Energy that the plant gains in every control period, and the work of the commands."""
+    result = simulate(scene, sampled=True)
+    left, right = (arm._replace(position_gain=0.0, velocity_gain=0.0) for arm in (scene.grasp.left, scene.grasp.right))
+    stored = 0.5 * energy(scene.grasp._replace(left=left, right=right), result.state).V_c
+    return np.diff(stored), (result.command[:-1] * np.diff(result.state[:, [0, 4]], axis=0)).sum(axis=1)
+
+
 @pytest.mark.parametrize("period", [0.01, 0.1, 0.25])
 def test_work_balance_of_held_commands(period: float) -> None:
     """O3: without dissipation the energy of the plant changes by the work of the commands."""
     scene = case_of(
-        "case_01",
-        2.0,
-        period,
-        "left_arm.damping_Ns_per_m=0",
-        "right_arm.damping_Ns_per_m=0",
-        "left_contact.dissipation_s_per_m=0",
-        "right_contact.dissipation_s_per_m=0",
+        "case_01", 2.0, period, "left_arm.damping_Ns_per_m=0", "right_arm.damping_Ns_per_m=0",
+        "left_contact.dissipation_s_per_m=0", "right_contact.dissipation_s_per_m=0",
     )
-    result = simulate(scene, sampled=True)
-    passive = scene.grasp._replace(
-        left=scene.grasp.left._replace(position_gain=0.0, velocity_gain=0.0),
-        right=scene.grasp.right._replace(position_gain=0.0, velocity_gain=0.0),
-    )
-    stored = 0.5 * energy(passive, result.state).V_c
-    work = (result.command[:-1] * np.diff(result.state[:, [0, 4]], axis=0)).sum(axis=1)
-    assert np.abs(np.diff(stored) - work).max() < 1e-12
+    gained, work = gained_and_work(scene)
+    assert np.abs(gained - work).max() < 1e-12
     assert np.abs(work).max() > 1e-3
 
 
 def test_dissipation_is_what_the_balance_lacks() -> None:
     """O3."""
-    scene = case_of("case_01", 2.0, 0.05)
-    result = simulate(scene, sampled=True)
-    passive = scene.grasp._replace(
-        left=scene.grasp.left._replace(position_gain=0.0, velocity_gain=0.0),
-        right=scene.grasp.right._replace(position_gain=0.0, velocity_gain=0.0),
-    )
-    stored = 0.5 * energy(passive, result.state).V_c
-    work = (result.command[:-1] * np.diff(result.state[:, [0, 4]], axis=0)).sum(axis=1)
-    lost = work - np.diff(stored)
+    gained, work = gained_and_work(case_of("case_01", 2.0, 0.05))
+    lost = work - gained
     assert (lost >= -1e-14).all()
     assert lost.sum() > 0.1

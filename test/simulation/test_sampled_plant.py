@@ -4,19 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from documents import case_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.layout import LEFT, RIGHT, Of
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene import Scene
 from grasp_ros.simulation import SampledPlant, simulate
 
 PERIOD, KILOGRAMS = 0.25, 2.0
-
-
-def case_01(period: float = 0.001) -> Scene:
-    return scenes.load("case_01", ["time.duration_s=2", f"time.control_period_s={period!r}"])
 
 
 def free_arm(delay: int) -> System:
@@ -50,7 +46,7 @@ def test_a_command_waits_is_held_and_acts(delay: int) -> None:
 
 
 def test_output_times_within_a_period_change_nothing() -> None:
-    scene = case_01(period=0.05)
+    scene = case_of(period=0.05)
     plants = [SampledPlant(scene.system, scene.period_ns) for _ in range(2)]
     for tick in range(scene.ticks):
         answers = scene.system.commands(tick, plants[0].state)
@@ -60,7 +56,7 @@ def test_output_times_within_a_period_change_nothing() -> None:
 
 
 def test_a_plant_that_stops_says_so_and_stays() -> None:
-    scene = case_01(period=0.5)
+    scene = case_of(period=0.5)
     plant = SampledPlant(scene.system, scene.period_ns, Integrator(scene.system, continuous=False, max_work=3))
     assert (plant.status, plant.stop) == (Status.DONE, "")
     while plant.status is Status.DONE:
@@ -102,14 +98,14 @@ def test_inputs_under_continuous_feedback_are_its_force_and_the_external_ones() 
 
 @pytest.mark.parametrize("method", ["exact", "paper"])
 def test_inputs_of_the_paper_are_4_and_5(method: str) -> None:
-    motion = simulate(case_01(), method=method)
+    motion = simulate(case_of(), method=method)
     assert np.array_equal(motion.inputs[:-1, :2], motion.command[:-1])
     assert not motion.inputs[:-1, 2].any()
     assert np.isnan(motion.inputs[-1]).all()
 
 
 def test_inputs_end_where_a_run_stops() -> None:
-    motion = simulate(case_01(), sampled=True, max_work=1000)
+    motion = simulate(case_of(), sampled=True, max_work=1000)
     assert motion.status is Status.WORK_BUDGET
     assert motion.inputs.shape == (len(motion.t), 3)
     assert np.isfinite(motion.inputs).all()
