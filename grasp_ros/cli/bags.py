@@ -75,8 +75,8 @@ def _recover(options: argparse.Namespace) -> int:
 def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
-    from grasp_ros.graph.comparison import compare_recording
     from grasp_ros.graph.summary import summary, verified
+    from grasp_ros.graph.verify import compare_recording
 
     check_output(options.output, (".csv",), options.force, [options.bag])
     recording = bag.read(options.bag)

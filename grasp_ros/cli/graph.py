@@ -135,10 +135,10 @@ def _run(options: argparse.Namespace) -> int:
 
 def _has_ticks(path: Path) -> bool:
     """Whether there is a bag with a state; with one that comes from elsewhere a run waits with a bag that has none."""
-    from grasp_ros.graph import bag
+    from grasp_ros.graph.opening import Opened
 
     closed = (path / "metadata.yaml").exists()
-    return closed and any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in bag.raw(path))
+    return closed and any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in Opened(path).messages)
 
 
 class Spent:
@@ -182,8 +182,8 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     """Print and draw what a run has recorded; the exit status says whether it is all there and right."""
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
-    from grasp_ros.graph.comparison import compare_recording
     from grasp_ros.graph.summary import summary
+    from grasp_ros.graph.verify import compare_recording
 
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
@@ -211,9 +211,9 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from grasp_ros.graph import bag
+    from grasp_ros.graph.opening import Opened
 
-    [states] = [name for name, topic in bag.names(options.bag).items() if topic == JOINT_STATES]
+    states = Opened(options.bag).names[JOINT_STATES]
     _reach(options)
     held = hold(os.environ, states.removesuffix(f"/{JOINT_STATES.name}") or "/")
     held.set_inheritable(True)  # what this process becomes has it to its end

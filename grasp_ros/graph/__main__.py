@@ -1,8 +1,112 @@
-"""`python -m grasp_ros.graph plant`: starts a node, as `ros2 run grasp_ros plant` does."""
+"""`python -m grasp_ros.graph plant`: starts a node, as `ros2 run grasp_ros plant` does.
 
+Importing rclpy and NumPy takes a while, and a Ctrl-C in it would end in a traceback. So the signal handlers come
+first and everything else after them.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
 import sys
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from typing import Any
 
-from grasp_ros.graph.nodes.start import start
+from grasp_ros.graph.host import check_reach, this_host
+from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
+from grasp_ros.graph.shared_memory import remove_left
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
+from grasp_ros.physics.errors import Refused
+
+
+def main(name: str, child: bool = False) -> int:
+    """Run the node of that name; returns the exit status of the process.
+
+    A child ends with the process that holds the other end of its standard input. "together" runs several in one thread:
+    those that stand on the command line before `--ros-args`; their parameters as `-p node:name:=value`.
+    """
+    words = _own_words()
+    if {"-h", "--help"} & set(words):
+        print(usage(name))
+        return 0
+    try:
+        check_reach(os.environ, alone=name == "together")
+        if words and name != "together":
+            raise Refused(f"{' '.join(words)}: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...")
+    except Refused as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 2
+    received: list[int] = []
+    note_signals(received)
+    end_late_by_force(name)
+    gc.disable()  # until the nodes are there: imports make little garbage and much to look through
+    if child:
+        end_with_parent(received, name)
+    else:
+        remove_left()
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
+    os.environ.update(this_host(os.environ))  # before rclpy looks
+    if name == "plant":
+        _spare_the_plant()
+    names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
+    makes = {each: _maker(each) for each in names}
+    status: int = import_module("grasp_ros.graph.ros.life").run(makes, received)
+    for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
+        signal.signal(number, signal.SIG_IGN)
+    return status
+
+
+def _maker(name: str) -> Callable[[], Any]:
+    """What makes the node of that name: its class, that of `monitor` is `nodes.monitor.Monitor`."""
+    kind = "controller" if name.endswith("controller") else name
+    module = import_module(f"grasp_ros.graph.{'tools' if name in TOOLS else 'nodes'}.{kind}")
+    make: Callable[..., Any] = getattr(module, kind.capitalize())
+    return partial(make, name) if kind == "controller" else make
+
+
+def _own_words() -> list[str]:
+    """Words of the command line that are not ROS's."""
+    words = sys.argv[1:]
+    if "--ros-args" not in words:
+        return words
+    begin = words.index("--ros-args")
+    end = words.index("--", begin) + 1 if "--" in words[begin:] else len(words)
+    return words[:begin] + words[end:]
+
+
+def _spare_the_plant() -> None:
+    """Let numba not find what it would import beside itself, which takes half as long as all the rest of the plant.
+
+    scipy has BLAS, which no kernel uses; a plant runs no code but the package's own.
+    """
+    for module in ("coverage", "scipy"):
+        sys.modules.setdefault(module, None)  # type: ignore[arg-type]
+
+
+def start() -> int:
+    """Start the node that the first word names; `child` before it marks a child of `grasp run`."""
+    is_child = sys.argv[1:2] == ["child"]
+    del sys.argv[1 : 1 + is_child]
+    name = sys.argv.pop(1) if len(sys.argv) > 1 else "--help"
+    if name in ("-h", "--help"):
+        print(f"usage: python -m grasp_ros.graph NODE [--help] [--ros-args ...]; NODE is one of {', '.join(NODES)}")
+        return 0
+    if name not in PARAMETERS and not (is_child and name == "together"):
+        print(f"{name!r} is no node; allowed: {', '.join(NODES)}", file=sys.stderr)
+        return 2
+    try:
+        return main(name, is_child)
+    except ModuleNotFoundError as error:
+        package = str(error.name).split(".")[0]
+        if package == "grasp_ros":
+            raise
+        print(f"{name}: the Python package {package} is missing; `pip install .` in the"
+              " checkout brings it", file=sys.stderr)
+        return 1
+
 
 if __name__ == "__main__":
     sys.exit(start())

@@ -7,25 +7,24 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from rosbags.serde import SerdeError
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.columns import Alike, alike
-from grasp_ros.graph.opening import KIND, begin, held_of, open_storage, running_of, scene_of
-from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, OWN_RECORD, Recorder, checksum
+from grasp_ros.graph.opening import Opened, doubting
+from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording, acted_from
-from grasp_ros.graph.rosbag2 import BagError, decode, names_of
+from grasp_ros.graph.rosbag2 import BagError, decode
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.files import decoding, read_text
+from grasp_ros.scene.files import read_text
 from grasp_ros.scene.topics import (
     CHANGES,
     JOINT_STATES,
@@ -37,39 +36,10 @@ from grasp_ros.scene.topics import (
     state_of,
 )
 
-__all__ = ["BagError", "Recorder", "Recording", "names", "open_storage", "raw", "read", "scene_of"]
-VERSION = "version "  # how the keys of versions begin
+__all__ = ["BagError", "Recorder", "Recording", "read"]
 BATCH_BYTES = 2**18  # of the messages of a topic that are decoded at once
 MOST_NS = 2**63 - 1
 WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
-
-
-def names(path: str | os.PathLike[str]) -> dict[str, Topic]:
-    """Topics of a bag by their full names in the graph that it was recorded from.
-
-    Raises
-    ------
-    BagError
-        If the path is not such a bag.
-    """
-    path = Path(path)
-    storage = open_storage(path)
-    with decoding(path, KIND, BagError, (SerdeError,)):
-        next(begin(storage, path), None)
-        scene = scene_of(storage, path)
-        return {name: topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
-
-
-def raw(path: str | os.PathLike[str]) -> Iterator[Stored]:
-    """Everything in a bag, in the order of time, as it lies in the file.
-
-    Raises
-    ------
-    BagError
-        If the path is not such a bag, or if it is damaged.
-    """
-    with decoding(path, KIND, BagError):
-        yield from open_storage(Path(path)).messages()
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
@@ -80,17 +50,14 @@ def read(path: str | os.PathLike[str]) -> Recording:
     BagError
         If the path is not such a bag, or if it is damaged.
     """
-    path = Path(path)
-    storage = open_storage(path)
-    with decoding(path, KIND, BagError, (SerdeError, AttributeError)):
-        content = None
-        for stored in begin(storage, path):
-            if content is None:
-                content = _Content(path, storage)
+    opened = Opened(path)
+    with doubting(opened.path):
+        content = _Content(opened)
+        for stored in opened.messages:
             content.take(stored)
-        if content is None or not len(content.columns[JOINT_STATES].of()[0]):
-            raise BagError(f"{path}: holds no tick")
-        _check_metadata(path, storage)
+        if not len(content.columns[JOINT_STATES].of()[0]):
+            raise BagError(f"{opened.path}: holds no tick")
+        _check_metadata(opened.path, opened.storage)
         return content.recording()
 
 
@@ -103,38 +70,36 @@ def _check_metadata(path: Path, storage: Storage) -> None:
 
 
 class _Content:
-    """What of a bag comes into its recording; begins with the first message."""
+    """What of a bag comes into its recording."""
 
-    def __init__(self, path: Path, storage: Storage) -> None:
-        self.path, self.storage, self.scene = path, storage, scene_of(storage, path)
-        self.changes, self.timing = _Changes(), list[Any]()
-        names = names_of(self.scene, storage.records[OWN_RECORD])
-        self.columns = {topic: _Columns(name, topic, self.scene) for topic, name in names.items()}
-        self.counts = dict.fromkeys(names, 0)
-        held = held_of(storage, self.scene)
-        self._takers = {(name, topic.type): (topic, self._taker(topic, held)) for topic, name in names.items()}
+    def __init__(self, opened: Opened) -> None:
+        self._bag, self._changes, self._timing = opened, _Changes(), list[Any]()
+        self.columns = {topic: _Columns(name, topic, opened.scene) for topic, name in opened.names.items()}
+        self._counts = dict.fromkeys(opened.names, 0)
+        self._takers = {(name, topic.type): (topic, self._taker(topic)) for topic, name in opened.names.items()}
 
-    def _taker(self, topic: Topic, held: Collection[Topic]) -> Callable[[Stored], object]:
+    def _taker(self, topic: Topic) -> Callable[[Stored], object]:
         """What is done with the messages of a topic."""
+        scene = self._bag.scene
         if topic in CHANGES.values():
-            return lambda stored: self.changes.add(topic, stored, self.scene)
+            return lambda stored: self._changes.add(topic, stored, scene)
         if topic == TIMING:
-            return lambda stored: self.timing.append(decode(topic, stored.cdr))
-        one_a_tick = topic in self.scene.topics and topic not in held  # the others as they came
+            return lambda stored: self._timing.append(decode(topic, stored.cdr))
+        one_a_tick = topic in scene.topics and topic not in self._bag.held  # the others as they came
         return self.columns[topic].add if one_a_tick else lambda _: None
 
     def take(self, stored: Stored) -> None:
         """Take a message."""
         known = self._takers.get((stored.topic, stored.type))
         if known is None:
-            raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+            raise BagError(f"{self._bag.path}: {stored.topic}: {stored.type} is not a topic of its scene")
         topic, taker = known
-        self.counts[topic] += 1
+        self._counts[topic] += 1
         taker(stored)
 
     def recording(self) -> Recording:
         """All of it, as arrays."""
-        path, scene, storage = self.path, self.scene, self.storage
+        scene = self._bag.scene
         ticks, joints = self.columns[JOINT_STATES].of()
         joints, stamps = joints[:, :8], joints[:, 8]
 
@@ -145,16 +110,15 @@ class _Content:
             result[here] = values[there]
             return result
 
-        command, held = np.zeros((len(ticks), 2)), held_of(storage, scene)
+        command, held = np.zeros((len(ticks), 2)), self._bag.held
         for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
             command[:, side] = acted_from(ticks, joints[:, 6 + side]) if topic in held else aligned(topic)[:, 0]
-        own = storage.records[OWN_RECORD]
         return Recording(
-            path, scene, {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)},
-            {topic.name: count for topic, count in self.counts.items()}, ticks, joints[:, :6], joints[:, 6:], command,
+            self._bag.path, scene, self._bag.versions,
+            {topic.name: count for topic, count in self._counts.items()}, ticks, joints[:, :6], joints[:, 6:], command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-            dict(self.changes), running_of(storage), ticks[stamps == 0.0], _lost(storage), _table(self.timing),
-            dict(+self.changes.unheard),
+            dict(self._changes), self._bag.running, ticks[stamps == 0.0], _lost(self._bag.storage),
+            _table(self._timing), dict(+self._changes.unheard),
         )
 
 

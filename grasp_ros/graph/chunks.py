@@ -29,11 +29,6 @@ _CHUNK, _INDEXES, _STATISTICS = (f"_Writer__{name}" for name in ("chunk_builder"
 class Messages:
     """Takes the messages for a writer of MCAP that has no chunk yet.
 
-    Attributes
-    ----------
-    counts : Counter of int
-        Messages so far, by channel.
-
     Raises
     ------
     BagError
@@ -45,7 +40,7 @@ class Messages:
             raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.5,<1.7")
         setattr(writer, _INDEXES, _ChunkIndexes())
         self._writer, self._chunk, self._statistics = writer, getattr(writer, _CHUNK), getattr(writer, _STATISTICS)
-        self.counts: Counter[int] = Counter()
+        self.counts: Counter[int] = Counter()  # messages so far, by channel
         self._records, self._entries = bytearray(), dict[int, bytearray]()
         self._begin = 0  # of the records in the chunk: behind channels and schemas
         self._first = self._last = 0

@@ -43,24 +43,18 @@ def alike(topic: Topic, cdrs: Sequence[bytes]) -> Iterator[Alike]:
 
 
 class _Layout:
-    """Where the parts of a message lie that rosbags has decoded.
-
-    Attributes
-    ----------
-    fixed : bool array (size,)
-        Bytes that say where the others lie and which texts there are; not numbers, and not what only fills up.
-    dtype : dtype
-        Of the whole message: its numbers by their dotted names.
-    """
+    """Where the parts of a message lie that rosbags has decoded."""
 
     def __init__(self, kind: str, cdr: bytes) -> None:
         self._order: Literal["<", ">"] = "<" if cdr[1] else ">"
         self._cdr, self._next = cdr, 0
         self._numbers: list[tuple[str, Any, int]] = []
+        # Bytes that say where the others lie and which texts there are; not numbers, and not what only fills up.
         self.fixed = np.zeros(len(cdr), dtype=bool)
         self.fixed[:2] = True
         self._message(kind, "")
         names, formats, offsets = zip(*self._numbers, strict=True)
+        # Of the whole message: its numbers by their dotted names.
         self.dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": len(cdr)})
 
     def _message(self, kind: str, name: str) -> None:

@@ -72,11 +72,7 @@ def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
 def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     """Refuse variables with which a graph would be somewhere else, or in no place where its nodes find each other.
 
-    Parameters
-    ----------
-    given : mapping of str to str
-    alone : bool, optional
-        Whether all nodes are in one process, which need not look for others.
+    If all are alone in one process, they need not.
     """
     domain, reach = given.get(DOMAIN, ""), given.get(RANGE, "")
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):

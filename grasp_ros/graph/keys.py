@@ -27,15 +27,10 @@ class Key(Enum):
 
 
 class Keys:
-    """Keys pressed on the standard input from `start` to `close`.
-
-    Attributes
-    ----------
-    there : bool
-        Whether there can be any: not without a terminal, nor in the background, where a terminal stops who sets it.
-    """
+    """Keys pressed on the standard input from `start` to `close`."""
 
     def __init__(self) -> None:
+        # Whether there can be any: not without a terminal, nor in the background, where a terminal stops who sets it.
         self.there, self._file, self._rest = False, 0, b""
         self._before: list[Any] = []
 

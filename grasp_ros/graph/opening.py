@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import os
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import AbstractContextManager
 from itertools import chain, islice
 from pathlib import Path
 
+from rosbags.serde import SerdeError
+
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.recorder import OWN_RECORD
-from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, topics_of
-from grasp_ros.graph.running import Running
+from grasp_ros.graph.recorder import OWN_RECORD, VERSION
+from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.scene.files import decoding
 from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
@@ -21,10 +24,14 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 
 
+def doubting(path: Path) -> AbstractContextManager[None]:
+    """Refuse a bag of which something is not as it should be."""
+    return decoding(path, KIND, BagError, (SerdeError, AttributeError))
+
+
 def open_storage(path: Path, salvage: bool = False) -> Storage:
     """The storage file of a bag, or of a directory that holds one."""
-    path = Path(path)
-    with decoding(path, KIND, BagError):
+    with doubting(path):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
         if files and files[0].is_fifo():
             raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
@@ -39,19 +46,37 @@ def open_storage(path: Path, salvage: bool = False) -> Storage:
         raise BagError(f"{path}: not {KIND}: holds {len(files)} .mcap files; allowed: one")
 
 
-def begin(storage: Storage, path: Path) -> Iterator[Stored]:
-    """All messages of a bag; from the first one on its records say which scene it holds, and how that ran.
+class Opened:
+    """A bag whose first messages have been read: its own record says which scene it holds, and how that ran.
 
     In a bag that another program has written anew, from ours, the topics `scene` and `run` say it.
     """
-    messages = storage.messages()
-    first = list(islice(messages, 1))
-    if first and OWN_RECORD not in storage.records:
-        first += islice(messages, MOST_AHEAD)
-        if any(stored.cdr.startswith(ZSTD) for stored in first):
-            raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
-        storage.records[OWN_RECORD] = _said(first, path)
-    return chain(first, messages)
+
+    def __init__(self, path: str | os.PathLike[str], salvage: bool = False) -> None:
+        self.path = path = Path(path)
+        self.storage = open_storage(path, salvage)
+        with doubting(path):
+            messages, records = self.storage.messages(), self.storage.records
+            first = list(islice(messages, 1))
+            if first and OWN_RECORD not in records:
+                first += islice(messages, MOST_AHEAD)
+                if any(stored.cdr.startswith(ZSTD) for stored in first):
+                    raise BagError(f"{path}: its messages are compressed one by one; allowed: chunks, {CONVERT}")
+                records[OWN_RECORD] = _said(first, path)
+            if OWN_RECORD not in records:
+                raise BagError(f"{path}: holds no tick")
+            own, self.messages = records[OWN_RECORD], _doubted(path, chain(first, messages))
+            self.scene = scenes.parse(own["scene"], path.name, str(path))
+            self.running = runnings.parse(own["run"])
+            self.versions = {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)}
+            self.names = names_of(self.scene, own)
+            # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
+            self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
+
+
+def _doubted(path: Path, messages: Iterable[Stored]) -> Iterator[Stored]:
+    with doubting(path):
+        yield from messages
 
 
 def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
@@ -64,20 +89,3 @@ def _said(first: Collection[Stored], path: Path) -> dict[str, str]:
     scene, root = scenes.parse(found["scene"], path.name, str(path)), there[SCENE.name].topic.removesuffix(SCENE.name)
     moved = [topic for topic in topics_of(scene) if topic != DIAGNOSTICS]
     return {**found, **{f"{TOPIC}{topic.name}": f"{root}{topic.name.lstrip('/')}" for topic in moved}}
-
-
-def scene_of(storage: Storage, path: Path) -> scenes.Scene:
-    """The scene of a bag, once its first record has been read."""
-    if OWN_RECORD not in storage.records:
-        raise BagError(f"{path}: not {KIND}: its scene is missing")
-    return scenes.parse(storage.records[OWN_RECORD]["scene"], path.name, str(path))
-
-
-def running_of(storage: Storage) -> Running:
-    """How the plant of a bag ran, once its first record has been read."""
-    return runnings.parse(storage.records[OWN_RECORD]["run"])
-
-
-def held_of(storage: Storage, scene: scenes.Scene) -> Collection[Topic]:
-    """Topics whose messages are as they came, not one for each tick: those of commands in a free run."""
-    return () if running_of(storage).lockstep else scene.controllers.values()

@@ -35,16 +35,7 @@ LONGEST = 2**16  # bytes of last words
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
-    """Turn this process into one that runs a node: its signals and its exit status are the node's own.
-
-    Parameters
-    ----------
-    node : str
-        Name of the node, as `graph.nodes.start` knows it.
-    parameters : mapping of str to str
-        Its parameters, as `-p` takes them.
-    namespace : str
-    """
+    """Turn this process into one that runs a node: its signals and its exit status are the node's own."""
     os.execv(sys.executable, _command([node], parameters, namespace))
 
 
@@ -63,46 +54,20 @@ class GraphError(RuntimeError):
 
 @dataclass
 class Graph:
-    """The processes of one scene: plant, monitor and a controller for every arm that has one.
-
-    Parameters
-    ----------
-    scene : Scene
-    directory : Path
-        New directory for the resolved scene and the bag.
-    accuracy : float
-    progress : bool
-        Whether the plant shows a progress bar on the terminal.
-    errors : int, optional
-        Where the processes' messages go, as in `subprocess.Popen`; default: the terminal.
-    without : sequence of str
-        Controllers that somebody else starts.
-    laws : mapping of str to str
-        Laws of the user's own, "module:object", by controller.
-    plant : mapping of str to str
-        Further parameters of the plant.
-    one_process : bool
-        Whether all nodes run in one process and one thread.
-    namespace : str
-        Of all names, /clock too where it is not the root.
-    peer_timeout : float, s
-        Wall time without a sign of life, or an answer, after which a node is silent.
-    on_silence : str
-        What the others do then: "end" or "wait".
-    """
+    """The processes of one scene: plant, monitor and a controller for every arm that has one."""
 
     scene: Scene
-    directory: Path
+    directory: Path  # a new one, for the resolved scene and the bag
     accuracy: float
-    progress: bool = False
-    errors: int | None = None
-    without: Sequence[str] = ()
-    laws: Mapping[str, str] = field(default_factory=dict)
-    plant: Mapping[str, str] = field(default_factory=dict)
-    one_process: bool = False
-    namespace: str = "/"
-    peer_timeout: float = PEER_SECONDS
-    on_silence: str = "end"
+    progress: bool = False  # whether the plant shows a progress bar on the terminal
+    errors: int | None = None  # where the processes' messages go, as in `subprocess.Popen`; None: to the terminal
+    without: Sequence[str] = ()  # controllers that somebody else starts
+    laws: Mapping[str, str] = field(default_factory=dict)  # of the user's own, "module:object", by controller
+    plant: Mapping[str, str] = field(default_factory=dict)  # further parameters of it
+    one_process: bool = False  # whether all nodes run in one process and one thread
+    namespace: str = "/"  # of all names, /clock too where it is not the root
+    peer_timeout: float = PEER_SECONDS  # wall time without a sign of life, or an answer, after which a node is silent
+    on_silence: str = "end"  # what the others do then; or "wait"
     processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
     begun: float | None = None  # wall time at which the bag was there
     _stopped: dict[str, float] = field(default_factory=dict)  # since when

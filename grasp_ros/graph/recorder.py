@@ -33,6 +33,7 @@ FLUSH_SECONDS = 0.1  # a kill loses what came after the last flush; flush and di
 INDEX_BYTES = 256  # at most what the index holds of one chunk
 OWN_RECORD, LOST_RECORD = "grasp_ros", "grasp_ros/lost"
 NOT_RECORDED = "messages not recorded"  # counted in LOST_RECORD: what came beside the states, and was too much
+VERSION = "version "  # how the keys of versions begin
 DIGEST, BESIDE = "digest", "digest of metadata.yaml"  # keys of checksums in these records
 
 
@@ -53,20 +54,9 @@ def ranges(ticks: Iterable[tuple[int, int]]) -> str:
 
 
 class Recorder:
-    """Writes one bag: the scene and the versions first, then ticks.
+    """Writes one bag, into a directory that does not exist yet: the scene and the versions first, then ticks.
 
-    Parameters
-    ----------
-    path : Path
-        Directory that does not exist yet.
-    scene : Scene
-        Its topics get a connection each.
-    versions : mapping of str to str
-        Stored in the bag's metadata.
-    names : mapping of Topic to str, optional
-        Full names of the topics in the graph; of those without a name here, the one without a namespace.
-    running : Running, optional
-        How the plant runs; default: in lockstep.
+    Topics that have no full name in `names` get the one without a namespace.
 
     Raises
     ------
@@ -86,7 +76,7 @@ class Recorder:
         self._waiting = self._chunks = 0
         self._closed, self._error = False, ""
         self._lock, self._stop = threading.Lock(), threading.Event()
-        words = {f"version {name}": word for name, word in sorted(versions.items())}
+        words = {f"{VERSION}{name}": word for name, word in sorted(versions.items())}
         topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
         self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
         self._names = rosbag2.names_of(scene, self._custom)
@@ -133,16 +123,9 @@ class Recorder:
     def write_tick(
         self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], stamp_ns: int | None = None
     ) -> None:
-        """Append all of one tick, and its /clock: it is in the bag as a whole, or not at all.
+        """Append all of one tick, that of the monitor itself last, and its /clock: as a whole, or not at all.
 
-        Parameters
-        ----------
-        time_ns : int, ns
-            Time in the bag, not before that of the last tick; goes on where a reset puts simulated time back.
-        messages : iterable of Topic and bytes
-            Serialized messages, that of the monitor itself last.
-        stamp_ns : int, ns, optional
-            Simulated time, where it is another one.
+        Time in the bag goes on where a reset puts simulated time, the stamp, back.
 
         Raises
         ------
@@ -221,12 +204,7 @@ class Recorder:
             raise BagError(f"{self._path}: was moved during the recording, which ends there; `grasp recover` closes it")
 
     def close(self, counters: Mapping[str, object] | None = None) -> None:
-        """Finish the bag; only now it has its metadata. Does nothing the second time.
-
-        Parameters
-        ----------
-        counters : mapping of str to object, optional
-            What else was lost or dropped, to be kept in the bag.
+        """Finish the bag, with what else was lost or dropped; only now it has its metadata. Nothing the second time.
 
         Raises
         ------

@@ -8,15 +8,10 @@ from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from rosbags.serde import SerdeError
-
-from grasp_ros import scene as scenes
-from grasp_ros.graph import bag, opening
-from grasp_ros.graph.recorder import OWN_RECORD, Recorder
-from grasp_ros.graph.rosbag2 import BagError, decode, names_of
-from grasp_ros.graph.storage import Storage, Stored
+from grasp_ros.graph.opening import Opened, doubting
+from grasp_ros.graph.recorder import Recorder
+from grasp_ros.graph.rosbag2 import BagError, decode
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.files import decoding
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, Topic
 
 
@@ -28,34 +23,20 @@ class Recovery(NamedTuple):
 
 
 def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recovery:
-    """Write all complete ticks of a bag into a new one; the old one is only read.
-
-    Parameters
-    ----------
-    path : Path
-        Directory of a bag, or its storage file; closed or not, damaged or not.
-    new : Path
-        Directory that does not exist yet.
+    """Write all complete ticks of a bag into a new directory; the old one, a directory or a file, is only read.
 
     Raises
     ------
     BagError
         If nothing can be saved, or if the new bag cannot be written.
     """
-    path, new = Path(path), Path(new)
-    storage = opening.open_storage(path, salvage=True)
-    with decoding(path, opening.KIND, BagError, (SerdeError,)):
-        messages = opening.begin(storage, path)
-        first = next(messages, None)
-        if first is None:
-            raise BagError(f"{path}: nothing can be recovered: it holds no whole chunk")
-        custom, scene = storage.records[OWN_RECORD], opening.scene_of(storage, path)
-    ticks = _ticks(storage, chain([first], messages), scene)
+    opened = Opened(path, salvage=True)
+    path, scene, left_out = opened.path, opened.scene, opened.storage.left_out
+    ticks = _ticks(opened)
     begin = next(ticks, None)
     if begin is None:
         raise BagError(f"{path}: nothing can be recovered: it holds no complete tick")
-    versions = {key.removeprefix(bag.VERSION): word for key, word in custom.items() if key.startswith(bag.VERSION)}
-    recorder, written = Recorder(new, scene, versions, names_of(scene, custom), opening.running_of(storage)), 0
+    recorder, written = Recorder(Path(new), scene, opened.versions, opened.names, opened.running), 0
     try:
         for time_ns, tick, beside in chain([begin], ticks):
             tick[LYAPUNOV] = own = tick.pop(LYAPUNOV)  # the last one
@@ -66,29 +47,27 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
                 recorder.write(topic, cdr)
             written += 1
     finally:
-        places = "; ".join(f"{size} at {offset}: {why}" for offset, size, why in storage.left_out)
+        places = "; ".join(f"{size} at {offset}: {why}" for offset, size, why in left_out)
         recorder.close({"recovered from": str(path), "bytes that were left out": places or "none"})
-    return Recovery(written, storage.left_out)
+    return Recovery(written, left_out)
 
 
 def _stamp_ns(path: Path, cdr: bytes) -> int:
     """Time in ns of what the monitor had computed, if it is that."""
-    with decoding(path, opening.KIND, BagError, (SerdeError, AttributeError)):
+    with doubting(path):
         own = decode(LYAPUNOV, cdr)
     if len(own.position) != len(LYAPUNOV_NAMES):
         raise BagError(f"{path}: {LYAPUNOV.name}: {len(own.position)} numbers; allowed: {len(LYAPUNOV_NAMES)}")
     return int(own.header.stamp.sec * NANOSECONDS + own.header.stamp.nanosec)
 
 
-def _ticks(storage: Storage, messages: Iterator[Stored], scene: scenes.Scene
-           ) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
+def _ticks(opened: Opened) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
     """Time, messages by topic, and what lies beside them, of every tick of which all are there, in ascending order."""
-    known = {(name, topic.type): topic for topic, name in names_of(scene, storage.records[OWN_RECORD]).items()}
-    held = opening.held_of(storage, scene)
-    wanted = {topic for topic in scene.topics if topic not in held}
+    known = {(name, topic.type): topic for topic, name in opened.names.items()}
+    wanted = {topic for topic in opened.scene.topics if topic not in opened.held}
     before = -1
-    with decoding(storage.path, opening.KIND, BagError, (SerdeError,)):
-        for time_ns, group in groupby(messages, lambda stored: stored.time_ns):
+    with doubting(opened.path):
+        for time_ns, group in groupby(opened.messages, lambda stored: stored.time_ns):
             tick: dict[Topic, bytes] = {}
             beside = []
             for stored in group:
@@ -97,6 +76,6 @@ def _ticks(storage: Storage, messages: Iterator[Stored], scene: scenes.Scene
                     tick[topic] = stored.cdr
                 elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
                     beside.append((topic, stored.cdr))
-            if time_ns % scene.period_ns == 0 and before < time_ns and tick.keys() >= wanted:
+            if time_ns % opened.scene.period_ns == 0 and before < time_ns and tick.keys() >= wanted:
                 before = time_ns
                 yield time_ns, tick, beside

@@ -23,30 +23,20 @@ def check_factor(factor: float) -> None:
 
 @dataclass(frozen=True)
 class Running:
-    """How a plant runs.
+    """How a plant runs."""
 
-    Attributes
-    ----------
-    accuracy : float
-        Of its integrator.
-    real_time_factor : float
-        Simulated seconds in a second of wall time; 0: lockstep.
-    timeouts : dict of str to float, s
-        Simulated time without a command after which `reactions` apply, by side; empty in lockstep.
-    reactions : dict of str to str
-        "hold" the last command, "zero" force, or "stop" the run.
-    """
-
-    accuracy: float = ACCURACY
-    real_time_factor: float = 0.0
+    accuracy: float = ACCURACY  # of its integrator
+    real_time_factor: float = 0.0  # simulated seconds in a second of wall time; 0: lockstep
+    # By side, in a free run: simulated time in s without a command, and what then acts: "hold" the last command, "zero"
+    # force, or "stop" the run.
     timeouts: Mapping[str, float] = field(default_factory=dict)
     reactions: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_accuracy(self.accuracy)
-        for name, value in {f"{side}_timeout_s": seconds for side, seconds in self.timeouts.items()}.items():
-            if not 0.0 < value < math.inf:
-                raise Refused(f"{name}: {value!r} is not allowed; allowed: a number > 0")
+        for side, seconds in self.timeouts.items():
+            if not 0.0 < seconds < math.inf:
+                raise Refused(f"{side}_timeout_s: {seconds!r} is not allowed; allowed: a number > 0")
         if self.real_time_factor:
             check_factor(self.real_time_factor)
         for side, reaction in self.reactions.items():

@@ -98,15 +98,7 @@ def tell_parent(node: str, why: str) -> None:
 
 
 def end_with_parent(received: list[int], name: str) -> None:
-    """Note the end of the process that holds the other end of the standard input; then end, if late by force.
-
-    Parameters
-    ----------
-    received : list of int
-        Gets a SIGHUP.
-    name : str
-        Of the node.
-    """
+    """Note the end of the process that holds the other end of the standard input as a SIGHUP; end, if late by force."""
     _parent.append(0)
     if sys.platform == "linux":  # a process that was stopped could not end: its parent's death lets it go on
         with suppress(OSError, AttributeError):

@@ -46,33 +46,22 @@ class Stored(NamedTuple):
 
 
 class Storage:
-    """One MCAP file, read once from its beginning.
+    """One MCAP file, read once from its beginning; a file that was cut off is read to there.
 
-    Parameters
-    ----------
-    path : Path
-    salvage : bool
-        Whether to go on behind what is damaged. Otherwise it is refused; a file that was cut off is read to there.
-
-    Attributes
-    ----------
-    closed : bool
-        Whether the file has its end.
-    left_out : list of tuple of int, int, str
-        Offset, size and reason of what was not read; complete when all messages have been taken.
-    records : dict of str to dict of str to str
-        Metadata records by name, the same.
+    What is damaged is refused, or with `salvage` left out.
     """
 
     def __init__(self, path: Path, salvage: bool = False) -> None:
         self.path, self._salvage = path, salvage
-        self.left_out: list[tuple[int, int, str]] = []
-        self.records: dict[str, dict[str, str]] = {}
+        # Both are complete when all messages have been taken.
+        self.left_out: list[tuple[int, int, str]] = []  # offset, size and reason of what was not read
+        self.records: dict[str, dict[str, str]] = {}  # of metadata, by name
         self._channels: dict[int, Channel] = {}
         self._schemas: dict[int, Schema] = {}
         with path.open("rb") as file:
             size = file.seek(0, 2)
             self._data = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) if size else b""
+        # Whether the file has its end.
         self.closed = len(self._data) > FOOTER_BYTES and self._data[-len(MAGIC) :] == MAGIC
 
     def messages(self) -> Iterator[Stored]:

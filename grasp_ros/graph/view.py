@@ -36,15 +36,7 @@ class Moment(NamedTuple):
 
 
 class View:
-    """Draws moments of one scene.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its initial state gives the scale of the line.
-    hint : str, optional
-        Keys that there are.
-    """
+    """Draws moments of one scene, whose initial state gives the scale of the line, and a hint to the keys there are."""
 
     def __init__(self, scene: Scene, hint: str = "") -> None:
         self.scene, self._hint = scene, hint

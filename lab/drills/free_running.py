@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from grasp_ros.graph import bag
+from grasp_ros.graph.opening import Opened
 from grasp_ros.graph.processes import Graph, GraphError
 from grasp_ros.graph.rosbag2 import decode
 from grasp_ros.graph.verify import verify
@@ -64,6 +65,6 @@ def run(scene: Scene, seconds: float, factor: float) -> bool:
 
 def timing_of(path: Path) -> dict[str, Array]:
     """What a bag has of `timing`, a row each second, by name."""
-    names = {topic: name for name, topic in bag.names(path).items()}
-    rows = [decode(TIMING, stored.cdr) for stored in bag.raw(path) if stored.topic == names[TIMING]]
+    opened = Opened(path)
+    rows = [decode(TIMING, stored.cdr) for stored in opened.messages if stored.topic == opened.names[TIMING]]
     return {name: np.array([row.position[place] for row in rows]) for place, name in enumerate(rows[0].name)}

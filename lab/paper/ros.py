@@ -9,8 +9,8 @@ from pathlib import Path
 from tqdm import tqdm
 
 from grasp_ros.graph import bag
-from grasp_ros.graph.comparison import compare_recording
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.verify import compare_recording
 from grasp_ros.physics.accuracy import ACCURACY
 from lab.paper.cases import Cases
 

@@ -22,9 +22,9 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.comparison import compare_recording
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.verify import compare_recording
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT

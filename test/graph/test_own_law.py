@@ -11,7 +11,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.controllers import load_controllers
-from grasp_ros.graph.nodes.law import OwnLaw
+from grasp_ros.graph.nodes.controller import OwnLaw
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.simulation import simulate

@@ -53,7 +53,7 @@ REFUSED = [
 
 ONE_BY_ONE = """
 import json, sys
-from grasp_ros.graph.nodes import start
+from grasp_ros.graph import __main__ as start
 for name, arguments in json.loads(sys.argv[1]):
     sys.argv[1:] = ["--ros-args", *arguments.split()]
     status = start.main(name)

@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.states import StateReader
+from grasp_ros.graph.ros.messages import StateReader
 from grasp_ros.graph.rosbag2 import state_template
 
 NAMES = ("left", "object", "right")

@@ -96,7 +96,7 @@ def is_seen(observer: Any, name: str) -> bool:
 
 WRONG_PLANT = """
 import sys
-from grasp_ros.graph.nodes import start
+from grasp_ros.graph import __main__ as start
 from grasp_ros.simulation.sampled_plant import SampledPlant
 step = SampledPlant.step
 def push_harder(plant, commands):

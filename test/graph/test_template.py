@@ -11,7 +11,6 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros.graph import rosbag2
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.template import Template
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
@@ -51,4 +50,4 @@ def test_a_wrong_number_of_numbers_is_refused() -> None:
         with pytest.raises(struct.error, match=r"expected . items for packing"):
             template.fill(0, [1.0] * count)
     with pytest.raises(ValueError, match="subsection"):
-        Template(lambda _: b"nothing of it", 1)
+        rosbag2.Template(lambda _: b"nothing of it", 1)

@@ -20,6 +20,7 @@ from processes import DEADLINE, START, wait_for
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.graph import bag, host, running
+from grasp_ros.graph.opening import Opened
 from grasp_ros.graph.recover import recover
 from grasp_ros.graph.running import Running
 from grasp_ros.maps import store
@@ -101,10 +102,9 @@ def test_a_tag_in_a_bag_is_not_followed(tmp_path: Path, monkeypatch: pytest.Monk
     with monkeypatch.context() as patch:
         patch.setattr(kind, "to_yaml", lambda _: tag)
         recorder.write(path, run)
-    for door in (bag.read, bag.names, lambda path: recover(path, tmp_path / "new")):
-        if kind is Scene or door is bag.read:  # the others do not ask how it ran
-            with pytest.raises(Refused):
-                door(path)
+    for door in (bag.read, Opened, lambda path: recover(path, tmp_path / "new")):
+        with pytest.raises(Refused):
+            door(path)
 
 
 def test_a_map_of_another_version_is_not_opened(tmp_path: Path) -> None:

@@ -13,8 +13,8 @@ import pytest
 import grasp_ros
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.comparison import compare_recording
 from grasp_ros.graph.processes import Graph
+from grasp_ros.graph.verify import compare_recording
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene import SceneError, compose, load, parse
 from grasp_ros.scene.effects import BY_SECTION

@@ -42,36 +42,16 @@ def digest(text: str) -> str:
 
 @dataclass
 class Sign:
-    """What is known of one process of a node.
+    """What is known of one process of a node."""
 
-    Attributes
-    ----------
-    node : str
-        Full name.
-    identity : str
-        Of the process: who takes the place of a node has another one.
-    turn : int
-        How often it has put its time back.
-    texts : list of str
-        Digests of what it says on `scene` and `run`.
-    ended : str
-        Its last words; empty while it lives.
-    process : str
-        Number and beginning of the process, as the kernel has them.
-    heard : float, s
-        Wall time of the last sign.
-    ready : bool
-        Whether it has begun to look for others: before it may compile.
-    """
-
-    node: str
-    identity: str
-    turn: int
-    texts: list[str]
-    ended: str
-    process: str
-    ready: bool
-    heard: float = 0.0
+    node: str  # full name
+    identity: str  # of the process: who takes the place of a node has another one
+    turn: int  # how often it has put its time back
+    texts: list[str]  # digests of what it says on `scene` and `run`
+    ended: str  # its last words; empty while it lives
+    process: str  # its number and beginning, as the kernel has them
+    ready: bool  # whether it has begun to look for others: before it may compile
+    heard: float = 0.0  # wall time of the last sign, s
 
     @property
     def state(self) -> str:
@@ -96,34 +76,19 @@ def _process(number: str) -> tuple[str, str]:
 
 
 class Beats:
-    """The signs of a node, and those that it hears.
-
-    Parameters
-    ----------
-    node : GraspNode
-    heard : callable
-        Called after each sign of another node.
-    watch : callable
-        Called as often as a sign is given, in a thread that does nothing else and never waits for others.
-
-    Attributes
-    ----------
-    own : Sign
-    publisher : Publisher
-    prepared : float, s
-        Wall time of the last sign of a node that is not ready.
-    """
+    """The signs of a node, and those that it hears."""
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
-        self._heard = heard
+        self._heard = heard  # called after each sign of another node
         process = _process(str(os.getpid()))[1]
         self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
         self._signs: dict[str, Sign] = {}
         self._told = 0.0  # wall time of the last own sign
-        self.prepared = 0.0
+        self.prepared = 0.0  # that of the last sign of a node that is not ready
         self.publisher = node.publisher(ALIVE)
         node.subscribe(ALIVE, self._on_beat)
         self._stop = threading.Event()
+        # The second one does nothing else, and never waits for others.
         self._threads = [threading.Thread(target=self._go_on, args=(action,), name="beats", daemon=True)
                          for action in (self._beat, watch)]
         for thread in self._threads:

@@ -32,7 +32,7 @@ class Gone(Enum):
     ENDS = "ends"
     AS_TOLD = "ends or waits on, as on_silence says"
     STAYS = "waits for the next one"
-    NOTED = "says so"
+    NOTED = "says so"  # and does not end for it, either: another one does
 
 
 class Need(NamedTuple):
@@ -40,7 +40,6 @@ class Need(NamedTuple):
 
     topic: Topic
     gone: Gone
-    vital: bool = True  # whether this node ends for it, if it was told so; otherwise another one does
     what: str = ""  # is due
     due: float = math.inf  # since this wall time
     first: bool = False  # whether it would be the first
@@ -55,13 +54,7 @@ class Trouble(NamedTuple):
 
 
 class PeerNode(GraspNode):
-    """A node that needs others; parameters peer_timeout_s, start_timeout_s, on_silence.
-
-    Attributes
-    ----------
-    begun : bool
-        Whether the peers it waited for at first have come.
-    """
+    """A node that needs others; parameters peer_timeout_s, start_timeout_s, on_silence."""
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
@@ -72,7 +65,7 @@ class PeerNode(GraspNode):
         if reaction not in ("end", "wait"):
             raise Refused(f"on_silence: {reaction!r} is not allowed; allowed: end, wait")
         self._ends = reaction == "end"
-        self.begun = False
+        self.begun = False  # whether the peers it waited for at first have come
         self._silent: dict[str, float] = {}  # by topic: since when
         self._said = 0.0  # when that was last said
         self._left: tuple[Phase, str] | None = None  # what it did before a peer ended without which it stays
@@ -205,7 +198,7 @@ class PeerNode(GraspNode):
         elif gone and need.gone is Gone.STAYS:
             self._silent.clear()
             self._leave(trouble.words)
-        elif (gone and need.gone is Gone.ENDS) or (need.vital and self._ends and trouble.certain):
+        elif (gone and need.gone is Gone.ENDS) or (need.gone is not Gone.NOTED and self._ends and trouble.certain):
             self.fail(trouble.words)
         elif since is None and not (trouble.announced and need.gone is Gone.NOTED):
             self._silent[name] = self._said = now
@@ -275,6 +268,7 @@ class PeerNode(GraspNode):
         """Whether nodes that give no sign of life may be a plant of another make."""
         return bool(names) and set(names) <= set(self.sources(JOINT_STATES))
 
-    def part(self) -> None:
-        """Say last words."""
+    def destroy_node(self) -> None:
+        """Say last words before."""
         self.beats.end(self.words if self.exit_code else "")
+        super().destroy_node()

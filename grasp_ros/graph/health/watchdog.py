@@ -23,23 +23,8 @@ class Watchdog:
     A process that is stopped just while it holds a lock of shared memory stops those that wait for the lock as well, in
     the middle of a call of DDS. So the sentence goes to the terminal alone: a log of ROS goes through DDS.
 
-    Parameters
-    ----------
-    name : str
-        Of the node.
-    patience : float, s
-        How long it may stand while a node of this machine is stopped.
-    standing : callable
-        How long in any case, in s; None: for ever.
-    ends : bool
-        Whether the process ends then.
-    frozen : callable
-        Names of the nodes of this machine that were stopped.
-
-    Attributes
-    ----------
-    resumed, stood : float, s
-        Wall time at which this process last went on after it had been stopped itself, and for how long it was.
+    It may stand as long as `standing` says, None being for ever; as long as `patience` while a node of this machine is
+    stopped, which `frozen` names. If it `ends`, the process does not outlive that.
     """
 
     def __init__(
@@ -48,7 +33,7 @@ class Watchdog:
     ) -> None:
         self._name, self._patience, self._standing, self._ends = name, patience, standing, ends
         self._frozen, self._beaten = frozen, time.monotonic()
-        self.resumed, self.stood = self._beaten, 0.0
+        self.resumed, self.stood = self._beaten, 0.0  # when it last went on after a stop of its own, which took so long
         self.seen()
 
     def seen(self) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -17,12 +16,10 @@ from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.subscription import Subscription
 
-from grasp_ros.graph.lockstep.stepped import SteppedNode
-from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import Command
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import CHANGES, COMMANDS, LYAPUNOV, WINDOW, Topic
+from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
 
 
 class Limits:
@@ -63,19 +60,7 @@ class Limits:
 
 
 class Sources:
-    """The sources of a topic, as a reader is connected with them.
-
-    Parameters
-    ----------
-    subscription : Subscription
-    seconds : float
-        After a change for which a message may be somebody else's.
-
-    Attributes
-    ----------
-    now : int
-        How many there are.
-    """
+    """The sources of a topic, as a reader is connected with them; for some seconds after a change none is known."""
 
     def __init__(self, subscription: Subscription, seconds: float) -> None:
         # Asked at every message, in the order of the messages: an event of the executor would come before or after.
@@ -83,7 +68,8 @@ class Sources:
             self._matches = rclpy_implementation.EventHandle(
                 subscription.handle, QoSSubscriptionEventType.RCL_SUBSCRIPTION_MATCHED
             )
-        self._seconds, self._until, self._ever, self.now = seconds, 0.0, -1, 0
+        self._seconds, self._until = seconds, 0.0
+        self._ever, self.now = -1, 0  # how many there have been, and how many there are
 
     def begin(self) -> None:
         """Take those that are there as known."""
@@ -107,45 +93,3 @@ class Sources:
             status = self._matches.take_event()
         if status is not None:
             self._ever, self.now = status.total_count, status.current_count
-
-
-class Recorded:
-    """The last tick that the monitor has complete, as it says itself.
-
-    Parameters
-    ----------
-    plant : SteppedNode
-    then : callable
-        Called when there is a new one.
-
-    Attributes
-    ----------
-    tick : int
-        -1: none of this run.
-    heard : float, s
-        Wall time at which that was said; -inf: never.
-    """
-
-    def __init__(self, plant: SteppedNode, then: Callable[[], None]) -> None:
-        self._plant, self._then = plant, then
-        self.tick, self.heard = -1, -math.inf
-        plant.counters["refused records"] = 0
-        if plant.monitored:
-            plant.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
-
-    def forget(self) -> None:
-        """Begin anew: the plant was reset."""
-        self.tick = -1
-
-    def outrun(self, lead: int = WINDOW) -> bool:
-        """Whether the plant has to wait for its monitor: it is more than some ticks ahead."""
-        return self._plant.monitored and self._plant.tick - self.tick > lead
-
-    def _on_lyapunov(self, cdr: bytes) -> None:
-        stamp = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
-        tick, rest = divmod(stamp, self._plant.scene.period_ns)
-        if rest or not max(self.tick, 0) <= tick <= self._plant.tick:
-            self._plant.refuse("refused records", LYAPUNOV)
-            return
-        self.tick, self.heard = tick, time.monotonic()
-        self._then()

@@ -12,14 +12,13 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from grasp_ros.graph.health.peers import Gone, Need
-from grasp_ros.graph.lockstep.admission import Limits, Recorded
+from grasp_ros.graph.lockstep.admission import Limits
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.lockstep.timing import Timing
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.rosbag2 import numbers_message
@@ -28,6 +27,9 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.topics import LYAPUNOV, TIMING, Topic
+
+if TYPE_CHECKING:  # it imports this one
+    from grasp_ros.graph.nodes.plant import Plant
 
 SHORTEST_SECONDS = 5e-4  # between looks at the clock
 LOOKS = 2  # at the clock in a period
@@ -48,29 +50,13 @@ class Held:
 
 
 class FreeRunning:
-    """Advances the plant with the wall clock.
+    """Advances the plant with the wall clock; waits, if at all, only until somebody sends the commands of each side."""
 
-    Parameters
-    ----------
-    plant : SteppedNode
-    steering : Steering
-    running : Running
-        Real-time factor, timeouts and reactions.
-    waits : bool
-        Whether it begins only when somebody sends the commands of each controller.
+    answered = False  # never: it waits for no controller
 
-    Attributes
-    ----------
-    topics : list of Topic
-    answered : bool
-        None and never: it waits for no controller.
-    """
-
-    answered = False
-
-    def __init__(self, plant: SteppedNode, steering: Steering, running: Running, waits: bool) -> None:
+    def __init__(self, plant: Plant, steering: Steering, running: Running, waits: bool) -> None:
         self._plant, self._steering, self._running, self._awaits = plant, steering, running, waits
-        self.topics: list[Any] = []
+        self.topics: list[Topic] = []  # of which it needs each message
         self._period = plant.scene.period_ns / NANOSECONDS / running.real_time_factor  # s of wall time
         self._timeouts = {
             side: max(1, math.ceil(seconds * NANOSECONDS / plant.scene.period_ns))
@@ -78,7 +64,6 @@ class FreeRunning:
         }
         plant.counters.update({"stale commands": 0, "refused commands": 0, "commands beyond a limit": 0,
                                "timeouts": 0})
-        self._recorded = Recorded(plant, self.advance)
         self._held = {NAMES[body]: Held() for body in plant.scene.system.laws}
         self._timing = Timing([*self._held], self._period, running.real_time_factor)
         self._quality = plant.publisher(TIMING)
@@ -127,7 +112,6 @@ class FreeRunning:
             return
         if self._steering.reset_due:
             self._held = {side: Held() for side in self._held}
-            self._recorded.forget()
             self._steering.reset_done()
             self._set_anchor()
         if self._steering.steps:  # asked for: not with the clock
@@ -146,7 +130,7 @@ class FreeRunning:
             self._set_anchor()
         while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
             due = self._anchor + (plant.tick + 1) * self._period
-            if now < due or self._recorded.outrun() or (now - due > self._period and self._waits(now)):
+            if now < due or plant.outrun() or (now - due > self._period and self._waits(now)):
                 return
             if plant.at_end:
                 plant.finish()

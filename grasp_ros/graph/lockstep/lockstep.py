@@ -10,17 +10,19 @@ import math
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_ros.graph.health.peers import Gone, Need
-from grasp_ros.graph.lockstep.admission import Limits, Recorded, Sources
+from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import NEW
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
+
+if TYPE_CHECKING:  # it imports this one
+    from grasp_ros.graph.nodes.plant import Plant
 
 REPEAT_SECONDS, FIRST_SECONDS = 1.0, 0.4  # the first state is the one that a reader may miss: it has just come
 SETTLE_SECONDS = 0.3  # after a source has come or gone; its messages are here by then
@@ -29,22 +31,12 @@ UNCONTROLLED_SECONDS = 1e-4  # wall time between the ticks of a scene without co
 
 
 class Lockstep:
-    """Takes the commands, and advances the plant when all of a tick are there.
+    """Takes the commands, and advances the plant when all of a tick are there."""
 
-    Attributes
-    ----------
-    topics : list of Topic
-        Where the commands come from.
-    answered : bool
-        Whether a state of this run was.
-    """
-
-    def __init__(self, plant: SteppedNode, steering: Steering) -> None:
+    def __init__(self, plant: Plant, steering: Steering) -> None:
         self._plant, self._steering = plant, steering
         self._commands: dict[int, float] = {}
-        self._recorded = Recorded(plant, self.advance)
-        self._refused = False  # a second source has come
-        self.answered = False
+        self.answered = False  # whether a state of this run was
         self._asked = 0.0  # wall time of the last repetition
         self._timer: Any = None
         self._going = True  # the timer
@@ -84,13 +76,13 @@ class Lockstep:
             due = math.inf if side in self._commands or topic in self._unsettled else plant.asked
             yield Need(topic, Gone.AS_TOLD, what=what, due=due, first=not self.answered)
         if plant.monitored:
-            due = max(plant.asked, self._recorded.heard) if self._complete and self._ahead else math.inf
+            due = max(plant.asked, plant.heard_of_record) if self._complete and self._ahead else math.inf
             yield Need(LYAPUNOV, Gone.ENDS, what=what, due=due)
 
     def ask_again(self, now: float) -> None:
         """Publish the current state again if nothing has come of it for a while: it, or an answer, was lost."""
         patience = REPEAT_SECONDS if self.answered else FIRST_SECONDS
-        since = max(self._plant.asked, self._asked, self._recorded.heard if self._complete else 0.0)
+        since = max(self._plant.asked, self._asked, self._plant.heard_of_record if self._complete else 0.0)
         if self._unsettled:
             self._settle(now)
         elif (self._ahead or not self._complete) and now - since > patience:
@@ -102,12 +94,13 @@ class Lockstep:
         self._plant.repeat()
 
     def _settle(self, now: float) -> None:
-        """Ask again once the sources of the commands are the same for a while, and one of each is alive."""
+        """Ask again once the sources of the commands are the same for a while, and one of each is alive; or end."""
         for topic, since in tuple(self._unsettled.items()):
             if self._sources[topic].settled() and self._alone(topic):
                 del self._unsettled[topic]
-            elif now - since > self._plant.patience and not self._refused:
-                self._refuse_sources()
+            elif now - since > self._plant.patience:
+                self._refuse_sources(now - since - self._plant.patience)
+                return
         if not self._unsettled:
             self._repeat(now)
 
@@ -124,7 +117,7 @@ class Lockstep:
     @property
     def _ahead(self) -> bool:
         """Whether the plant has to wait for its monitor."""
-        return self._recorded.outrun(0 if self._steering.reset_due or self._plant.at_end else WINDOW)
+        return self._plant.outrun(0 if self._steering.reset_due or self._plant.at_end else WINDOW)
 
     def _on_command(self, side: int, topic: Topic, cdr: bytes) -> None:
         command = messages.raw_command(cdr)
@@ -146,12 +139,11 @@ class Lockstep:
         plant = self._plant
         resetting, ahead = self._steering.reset_due, self._ahead
         self._let_go_on(not ahead and (resetting or not self._steering.stands))
-        if self._refused or not plant.begun or plant.finished or ahead or not self._complete:
+        if not plant.begun or plant.finished or ahead or not self._complete:
             return
         self.answered = True
         if resetting:
             self._commands.clear()
-            self._recorded.forget()
             self._steering.reset_done()
         elif self._steering.go_on():
             if plant.at_end:
@@ -169,19 +161,11 @@ class Lockstep:
             self._going = going
             (self._timer.reset if going else self._timer.cancel)()
 
-    def _refuse_sources(self) -> None:
+    def _refuse_sources(self, waited: float) -> None:
         """End the run, with the names of the sources as soon as discovery has them."""
-        self._refused = True
-        deadline = time.monotonic() + NAMES_SECONDS
-
-        def named() -> bool:
-            late = time.monotonic() > deadline
-            return late or not any(name == NEW for topic in self.topics for name in self._plant.sources(topic))
-
-        self._plant.when(named, self._name_sources)
-
-    def _name_sources(self) -> None:
         found = {topic.name: self._plant.sources(topic) for topic in self.topics}
+        if waited < NAMES_SECONDS and any(NEW in nodes for nodes in found.values()):
+            return
         words = [f"{name}: {len(nodes)} sources, {' and '.join(nodes)}" for name, nodes in found.items()
                  if len(nodes) > 1]
         self._plant.fail(f"{'; '.join(words) or 'a command topic had two sources'};"

@@ -9,40 +9,35 @@ from __future__ import annotations
 
 import json
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rcl_interfaces.msg import IntegerRange, ParameterDescriptor
 from std_srvs.srv import Trigger
 
-from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.ros.node import Phase
+
+if TYPE_CHECKING:  # it imports this one
+    from grasp_ros.graph.nodes.plant import Plant
 
 MOST_STEPS = 10**9
 PAUSED, STEPPING = "paused", "stepping"  # beside the phases of a node
 
 
 class Steering:
-    """Services `~/pause`, `~/resume`, `~/step`, `~/reset`, `~/status`, and the parameter `steps` of `~/step`.
+    """Services `~/pause`, `~/resume`, `~/step`, `~/reset`, `~/status`, and the parameter `steps` of `~/step`."""
 
-    Attributes
-    ----------
-    steps : int
-        Control periods that are still to be done although the plant is paused.
-    reset_due : bool
-        Whether the plant is to be put back once its current state has been answered.
-    """
-
-    def __init__(self, plant: SteppedNode) -> None:
+    def __init__(self, plant: Plant) -> None:
         self._plant = plant
         self._paused = plant.read_only("paused", False)
-        self.steps = 0
-        self.reset_due = False
+        self.steps = 0  # control periods that are still to be done although the plant is paused
+        self.reset_due = False  # whether it is to be put back once its current state has been answered
         plant.declare("steps", 1, ParameterDescriptor(
             description="control periods of one call of the service step",
             integer_range=[IntegerRange(from_value=1, to_value=MOST_STEPS, step=1)],
         ))
         for name, action in (("pause", partial(self._pause, True)), ("resume", partial(self._pause, False)),
-                             ("step", self._step), ("reset", self._reset), ("status", self._status)):
+                             ("step", self._step), ("reset", self._reset),
+                             ("status", lambda _, response: self._answer(response))):
             plant.create_service(Trigger, f"~/{name}", action)
 
     def go_on(self) -> bool:
@@ -92,9 +87,6 @@ class Steering:
         number, tick = self._plant.resets + 1, self._plant.tick  # which may be over when `advance` returns
         self._plant.advance()
         return self._answer(response, goal={"resets": number, "resetting": False}, last_tick=tick)
-
-    def _status(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        return self._answer(response)
 
     def _answer(self, response: Trigger.Response, why: str = "", **more: Any) -> Trigger.Response:
         """What the plant is now, as JSON; with what it will be, or why it is not."""

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.states import State, StateReader
+from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.rosbag2 import force_message
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
@@ -60,22 +60,9 @@ class Ticks:
     effort. That decides where a command came when its topic may have had another source, and stands for one that did
     not come at all.
 
-    Parameters
-    ----------
-    topics : sequence of Topic
-        Beside `joint_states`, those with a message for every state.
-    names : collection of str
-        That every state has.
-    period_ns, end_ns : int, ns
-        Every stamp is a multiple of the first, and not above the second.
-    turn : callable
-        How often the plant was reset, as it says itself: the first state may come again for that reason or another.
-    delay : int, optional
-        Control periods from a command's arrival to its action.
-
-    Attributes
-    ----------
-    end_ns : int, ns
+    `topics` are, beside `joint_states`, those with a message for every state; `names` those that every state has. Every
+    stamp is a multiple of `period_ns` and not above `end_ns`. `turn` says how often the plant was reset: the first
+    state may come again for that reason or another. A command acts `delay` control periods after its arrival.
     """
 
     def __init__(
@@ -145,13 +132,7 @@ class Ticks:
         return Arrival.CONTRADICTS if others else Arrival.TAKEN
 
     def take(self, waited: float = 0.0) -> Tick | None:
-        """The next tick that is complete, or that will not be completed any more; None if that is still open.
-
-        Parameters
-        ----------
-        waited : float, s
-            How long it has been waited for.
-        """
+        """The next tick that is complete, or after such a wait in s will not be any more; None if that is open."""
         if not self._states:
             return None
         time_ns, restarted, message, cdr = self._states[0]

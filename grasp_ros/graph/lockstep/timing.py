@@ -13,27 +13,12 @@ OLDEST = 10_000  # periods that are told apart over the whole run
 
 
 class Timing:
-    """Collects lateness, intervals and the ages of commands.
-
-    Parameters
-    ----------
-    sides : sequence of str
-        Who has a controller.
-    period : float, s
-        Control period in wall time.
-    factor : float
-        Simulated seconds in a second that are asked for.
-
-    Attributes
-    ----------
-    lost : float, s
-        Wall time given up since the start, because the plant was too far behind.
-    """
+    """Collects lateness, intervals and the ages of commands; of a period in wall time, s, at a real-time factor."""
 
     def __init__(self, sides: Sequence[str], period: float, factor: float) -> None:
         self._sides, self._period, self._factor = sides, period, factor
         self._spent, self._counted = 0.0, 0  # wall time of all intervals, and their number
-        self.lost = 0.0
+        self.lost = 0.0  # wall time given up since the start, because the plant was too far behind, s
         self._overruns = 0
         self._before = math.nan
         self._all: dict[str, Counter[int]] = {side: Counter() for side in sides}  # ages since the start

@@ -1,1 +1,1 @@
-"""The nodes of the graph, and how they start."""
+"""The nodes of the graph."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, TypeGuard
 
@@ -14,17 +14,17 @@ from rclpy.parameter import Parameter
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
-from grasp_ros.graph.nodes.law import OwnLaw
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.ros.priority import Priority
-from grasp_ros.graph.ros.states import State, StateReader
 from grasp_ros.graph.rosbag2 import force_template, numbers_message
-from grasp_ros.physics.control import ControlLaw
-from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.system import NAMES
+from grasp_ros.physics.control import answered, limited
+from grasp_ros.physics.errors import Refused, described
+from grasp_ros.physics.sight import Sight, asked, check
+from grasp_ros.physics.system import COLUMN, NAMES, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
+from grasp_ros.scene.own_law import begin, find_law
 from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE, state_of
 from grasp_ros.scene.validation import SceneError
 
@@ -49,13 +49,12 @@ class Controller(PeerNode):
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor", False)
-        self._priority = Priority(self)
+        self._priority = self.read_priority()
         law = self.read_only("law", "")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
         self._announcements = self.publisher(CHANGES[self._side])
         self._scene: Scene | None = None
-        self._law: ControlLaw | None = None
         self._staged: dict[str, float] = {}
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
         self._turn = 0  # how often the plant had been reset then
@@ -76,7 +75,7 @@ class Controller(PeerNode):
         """The plant; a monitor is the plant's need."""
         yield Need(JOINT_STATES, Gone.STAYS)
         if self._monitored:
-            yield Need(LYAPUNOV, Gone.NOTED, vital=False)
+            yield Need(LYAPUNOV, Gone.NOTED)
 
     def progress(self) -> object:
         """The last state answered."""
@@ -115,7 +114,6 @@ class Controller(PeerNode):
             self._check_own(self._staged)
         self._reader = StateReader([NAMES[body] for body in scene.system.present] if self._own else (self._side,))
         self._scene, self._answered, self.concern, self._number = scene, -1, "", 0
-        self._law = scene.system.laws[SIDES[self._side]]
 
     def _check(self, parameters: list[Parameter]) -> SetParametersResult:
         """Whether numbers of the law may be set; somebody else may still refuse them."""
@@ -147,7 +145,7 @@ class Controller(PeerNode):
         self.phase = Phase.RUNNING
         self.words = f"running with {self._own.words}" if self._own else "running"
         self.begun, self.concern = True, ""
-        self._priority.take()
+        self.take_priority(self._priority)
         if not self._listening:  # this tells the plant that the controller is ready, so it comes last
             self._listening = True
             self._states = self.subscribe(JOINT_STATES, self._on_state, read=lambda cdr: self._reader.read(cdr))
@@ -167,7 +165,6 @@ class Controller(PeerNode):
             if warning not in before.warnings:
                 self.get_logger().warning(warning)
         self._staged.clear()
-        self._law = self._scene.system.laws[SIDES[self._side]]
         if self._own is None:
             numbers, self._number = self._scene.numbers_of(self._executable), self._number + 1
             self._announcements.publish(numbers_message(time_ns, numbers, self._number))
@@ -178,12 +175,12 @@ class Controller(PeerNode):
     def _admits(self, state: State | None) -> TypeGuard[State]:
         """Whether a message can be a state of this run."""
         assert self._scene is not None
-        true = False
-        if state is not None and state.time_ns % self._scene.period_ns == 0:
-            true = state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * self._scene.period_ns
-        if not true:
-            self.refuse("refused states", JOINT_STATES)
-        return true
+        if state is not None and state.time_ns % self._scene.period_ns == 0 and (
+            state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * self._scene.period_ns
+        ):
+            return True
+        self.refuse("refused states", JOINT_STATES)
+        return False
 
     def _on_state(self, state: State | None) -> None:
         if not self._ready_to_answer:
@@ -200,15 +197,14 @@ class Controller(PeerNode):
             return
         if self._staged or time_ns <= self._answered or self._answered < 0:
             self._begin(time_ns)
-        assert self._law is not None
         self._answered = time_ns
-        tick, row = time_ns // self._scene.period_ns, state.name.index(self._side)
+        tick, row, system = time_ns // self._scene.period_ns, state.name.index(self._side), self._scene.system
         try:
             if self._own:
-                numbers, system = state_of(state)[0].tolist(), self._scene.system
+                numbers = state_of(state)[0].tolist()
                 force = self._own.command(system, SIDES[self._side], tick, self._scene.time_of(tick), numbers)
             else:
-                force = self._law.command(tick, state.position[row], state.velocity[row])
+                force = system.laws[SIDES[self._side]].command(tick, state.position[row], state.velocity[row])
         except Refused as error:
             self.fail(str(error))
             return
@@ -234,8 +230,38 @@ class Controller(PeerNode):
         return state
 
     def _answer(self, time_ns: int) -> None:
-        """Publish the command that answers a state."""
         self._commands.publish(self._force_template.fill(time_ns, (self._force,)))
+
+
+class OwnLaw:
+    """A law of the user's own, between the sensors and the actuator of the scene."""
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+        try:
+            self._found = find_law(words, f"law: {words}")
+        except KeyboardInterrupt as error:  # of the module itself: a node notes signals, they raise none
+            raise Refused(f"law: {words}: {described(error)}") from error
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew, without memory."""
+        self._law = begin(self._found, f"law: {self.words}")
+        self.asks = asked(self._law)
+
+    def check(self, system: System, side: int) -> None:
+        """Refuse a scene that does not have what the law asks for."""
+        check(self.asks, system, side, f"law: {self.words}")
+
+    def command(self, system: System, side: int, tick: int, time: float, state: Sequence[float]) -> float:
+        """Command in N that answers the state (6,) of a tick, through the stages of the scene."""
+        stages, seen = system.laws[side], Sight(system, system.laws, side, tick, state).seen(self.asks)
+        x, v = stages.measured(tick, *state[COLUMN[side] :][:2])
+        try:
+            answer = self._law(tick, time, x, v, **seen)
+        except BaseException as error:  # an exit and an interrupt, too: a node notes signals, they raise none
+            raise Refused(f"law: {self.words}: {described(error)}, at tick {tick}") from error
+        return float(limited(stages.row.tolist(), answered(answer, f"law: {self.words}", tick, time)))
 
 
 def _numbers(parameters: list[Parameter]) -> dict[str, Any]:

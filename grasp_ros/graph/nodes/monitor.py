@@ -96,7 +96,7 @@ class Monitor(PeerNode):
         yield Need(JOINT_STATES, Gone.ENDS)
         if self._running is not None and self._scene is not None and self._running.lockstep:
             for topic in self._scene.controllers.values():
-                yield Need(topic, Gone.NOTED, vital=False)
+                yield Need(topic, Gone.NOTED)
 
     def progress(self) -> object:
         """The ticks so far."""

@@ -11,8 +11,8 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import State
 from grasp_ros.graph.ros.node import GraspNode
-from grasp_ros.graph.ros.states import State
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -53,7 +53,10 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
         name, x = NAMES[body], float(state[COLUMN[body]])
         shown = ASIDE[name]
         pressed = name in touching or (body == OBJECT and touching)
-        found.append(_box(body, time_ns, x + shown, TOUCHING if pressed else COLORS[name]))
+        box = _marker(body, "masses", Marker.CUBE, time_ns, TOUCHING if pressed else COLORS[name])
+        box.pose.position.x = x + shown
+        box.scale.x = box.scale.y = box.scale.z = SIZE
+        found.append(box)
         if body != OBJECT and system.bodies[body, Of.STIFFNESS] > 0.0:
             found.append(_line(10 + body, "springs", Marker.LINE_LIST, time_ns, (shown, x + shown), COLORS[name]))
     for number, (side, force) in enumerate(forces.items()):
@@ -72,13 +75,6 @@ def _marker(number: int, group: str, kind: int, time_ns: int, color: Iterable[fl
     red, green, blue = color
     marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
     marker.pose.orientation.w = 1.0
-    return marker
-
-
-def _box(body: int, time_ns: int, x: float, color: Iterable[float]) -> Marker:
-    marker = _marker(body, "masses", Marker.CUBE, time_ns, color)
-    marker.pose.position.x = x
-    marker.scale.x = marker.scale.y = marker.scale.z = SIZE
     return marker
 
 

@@ -5,9 +5,7 @@ When it advances is decided by one of two loops, `lockstep` (the default) and `f
 
 from __future__ import annotations
 
-import io
 import math
-import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -18,43 +16,22 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
 from grasp_ros.graph.health.beats import digest
-from grasp_ros.graph.health.peers import SLOW, Need
+from grasp_ros.graph.health.peers import SLOW, Need, PeerNode
 from grasp_ros.graph.lockstep.free_running import FreeRunning
 from grasp_ros.graph.lockstep.lockstep import Lockstep
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.lockstep.stepped import SteppedNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.ros.priority import Priority
 from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
 from grasp_ros.graph.running import Running, check_factor
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE
+from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
 from grasp_ros.simulation.sampled_plant import SampledPlant
 
 
-class _Terminal(io.TextIOBase):
-    """The standard error output, as long as somebody reads it: a terminal that is gone ends no run."""
-
-    encoding = sys.stderr.encoding
-
-    def isatty(self) -> bool:
-        """Whether it is one: a file or a journal gets no bar."""
-        return sys.stderr.isatty()
-
-    def write(self, text: str) -> int:
-        with suppress(OSError):
-            sys.stderr.write(text)
-        return len(text)
-
-    def flush(self) -> None:
-        with suppress(OSError):
-            sys.stderr.flush()
-
-
-class Plant(SteppedNode):
+class Plant(PeerNode):
     """Node `plant`; parameters scene, accuracy, wait_for_monitor, progress, those of its loop and of the scene."""
 
     why_read_only = "it describes what is simulated, which does not change in a run; set it in the scene or with -p"
@@ -67,7 +44,7 @@ class Plant(SteppedNode):
         progress = self.read_only("progress", False)
         free = self.read_only("free_running", False)
         waits = free and self.read_only("wait_for_controllers", False)
-        self._priority = Priority(self) if free else None
+        self._priority = self.read_priority() if free else 0
         steering = Steering(self)
         scene = scenes.load(name)
         running = self._read_running(free, list(scene.controllers.values()))
@@ -77,12 +54,13 @@ class Plant(SteppedNode):
         self._plant = self._new_plant()
         self._state_template = state_template([NAMES[body] for body in self.scene.system.present])
         self._clock_template, self._force_template = clock_template(), force_template()
-        self.resets, self.asked = 0, math.inf
+        self.resets, self.asked = 0, math.inf  # how often it was put back; wall time of the current state
+        self._recorded, self.heard_of_record = -1, -math.inf  # last tick that the monitor has; wall time of its word
         self._begin = math.nan  # wall time of the first state
-        self.counters.update(tick=0, resets=0)
+        self.counters.update(tick=0, resets=0, **{"refused records": 0})
+        # On a terminal alone: a file or a journal gets no bar.
         self._bar = tqdm(
-            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True,
-            file=_Terminal(),
+            total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True
         )
         self._states = self.publisher(JOINT_STATES)
         self._forces = [(self.publisher(output.topic), output.value) for output in self.scene.outputs]
@@ -93,6 +71,8 @@ class Plant(SteppedNode):
         for publisher, text in zip(self._descriptions, texts, strict=True):
             publisher.publish(messages.text(text))
         compile_kernels()  # while others get ready for this scene
+        if self.monitored:
+            self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
         if progress:
             self.wall_timer(0.1, self._show)
@@ -120,6 +100,24 @@ class Plant(SteppedNode):
     def tick(self) -> int:
         """Control periods done since the start or the last reset."""
         return self._plant.tick
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the horizon of the scene has been reached."""
+        return self.tick == self.scene.ticks
+
+    def outrun(self, lead: int = WINDOW) -> bool:
+        """Whether it has to wait for its monitor, which is more than some ticks behind."""
+        return self.monitored and self.tick - self._recorded > lead
+
+    def _on_lyapunov(self, cdr: bytes) -> None:
+        stamp = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
+        tick, rest = divmod(stamp, self.scene.period_ns)
+        if rest or not max(self._recorded, 0) <= tick <= self.tick:
+            self.refuse("refused records", LYAPUNOV)
+            return
+        self._recorded, self.heard_of_record = tick, time.monotonic()
+        self.advance()
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant."""
@@ -175,8 +173,7 @@ class Plant(SteppedNode):
         self.begun, self.concern = True, ""
         self.beats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
-        if self._priority is not None:
-            self._priority.take()
+        self.take_priority(self._priority)
         self.publish_state()
         self.loop.start()
 
@@ -212,11 +209,12 @@ class Plant(SteppedNode):
     def restart(self) -> None:
         """Put time and state back to the beginning of the scene, and publish the first state again."""
         self.get_logger().info(f"reset at tick {self.tick}")
-        self._plant = self._new_plant()
+        self._plant, self._recorded = self._new_plant(), -1
         self.resets += 1
         self.counters.update(tick=0, resets=self.resets)
         self._begin = time.monotonic()
-        self._bar.reset()
+        with suppress(OSError):
+            self._bar.reset()
         self.beats.own.turn = self.resets
         self.beats.tell()  # with the stamp of the first state this one is otherwise a repetition
         self.publish_state()
@@ -229,11 +227,13 @@ class Plant(SteppedNode):
         self.get_logger().info(f"finished {self.scene.ticks} ticks at {speed:.1f} ticks/s")
 
     def _show(self) -> None:
-        self._bar.update(self._plant.tick - self._bar.n)
+        with suppress(OSError):  # a terminal that is gone ends no run
+            self._bar.update(self._plant.tick - self._bar.n)
 
     def close(self) -> None:
         """End the progress bar, and deliver what a finished run has published."""
         self._show()
-        self._bar.close()
+        with suppress(OSError):
+            self._bar.close()
         if self.finished and not self.exit_code:
             self.flush(self._states, *(publisher for publisher, _ in self._forces))

@@ -43,7 +43,7 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: Sequence[int]) -
         gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
         gc.enable()
         if not nodes[0].work(received):
-            spin(nodes, received)
+            _spin(nodes, received, names)
     except Refused as error:
         tell_parent(names, str(error))
         with suppress(OSError):  # nobody reads it
@@ -62,40 +62,25 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: Sequence[int]) -
     return next((node.exit_code for node in nodes if node.exit_code), 0)
 
 
-def spin(nodes: Sequence[GraspNode], received: Sequence[int] = ()) -> None:
-    """Run nodes of one context in this thread until plant and monitor, or whatever there is, have finished.
+def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:
+    """Run nodes in this thread until plant and monitor, or whatever there is, have finished, or a signal has come.
 
-    Controllers go on for the next plant and end when nothing else is left. All nodes are closed and destroyed at the
-    end, also when it comes by an exception.
-
-    Parameters
-    ----------
-    nodes : sequence of GraspNode
-    received : sequence of int, optional
-        Ends when something is in it, say a signal.
+    Controllers go on for the next plant and end when nothing else is left.
     """
     executor = EventsExecutor(context=nodes[0].context)
-    try:
-        for node in nodes:
-            executor.add_node(node)
-        waited_for = [node for node in nodes if not node.stays] or list(nodes)
-        while not received:
-            finished = [node for node in nodes if node.finished]  # a list is quicker than `any`
-            if finished and (set(waited_for) <= set(finished) or any(node.exit_code for node in finished)):
-                break
-            executor.spin_once(timeout_sec=POLL_SECONDS)
-        if received:
-            tell_parent(_names(nodes), f"was ended by {signal.Signals(received[0]).name}")
-        if received and len(nodes) == 1:  # of several, nobody is behind
-            _take_what_came(executor, nodes[0])
-        executor.shutdown()
-    finally:
-        for node in nodes:
-            node.end()
-
-
-def _names(nodes: Sequence[GraspNode]) -> str:
-    return ", ".join(node.get_name() for node in nodes)
+    for node in nodes:
+        executor.add_node(node)
+    waited_for = [node for node in nodes if not node.stays] or list(nodes)
+    while not received:
+        finished = [node for node in nodes if node.finished]  # a list is quicker than `any`
+        if finished and (set(waited_for) <= set(finished) or any(node.exit_code for node in finished)):
+            break
+        executor.spin_once(timeout_sec=POLL_SECONDS)
+    if received:
+        tell_parent(names, f"was ended by {signal.Signals(received[0]).name}")
+    if received and len(nodes) == 1:  # of several, nobody is behind
+        _take_what_came(executor, nodes[0])
+    executor.shutdown()
 
 
 def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from enum import Enum
 from functools import partial
 from itertools import islice
+from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -30,6 +32,7 @@ PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0
 LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
 SWEEP = 100  # messages of one topic at a time
+PRIORITY, MOST_PRIORITY = "real_time_priority", 99  # of Linux
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 NEW = "a node whose name is not known yet"
 
@@ -45,37 +48,23 @@ class Phase(Enum):
 
 
 class GraspNode(ParameterNode):
-    """A node with counters on /diagnostics and an end.
-
-    Attributes
-    ----------
-    finished : bool
-        Whether there is nothing left to do; `run` and `spin` end then.
-    exit_code : int
-        0, or 1 after a failure, 2 after a refusal.
-    phase : Phase
-    words : str
-        What it does or waits for; the message of its /diagnostics.
-    counters : dict of str to number or text
-        The values of its /diagnostics.
-    inputs : list of Topic
-        What it subscribes to.
-    """
+    """A node with counters on /diagnostics and an end."""
 
     stays = False  # whether it goes on when a run is over
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
-        self.finished = False
-        self.exit_code = 0
-        self.counters: dict[str, int | float | str] = {}
-        self.inputs: list[Topic] = []
+        self.finished = False  # whether there is nothing left to do
+        self.exit_code = 0  # 1 after a failure, 2 after a refusal
+        self.counters: dict[str, int | float | str] = {}  # the values of its /diagnostics
+        self.inputs: list[Topic] = []  # what it subscribes to
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self._ended = False
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.strangers = ""  # who publishes what somebody else does
         self.phase = Phase.WAITING
+        # What it does or waits for: the message of its /diagnostics.
         self.words = f"waiting for peers {place(os.environ, self.get_namespace())}"
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.publisher(DIAGNOSTICS)
@@ -157,6 +146,27 @@ class GraspNode(ParameterNode):
         """Whether every reader that is matched has what was published; what it received it will also see first."""
         return bool(publisher.wait_for_all_acked(Duration(seconds=0)))
 
+    def read_priority(self) -> int:
+        """Parameter real_time_priority: that of this process once it runs, SCHED_RR; 0: that of every process.
+
+        Between equals a thread waits some milliseconds for its turn when all processors are busy, several periods of a
+        fast loop. Linux gives this priority to whoever has the right, by CAP_SYS_NICE or a limit `rtprio`.
+        """
+        wanted = self.read_only(PRIORITY, 0)
+        if not 0 <= wanted <= MOST_PRIORITY:
+            raise Refused(f"{PRIORITY}: {wanted} is not allowed; allowed: 0 to {MOST_PRIORITY}")
+        return int(wanted)
+
+    def take_priority(self, wanted: int) -> None:
+        """Give it to all threads of this process; those that they start inherit it. Without the right, say so."""
+        try:
+            for thread in Path("/proc/self/task").iterdir() if wanted else ():
+                with suppress(ProcessLookupError):  # it has just ended
+                    os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(wanted))
+        except OSError as error:
+            self.get_logger().info(f"{PRIORITY}: {wanted} is not to be had here ({error.strerror}):"
+                                   " goes on without, and commands get older on busy processors")
+
     def count(self, counter: str, number: int = 1) -> None:
         """Add to a counter."""
         self.counters[counter] = int(self.counters.get(counter, 0)) + number
@@ -234,11 +244,7 @@ class GraspNode(ParameterNode):
         if not self._ended:
             self._ended = True
             self.close()
-            self.part()
             self.destroy_node()
-
-    def part(self) -> None:
-        """Say last words; called once, before the node is destroyed."""
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""

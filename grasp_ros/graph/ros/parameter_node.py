@@ -23,14 +23,7 @@ RCLError = rclpy_implementation.RCLError
 
 
 class ParameterNode(Node):
-    """A node whose parameters are fixed at its start, but for numbers of a scene that may be set while it runs.
-
-    Parameters
-    ----------
-    name : str
-    options
-        As in `rclpy.node.Node`.
-    """
+    """A node whose parameters are fixed at its start, but for numbers of a scene that may be set while it runs."""
 
     why_read_only = "set at the start only, with -p or a parameter file"
 

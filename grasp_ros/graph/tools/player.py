@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 import time
-from pathlib import Path
 from typing import Any
 
-from grasp_ros.graph import bag
+from grasp_ros.graph.opening import Opened
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.physics.errors import Refused
@@ -24,14 +23,14 @@ class Player(GraspNode):
 
     def __init__(self, **options: Any) -> None:
         super().__init__("player", **options)
-        path = Path(self.read_only("bag", ""))
+        bag = Opened(self.read_only("bag", ""))
         self._rate = self.read_only("rate", 1.0)
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
-        self._rows = bag.raw(path)
+        self._rows = bag.messages
         self._next = next(self._rows, None)
         self._outputs: dict[str, Any] = {}
-        for name, topic in bag.names(path).items():
+        for topic, name in bag.names.items():
             self._outputs[name] = self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
         self.counters["messages"] = 0
         self._created, self._begin = time.monotonic(), math.nan

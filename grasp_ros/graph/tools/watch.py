@@ -39,16 +39,10 @@ MOST_OPEN = WINDOW + 500  # states of which not all has come; a monitor may be W
 
 
 class Newest:
-    """The newest state of which all messages have come; a state that lacks one is left out.
-
-    Attributes
-    ----------
-    found : dict of Topic to bytes
-        Its serialized messages; empty before the first.
-    """
+    """The newest state of which all messages have come; a state that lacks one is left out."""
 
     def __init__(self) -> None:
-        self.found: dict[Topic, bytes] = {}
+        self.found: dict[Topic, bytes] = {}  # its serialized messages; none before the first
         self._open: dict[int, dict[Topic, bytes]] = {}
         self._state, self._stale = -1, 0.0  # stamp of the last one, and until when others are not taken
 
