@@ -20,9 +20,11 @@ from grasp_ros.graph.rosbag2 import BagError
 
 HEAD: struct.Struct = struct.Struct("<BQ")  # opcode and length of every record
 RECORD = struct.Struct("<BQHIQQ")  # the same of a message, its channel, number and both times
+INDEX = struct.Struct("<BQHI")  # the same of an index of messages, its channel, and the bytes of its entries
 ENTRY = struct.Struct("<QQ")  # time of a message, and its place in the content of its chunk
 _OWN_BYTES = RECORD.size - HEAD.size  # of a message, beside its data
-_MESSAGE = int(Opcode.MESSAGE)
+_OWN_INDEX_BYTES = INDEX.size - HEAD.size
+_MESSAGE, _INDEX = int(Opcode.MESSAGE), int(Opcode.MESSAGE_INDEX)
 _CHUNK, _INDEXES, _STATISTICS = (f"_Writer__{name}" for name in ("chunk_builder", "chunk_indices", "statistics"))
 
 
@@ -38,7 +40,7 @@ class Messages:
     def __init__(self, writer: Writer) -> None:
         if getattr(writer, _INDEXES, None) != [] or not hasattr(writer, _CHUNK) or not hasattr(writer, _STATISTICS):
             raise BagError(f"mcap {version('mcap')}: its writer is another one; allowed: mcap>=1.5,<1.7")
-        setattr(writer, _INDEXES, _ChunkIndexes())
+        setattr(writer, _INDEXES, _Records())
         self._writer, self._chunk, self._statistics = writer, getattr(writer, _CHUNK), getattr(writer, _STATISTICS)
         self.counts: Counter[int] = Counter()  # messages so far, by channel
         self._records, self._entries = bytearray(), dict[int, bytearray]()
@@ -73,7 +75,10 @@ class Messages:
         """What the library would have noted at each message."""
         chunk, statistics = self._chunk, self._statistics
         chunk.record_writer.write(self._records)
-        chunk.message_indices.update({channel: _Index(channel, entries) for channel, entries in self._entries.items()})
+        chunk.message_indices.update({
+            channel: _Records(INDEX.pack(_INDEX, _OWN_INDEX_BYTES + len(entries), channel, len(entries)) + entries)
+            for channel, entries in self._entries.items()
+        })
         chunk.num_messages = sum(len(entries) // ENTRY.size for entries in self._entries.values())
         chunk.message_start_time, chunk.message_end_time = self._first, self._last
         begun = statistics.message_count > 0
@@ -85,37 +90,22 @@ class Messages:
         self._entries.clear()
 
 
-class _Index:
-    """Where the messages of one channel are in a chunk."""
+class _Records:
+    """Records that are serialized already, for the writer to write: an index, or all that stand in for its list."""
 
-    def __init__(self, channel: int, entries: bytearray) -> None:
-        self._channel, self._entries = channel, entries
-
-    def write(self, stream: RecordBuilder) -> None:
-        """Write it."""
-        stream.start_record(Opcode.MESSAGE_INDEX)
-        stream.write2(self._channel)
-        stream.write4(len(self._entries))
-        stream.write(self._entries)
-        stream.finish_record()  # type: ignore[no-untyped-call]
-
-
-class _ChunkIndexes:
-    """What a writer takes for its list of chunk indexes, kept as the bytes that it writes at the end."""
-
-    def __init__(self) -> None:
-        self._records = bytearray()
+    def __init__(self, content: bytes = b"") -> None:
+        self._content = bytearray(content)
 
     def append(self, index: ChunkIndex) -> None:
         """Add one."""
         builder = RecordBuilder()
         index.write(builder)
-        self._records += builder.end()  # type: ignore[no-untyped-call]
+        self._content += builder.end()  # type: ignore[no-untyped-call]
 
-    def __iter__(self) -> Iterator[_ChunkIndexes]:
-        """All of them as one record, for the writer to write."""
+    def __iter__(self) -> Iterator[_Records]:
+        """All of them as one."""
         yield self
 
     def write(self, stream: RecordBuilder) -> None:
         """Write all of them."""
-        stream.write(self._records)
+        stream.write(self._content)

@@ -39,7 +39,6 @@ class Lockstep:
         self.answered = False  # whether a state of this run was
         self._asked = 0.0  # wall time of the last repetition
         self._timer: Any = None
-        self._going = True  # the timer
         plant.counters.update({
             "stale commands": 0, "repeated commands": 0, "refused commands": 0, "commands beyond a limit": 0,
             "commands while sources change": 0, "repeated states": 0,
@@ -157,8 +156,7 @@ class Lockstep:
 
     def _let_go_on(self, going: bool) -> None:
         """Stop the timer of a scene without controllers while nothing is due: it would keep others from their turn."""
-        if self._timer is not None and going is not self._going:
-            self._going = going
+        if self._timer is not None and going is self._timer.is_canceled():
             (self._timer.reset if going else self._timer.cancel)()
 
     def _refuse_sources(self, waited: float) -> None:
