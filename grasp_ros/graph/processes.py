@@ -35,7 +35,7 @@ LONGEST = 2**16  # bytes of last words
 
 
 def become(node: str, parameters: Mapping[str, str], namespace: str = "/") -> NoReturn:
-    """Turn this process into one that runs a node: its signals and its exit status are the node's own."""
+    """Become the process of a node, with parameters as `-p` takes them: signals and exit status are the node's own."""
     os.execv(sys.executable, _command([node], parameters, namespace))
 
 

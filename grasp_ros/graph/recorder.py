@@ -123,9 +123,9 @@ class Recorder:
     def write_tick(
         self, time_ns: int, messages: Iterable[tuple[Topic, bytes]], stamp_ns: int | None = None
     ) -> None:
-        """Append all of one tick, that of the monitor itself last, and its /clock: as a whole, or not at all.
+        """Append all messages of one tick, the monitor's own last, and its /clock: as a whole, or not at all.
 
-        Time in the bag goes on where a reset puts simulated time, the stamp, back.
+        Time in the bag never goes back; it goes on where a reset puts simulated time, the stamp, back.
 
         Raises
         ------

@@ -74,7 +74,7 @@ def definition(kind: str) -> bytes:
 def metadata(
     file: str, counts: Mapping[Topic, int], names: Mapping[Topic, str], last_ns: int, custom: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Document of metadata.yaml: of a storage file whose first time is 0, with `custom` for rosbag2 to carry along."""
+    """Document of metadata.yaml: of one file from time 0 to `last_ns`, with `custom` for rosbag2 to carry along."""
     start, duration = {"nanoseconds_since_epoch": 0}, {"nanoseconds": last_ns}
     total = sum(counts.values())
     return {INFORMATION: {

@@ -50,7 +50,7 @@ class Held:
 
 
 class FreeRunning:
-    """Advances the plant with the wall clock; waits, if at all, only until somebody sends the commands of each side."""
+    """Advances the plant with the wall clock; if it `waits`, from when somebody sends the commands of each side."""
 
     answered = False  # never: it waits for no controller
 

@@ -13,7 +13,7 @@ OLDEST = 10_000  # periods that are told apart over the whole run
 
 
 class Timing:
-    """Collects lateness, intervals and the ages of commands; of a period in wall time, s, at a real-time factor."""
+    """Collects lateness, intervals and ages of commands; `period` in s of wall time, `factor` as it is asked for."""
 
     def __init__(self, sides: Sequence[str], period: float, factor: float) -> None:
         self._sides, self._period, self._factor = sides, period, factor
