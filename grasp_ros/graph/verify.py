@@ -260,14 +260,14 @@ def compare_recording(recording: Recording) -> Comparison:
     verification, answers = verify(recording), answers_of(recording)
     one_run = recording.running.lockstep and len(recording.starts) <= 1
     own = one_run and not any(found.foreign for found in answers.values())
-    if not own:
-        return Comparison(verification.holds, own, None, verification, answers)
-    same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
-    equal = verification.difference is None and _equal(same, recording)
-    if scene.sampled or recording.changes:
-        return Comparison(equal, own, None, verification, answers)
-    ideal = simulate(scene, grid=times, accuracy=accuracy)
-    return Comparison(equal, own, np.abs(ideal.state - recording.state).max(axis=0), verification, answers)
+    equal, offset = verification.holds, None
+    if own:
+        same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
+        equal = verification.difference is None and _equal(same, recording)
+    if own and not (scene.sampled or recording.changes):
+        ideal = simulate(scene, grid=times, accuracy=accuracy)
+        offset = np.abs(ideal.state - recording.state).max(axis=0)
+    return Comparison(equal, own, offset, verification, answers)
 
 
 def _equal(same: Trajectory, recording: Recording) -> bool:
