@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 from grasp_ros.physics.errors import Refused
@@ -56,7 +57,7 @@ def usage(node: str) -> str:
 
 
 def quoted(text: str) -> str:
-    """A text as `-p` takes one, in ASCII: as YAML, to which JSON's pairs of surrogates are nothing."""
+    """A text as `-p` takes one, in ASCII: as YAML, where JSON would write pairs of surrogates, which YAML refuses."""
     if re.search("[\ud800-\udfff]", text):
         raise Refused(f"{text}: not allowed; allowed: a name in UTF-8")
     return '"' + re.sub(r'[^ !#-\[\]-~]', lambda sign: f"\\U{ord(sign[0]):08x}", text) + '"'
@@ -67,5 +68,5 @@ def check_timeouts(peer: float, start: float) -> None:
     if not start > 0.0:
         raise Refused(f"start_timeout_s: {start:g} is not allowed; allowed: a number > 0, or 0 for any time")
     if not 0.0 < peer <= start:
-        raise Refused(f"peer_timeout_s: {peer:g} is not allowed; allowed: a number > 0, not above start_timeout_s,"
-                      f" {start:g}")
+        most = f", at most {start:g} like start_timeout_s" if start < math.inf else ""
+        raise Refused(f"peer_timeout_s: {peer:g} is not allowed; allowed: a number > 0{most}")

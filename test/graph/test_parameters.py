@@ -181,7 +181,7 @@ def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
     [
         ("start_timeout_s:=-1", "start_timeout_s: -1 is not allowed; allowed: a number > 0, or 0 for any time"),
         ("start_timeout_s:=.nan", "start_timeout_s: nan is not allowed"),
-        ("peer_timeout_s:=-1", "peer_timeout_s: -1 is not allowed; allowed: a number > 0, not above start"),
+        ("peer_timeout_s:=-1", "peer_timeout_s: -1 is not allowed; allowed: a number > 0, at most"),
         ("steps:=0", "Invalid parameter value (0) for parameter. Reason: Parameter steps out of range. Min: 1"),
     ],
 )

@@ -142,7 +142,8 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     message = json.loads(ask("echo joint_states 1"))
     assert message["name"] == ["left"]
     assert "One arm by itself" in ask("echo scene 1")  # said before this reader came
-    refused = ["set plant steps 0", f"set plant steps {10 ** 20}", "set plant steps [1,a]", "step",  # while it is there
+    refused = ["set plant steps 0", f"set plant steps {10 ** 20}", f"set plant steps [{10 ** 20}]",
+               "set plant steps [1,a]", "step",  # while it is there
                "pause now", "echo nothing", "nonsense", "step x", "step 0", "get nobody steps",
                "set left_controller law x", f"set left_controller {gain} -100",
                "set left_controller left_feedback.position_gain 9"]
@@ -151,6 +152,7 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
                   "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number >= 1",
                   "0: not allowed; allowed: a whole number >= 1", "law: set at the start only",
                   f"steps: {10 ** 20} is not allowed", "steps: [1, 'a'] is not allowed",
+                  f"steps: [{10 ** 20}] is not allowed",
                   "no nobody answers in ROS domain", "allowed: a sum >= 0",
                   "left_feedback.position_gain: left_controller has no such parameter; did you mean " + gain):
         assert words in err

@@ -68,7 +68,7 @@ def reader_qos(topic: Topic) -> QoSProfile:
 
 
 def glance_qos(topic: Topic) -> QoSProfile:
-    """That of a reader for which nobody waits: it may miss what it has no time for, but not what was said before it."""
+    """That of a reader for which nobody waits: it may miss messages, but not one that is latched."""
     return qos(topic) if topic.latched else QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 

@@ -29,7 +29,6 @@ from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 5.0  # without an answer, or without progress
 SPIN_SECONDS = 0.1
-MOST_BITS = 63  # of a whole number, beside its sign
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
 
@@ -141,10 +140,8 @@ class Remote(GraspNode):
 
     def _set(self, node: str, name: str, value: Any) -> None:
         try:
-            if isinstance(value, int) and value.bit_length() > MOST_BITS:
-                raise TypeError
             request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        except TypeError:
+        except (TypeError, OverflowError, AssertionError):  # of the library for what no message holds
             raise Refused(f"{name}: {value} is not allowed; allowed: what a parameter of ROS can be") from None
         [result] = self._ask(SetParameters, f"{node}/set_parameters", request).results
         if not result.successful:
