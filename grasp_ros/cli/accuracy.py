@@ -12,7 +12,7 @@ from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_scene
 from grasp_ros.cli.checks import check_output, load_scene, prepare
-from grasp_ros.cli.output import bar, images, show, write_figure
+from grasp_ros.cli.output import bar, figure_endings, show, write_figure
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.physics.errors import Refused
 
@@ -39,7 +39,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     wished = options.error is not None or options.budget is not None
     if wished:
         check_wish(options.error, options.budget)
-    check_output(options.output, images(options.output), options.force, [options.scene])
+    check_output(options.output, figure_endings(options.output), options.force, [options.scene])
     contenders, others = own_contenders(scene)
     prepare()
     truth = finest(scene)

@@ -9,7 +9,7 @@ from typing import Any
 
 from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
-from grasp_ros.cli.output import bar, images, show, write_figure, write_scene
+from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_scene
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import YAML
 from grasp_ros.simulation.outcomes import GROUPS
@@ -50,7 +50,7 @@ def _design(options: argparse.Namespace) -> int:
     problem = Problem(scene, [read_axis("--free", text, grid=False) for text in options.free], options.minimise,
                       [read_bound(text) for text in options.bounds], setup)
     check_output(options.output, YAML, options.force, [options.scene])
-    check_output(options.figure, images(options.figure), options.force, [options.scene])
+    check_output(options.figure, figure_endings(options.figure), options.force, [options.scene])
     several = len(options.minimise) == 2
     if several and options.output is not None:
         raise Refused("-o: allowed: with one --minimise, which has one best choice; the table has the numbers of all")

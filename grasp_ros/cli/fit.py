@@ -8,7 +8,7 @@ from typing import Any
 from grasp_ros import scene as scenes
 from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
 from grasp_ros.cli.checks import check_output, load_scene, prepare, warn
-from grasp_ros.cli.output import images, show, write_figure, write_scene
+from grasp_ros.cli.output import figure_endings, show, write_figure, write_scene
 from grasp_ros.identification.fit import fit
 from grasp_ros.identification.measured import CHANNELS, measured
 from grasp_ros.identification.result import Fit
@@ -37,7 +37,7 @@ def add_to(commands: Any) -> None:
 
 
 def _fit(options: argparse.Namespace) -> int:
-    check_output(options.output, (*YAML, *images(options.output)), options.force, [options.source])
+    check_output(options.output, (*YAML, *figure_endings(options.output)), options.force, [options.source])
     scene = None
     if options.scene is not None:
         scene = load_scene(options.scene, options.settings)

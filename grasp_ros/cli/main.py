@@ -73,11 +73,11 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         try:
             options = parser().parse_args(words)
         except FileNotFoundError:  # of an import
-            check_directory()
+            _check_directory()
             raise
         except SystemExit as stop:  # of argparse, which has said why
             return stop.code if isinstance(stop.code, int) else 0
-        check_directory()
+        _check_directory()
         command: Command = options.command
         if isinstance(sys.stdout, io.TextIOWrapper):  # a title or a path that the terminal cannot show is no error
             sys.stdout.reconfigure(errors="backslashreplace")
@@ -96,7 +96,7 @@ def _status(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str])
         return 130
 
 
-def check_directory() -> None:
+def _check_directory() -> None:
     """Refuse a working directory that has been removed."""
     try:
         os.getcwd()

@@ -85,7 +85,7 @@ def write_scene(scene: Scene, path: Path) -> None:
         file.write(scene.to_yaml().encode())
 
 
-def images(output: Path | None) -> list[str]:
+def figure_endings(output: Path | None) -> list[str]:
     """Endings of figures; none, and no matplotlib, without an output."""
     if output is None:
         return []

@@ -11,7 +11,7 @@ import numpy as np
 
 from grasp_ros.cli.arguments import add_command, add_file, add_settings
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
-from grasp_ros.cli.output import STDOUT, images, note, write_figure
+from grasp_ros.cli.output import STDOUT, figure_endings, note, write_figure
 from grasp_ros.cli.sensitivity import sensitivity_panels
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
@@ -49,7 +49,7 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
-    check_output(output, WRITERS if options.animate else images(output), options.force, options.sources)
+    check_output(output, WRITERS if options.animate else figure_endings(output), options.force, options.sources)
     if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]

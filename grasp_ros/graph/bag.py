@@ -16,7 +16,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph.columns import Alike, alike
-from grasp_ros.graph.opening import Opened, doubting
+from grasp_ros.graph.opening import Opened, decoding_bag
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording, acted_from
 from grasp_ros.graph.rosbag2 import BagError, decode
@@ -51,7 +51,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
         If the path is not such a bag, or if it is damaged.
     """
     opened = Opened(path)
-    with doubting(opened.path):
+    with decoding_bag(opened.path):
         content = _Content(opened)
         for stored in opened.messages:
             content.take(stored)

@@ -24,14 +24,14 @@ ZSTD = b"\x28\xb5\x2f\xfd"
 CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 
 
-def doubting(path: Path) -> AbstractContextManager[None]:
+def decoding_bag(path: Path) -> AbstractContextManager[None]:
     """Refuse a bag of which something is not as it should be."""
     return decoding(path, KIND, BagError, (SerdeError, AttributeError))
 
 
 def open_storage(path: Path, salvage: bool = False) -> Storage:
     """The storage file of a bag, or of a directory that holds one."""
-    with doubting(path):
+    with decoding_bag(path):
         files = sorted(path.glob("*.mcap")) if path.is_dir() else [path]
         if files and files[0].is_fifo():
             raise BagError(f"{path}: not {KIND}: a pipe; allowed: a file")
@@ -55,7 +55,7 @@ class Opened:
     def __init__(self, path: str | os.PathLike[str], salvage: bool = False) -> None:
         self.path = path = Path(path)
         self.storage = open_storage(path, salvage)
-        with doubting(path):
+        with decoding_bag(path):
             messages, records = self.storage.messages(), self.storage.records
             first = list(islice(messages, 1))
             if first and OWN_RECORD not in records:
@@ -65,7 +65,7 @@ class Opened:
                 records[OWN_RECORD] = _said(first, path)
             if OWN_RECORD not in records:
                 raise BagError(f"{path}: holds no tick")
-            own, self.messages = records[OWN_RECORD], _doubted(path, chain(first, messages))
+            own, self.messages = records[OWN_RECORD], _decoded(path, chain(first, messages))
             self.scene = scenes.parse(own["scene"], path.name, str(path))
             self.running = runnings.parse(own["run"])
             self.versions = {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)}
@@ -74,8 +74,8 @@ class Opened:
             self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
 
 
-def _doubted(path: Path, messages: Iterable[Stored]) -> Iterator[Stored]:
-    with doubting(path):
+def _decoded(path: Path, messages: Iterable[Stored]) -> Iterator[Stored]:
+    with decoding_bag(path):
         yield from messages
 
 

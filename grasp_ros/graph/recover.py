@@ -8,7 +8,7 @@ from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from grasp_ros.graph.opening import Opened, doubting
+from grasp_ros.graph.opening import Opened, decoding_bag
 from grasp_ros.graph.recorder import Recorder
 from grasp_ros.graph.rosbag2 import BagError, decode
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -54,7 +54,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
 
 def _stamp_ns(path: Path, cdr: bytes) -> int:
     """Time in ns of what the monitor had computed, if it is that."""
-    with doubting(path):
+    with decoding_bag(path):
         own = decode(LYAPUNOV, cdr)
     if len(own.position) != len(LYAPUNOV_NAMES):
         raise BagError(f"{path}: {LYAPUNOV.name}: {len(own.position)} numbers; allowed: {len(LYAPUNOV_NAMES)}")
@@ -66,7 +66,7 @@ def _ticks(opened: Opened) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple
     known = {(name, topic.type): topic for topic, name in opened.names.items()}
     wanted = {topic for topic in opened.scene.topics if topic not in opened.held}
     before = -1
-    with doubting(opened.path):
+    with decoding_bag(opened.path):
         for time_ns, group in groupby(opened.messages, lambda stored: stored.time_ns):
             tick: dict[Topic, bytes] = {}
             beside = []

@@ -99,9 +99,8 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> No
     import zarr
 
     names = ("row",) if plan.sample else tuple(axis.name for axis in plan.axes)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
     with replaced(path) as part, zarr.config.set(ALL_FILES):
+        path.parent.mkdir(parents=True, exist_ok=True)
         group = zarr.create_group(part, zarr_format=3, attributes={
             "format": FORMAT, "plan": document, "versions": versions(), "statuses": list(STATUSES), "seconds": 0.0})
         packed = {"compressors": zarr.codecs.ZstdCodec(checksum=True)}

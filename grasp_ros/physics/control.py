@@ -63,7 +63,7 @@ def feedback(row: Any, x: Any, v: Any) -> Any:
     return force
 
 
-def answered(answer: object, who: str, tick: int, time: float) -> float:
+def command_of(answer: object, who: str, tick: int, time: float) -> float:
     """The command in N that a law of the user's own has answered with.
 
     Raises

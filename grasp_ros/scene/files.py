@@ -89,7 +89,10 @@ def replaced(path: Path) -> Iterator[Path]:
             yield part
             part.replace(path.resolve())
         finally:
-            shutil.rmtree(part) if part.is_dir() else part.unlink(missing_ok=True)
+            if part.is_dir():
+                shutil.rmtree(part)
+            else:
+                part.unlink(missing_ok=True)
 
 
 def opened(target: str | os.PathLike[str] | BinaryIO) -> AbstractContextManager[BinaryIO]:

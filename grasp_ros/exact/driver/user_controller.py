@@ -21,7 +21,7 @@ from numba.core.errors import NumbaError
 from numba.core.types import float64, int64
 from numba.extending import intrinsic, is_jitted
 
-from grasp_ros.physics.control import Law, answered
+from grasp_ros.physics.control import Law, command_of
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.sight import Sight, asked
 
@@ -111,7 +111,7 @@ class Foreign:
         """What a callable of Python answers; NaN for what is kept for `failure`."""
         try:
             seen = self.sight(tick).seen(self.asks) if self.asks else {}
-            return answered(self._law(tick, time, x, v, **seen), self._who, tick, time)
+            return command_of(self._law(tick, time, x, v, **seen), self._who, tick, time)
         except BaseException as error:  # ctypes would print it and go on
             self._error = error
             return math.nan
@@ -121,7 +121,7 @@ class Foreign:
         error, self._error = self._error, None
         if error is None:  # a compiled law has no memory: it does the same again
             try:
-                answered(self._law(tick, time, x, v), self._who, tick, time)
+                command_of(self._law(tick, time, x, v), self._who, tick, time)
             except BaseException as again:
                 error = again
         if error is None:

@@ -18,7 +18,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.rosbag2 import force_template, numbers_message
-from grasp_ros.physics.control import answered, limited
+from grasp_ros.physics.control import command_of, limited
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.sight import Sight, asked, check
 from grasp_ros.physics.system import COLUMN, NAMES, System
@@ -261,7 +261,7 @@ class OwnLaw:
             answer = self._law(tick, time, x, v, **seen)
         except BaseException as error:  # an exit and an interrupt, too: a node notes signals, they raise none
             raise Refused(f"law: {self.words}: {described(error)}, at tick {tick}") from error
-        return float(limited(stages.row.tolist(), answered(answer, f"law: {self.words}", tick, time)))
+        return float(limited(stages.row.tolist(), command_of(answer, f"law: {self.words}", tick, time)))
 
 
 def _numbers(parameters: list[Parameter]) -> dict[str, Any]:

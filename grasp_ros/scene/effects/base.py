@@ -65,7 +65,7 @@ class Effect:
     commands: Topic | None = None  # topic of the controller that it brings
     outputs: tuple[Output, ...] = ()  # what the plant publishes about it
     problems: Callable[[Sections], Iterable[Problem]] = nothing  # what is wrong beyond ranges
-    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing  # suspicious settings, and what they have built
+    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing  # suspicious settings
     example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it
 
 
