@@ -10,17 +10,15 @@ from functools import partial
 from grasp_ros.cli.main import run
 from grasp_ros.cli.parser import Command
 from grasp_ros.physics.errors import Refused
-from lab.commands import accuracy, costs, graph, maps, proofs
+from lab.commands import accuracy, graph, proofs
 
 # names of modules of the extra `lab`
 PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
 ABOUT = "Measure, and print what was measured. Those with --docs write a page; `make study` writes all pages."
 COMMANDS = (
-    proofs.add_paper, proofs.add_domain, proofs.add_certificate, proofs.add_hard, proofs.add_fuzz,
-    accuracy.add_accuracy, accuracy.add_prediction, accuracy.add_derivatives,
-    accuracy.add_speed,
-    costs.add_effects, costs.add_loop, costs.add_recorder, maps.add_maps, maps.add_many,
-    graph.add_graph, graph.add_free_running, graph.add_steering, proofs.add_faults, proofs.add_doors,
+    proofs.add_paper, proofs.add_domain, accuracy.add_certificate, proofs.add_hard, proofs.add_fuzz,
+    accuracy.add_accuracy, accuracy.add_speed, accuracy.add_derivatives, accuracy.add_effects, accuracy.add_maps,
+    graph.add_graph, graph.add_recorder, graph.add_steering, proofs.add_faults, proofs.add_doors,
 )
 
 

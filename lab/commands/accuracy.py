@@ -1,85 +1,87 @@
-"""The studies of error against time: `accuracy`, `prediction`, `derivatives` and `speed`."""
+"""The studies that measure: `speed`, and with a page `accuracy`, `maps`, `effects`, `certificate`, `derivatives`."""
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
-from pathlib import Path
+from functools import partial
+from importlib import import_module
 from typing import Any
 
-from grasp_ros.cli.arguments import add_command, add_output, add_scene, add_settings, whole
+from grasp_ros.cli.arguments import add_command, add_scene, whole
 from grasp_ros.cli.checks import load_scene, prepare
-from grasp_ros.physics.errors import Refused
-from grasp_ros.scene import Scene
-from grasp_ros.scene.files import writing
-from lab.commands.docs import add_docs, page_directory
-from lab.commands.shared import STUDY_DIRECTORY, add_study_directory
+from lab.commands.shared import add_docs, add_study_directory, page_directory
 
-DRIFT_QUICK_S = 20.0
 Parser = argparse.ArgumentParser
 
 
 def add_accuracy(commands: Any) -> Parser:
     """`python -m lab accuracy`."""
-    text = "error against time of every method; resumes"
-    sub = add_command(commands, "accuracy", _accuracy, text)
-    _add_scenes(sub)
-    sub.add_argument("--quick", action="store_true", help="few settings, our own compiled methods only")
+    text = "what accuracy costs: error against time of every method, energy, prediction, control periods; resumes"
+    return _add_resumed(commands, "accuracy", "accuracy_page", text)
+
+
+def add_maps(commands: Any) -> Parser:
+    """`python -m lab maps`."""
+    return _add_resumed(commands, "maps", "map_page", "where a grasp settles, and how robust it is; resumes")
+
+
+def _add_resumed(commands: Any, name: str, module: str, text: str) -> Parser:
+    """A study that goes on from what it has measured, and whose result is its page."""
+    sub = add_command(commands, name, partial(_resume, name, module), text)
+    sub.add_argument("--quick", action="store_true", help="a part of it, without ROS and outside peers: to try it out")
+    add_docs(sub)
+    add_study_directory(sub)
+    return sub
+
+
+def _resume(name: str, module: str, options: argparse.Namespace) -> int:
+    study = import_module(f"lab.studies.{module}")
+    docs = page_directory(options, name) or options.output
+    prepare()
+    print(f"written to {study.write(docs, options.output, options.quick)}")
+    return 0
+
+
+def add_effects(commands: Any) -> Parser:
+    """`python -m lab effects`."""
+    return _add_printed(commands, "effects", "what each effect costs: counts of work, times, bytes")
+
+
+def add_certificate(commands: Any) -> Parser:
+    """`python -m lab certificate`."""
+    return _add_printed(commands, "certificate", "where the paper's V jumps; limits of the control period")
+
+
+def _add_printed(commands: Any, name: str, text: str) -> Parser:
+    """A study that prints its numbers, and writes its page where one is wanted."""
+    sub = add_command(commands, name, partial(_print, name), text)
     add_docs(sub)
     return sub
 
 
-def _accuracy(options: argparse.Namespace) -> int:
-    from lab.studies import accuracy, drift, figures, measure
-    from lab.studies.contenders import all_contenders
-
-    subjects = _subjects(options)
-    if docs := page_directory(options, "accuracy"):
-        return _accuracy_page(options, docs)
+def _print(name: str, options: argparse.Namespace) -> int:
+    study = import_module(f"lab.studies.{name}")
+    docs = page_directory(options, study.PAGE)
     prepare()
-    effort = measure.QUICK if options.quick else measure.FULL
-    contenders = accuracy.quick_contenders() if options.quick else all_contenders()
-    records = accuracy.run(subjects, options.output, effort, contenders)
-    print(accuracy.report(records))
-    figures.work_precision(records, accuracy.METRIC, options.output / "error_against_time.png")
-    figures.contacts_missed(records, options.output / "contacts_missed.png")
-    if not options.scenes:
-        drifts = drift.run(options.output, DRIFT_QUICK_S if options.quick else drift.SECONDS)
-        print("\n" + drift.report(drifts))
-        figures.energy_drift(drifts, options.output / "energy_drift.png")
-    print(f"written to {options.output}")
+    study.run(docs)
     return 0
 
 
-def _accuracy_page(options: argparse.Namespace, docs: Path) -> int:
-    from lab.studies import accuracy_page
-
-    if options.scenes:
-        raise Refused("--docs: allowed: without a SCENE, because the page has its own")
-    prepare()
-    print(f"written to {accuracy_page.write(docs, options.output, options.quick)}")
-    return 0
-
-
-def add_prediction(commands: Any) -> Parser:
-    """`python -m lab prediction`."""
-    text = "how far ahead a scene can be predicted in doubles"
-    sub = add_command(commands, "prediction", _prediction, text)
-    _add_scenes(sub)
+def add_speed(commands: Any) -> Parser:
+    """`python -m lab speed`."""
+    sub = add_command(commands, "speed", _speed, "time to one given error, beside the outside peers")
+    add_scene(sub)
+    sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")
+    add_study_directory(sub)
     return sub
 
 
-def _prediction(options: argparse.Namespace) -> int:
-    from lab.studies import figures, predictability
+def _speed(options: argparse.Namespace) -> int:
+    from lab.studies import speed
 
-    subjects = _subjects(options)
-    with writing(options.output):
-        options.output.mkdir(parents=True, exist_ok=True)
+    scene = load_scene(options.scene, options.settings)
     prepare()
-    predictions = predictability.run(subjects)
-    print(predictability.report(predictions))
-    figures.prediction(predictions, options.output / "prediction.png")
-    print(f"written to {options.output}")
+    speed.run(scene, options.error, options.output)
     return 0
 
 
@@ -106,36 +108,3 @@ def _derivatives(options: argparse.Namespace) -> int:
     if docs is not None:
         print(f"written to {derivatives.write(docs, found)}")
     return 0
-
-
-def add_speed(commands: Any) -> Parser:
-    """`python -m lab speed`."""
-    text = "time to one given error, beside the outside peers"
-    sub = add_command(commands, "speed", _speed, text)
-    add_scene(sub)
-    sub.add_argument("--error", type=float, default=1e-9, help="largest error in all states (default 1e-9)")
-    add_output(sub, "FILE.json", "write the records")
-    return sub
-
-
-def _speed(options: argparse.Namespace) -> int:
-    from lab.studies import speed
-
-    scene = load_scene(options.scene, options.settings)
-    prepare()
-    speed.run(scene, options.error, options.output, STUDY_DIRECTORY)
-    return 0
-
-
-def _add_scenes(sub: Parser) -> None:
-    sub.add_argument("scenes", nargs="*", metavar="SCENE", help="default: cases 1 to 4, and case 1 with H = 1e8")
-    add_settings(sub)
-    add_study_directory(sub)
-
-
-def _subjects(options: argparse.Namespace) -> Sequence[Scene]:
-    from lab.studies import accuracy
-
-    if options.settings and not options.scenes:
-        raise Refused("--set: allowed: with a SCENE")
-    return [load_scene(name, options.settings) for name in options.scenes] or accuracy.default_scenes()

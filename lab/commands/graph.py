@@ -1,15 +1,12 @@
-"""The studies of the graph: `graph`, `steering` and `free-running`."""
+"""The studies of the graph and of its recorder: `graph`, `steering` and `recorder`."""
 
 from __future__ import annotations
 
 import argparse
-import math
 from typing import Any
 
 from grasp_ros.cli.arguments import add_command, add_scene, whole
 from grasp_ros.cli.checks import load_scene, prepare
-from grasp_ros.graph.running import Running
-from grasp_ros.physics.errors import Refused
 
 Parser = argparse.ArgumentParser
 
@@ -50,24 +47,18 @@ def _steering(options: argparse.Namespace) -> int:
     return 0 if steering.run(scene, options.calls, options.seed) else 1
 
 
-def add_free_running(commands: Any) -> Parser:
-    """`python -m lab free-running`."""
-    text = "a run with the wall clock: states lost, age, jitter"
-    sub = add_command(commands, "free-running", _free_running, text)
+def add_recorder(commands: Any) -> Parser:
+    """`python -m lab recorder`."""
+    sub = add_command(commands, "recorder", _recorder, "recordings are killed: what is left in their bags")
     add_scene(sub)
-    sub.add_argument("--seconds", type=float, default=60.0, metavar="S", help="simulated (default 60)")
-    sub.add_argument("--factor", type=float, default=1.0, metavar="F", help="simulated seconds in one (default 1)")
+    sub.add_argument("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)")
+    sub.add_argument("--seed", type=whole(0), default=0, help="another seed kills at other moments (default 0)")
     return sub
 
 
-def _free_running(options: argparse.Namespace) -> int:
-    from lab.drills import free_running
+def _recorder(options: argparse.Namespace) -> int:
+    from lab.drills import recorder
 
-    Running(real_time_factor=options.factor)  # refuses what is wrong
-    least = 2.0 * options.factor  # the quality of a second is published when it is over
-    if not options.factor or not (math.isfinite(options.seconds) and options.seconds >= least):
-        raise Refused(f"--seconds {options.seconds:g} --factor {options.factor:g}: not allowed; allowed: a factor > 0,"
-                      " and at least two seconds of wall time")
     scene = load_scene(options.scene, options.settings)
     prepare()
-    return 0 if free_running.run(scene, options.seconds, options.factor) else 1
+    return 0 if recorder.run(scene, options.kills, options.seed) else 1

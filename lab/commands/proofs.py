@@ -1,18 +1,17 @@
-"""The studies of what is promised: `domain`, `certificate`, `paper`, `hard`, `fuzz`, `doors` and `faults`."""
+"""The studies of what is promised: `domain`, `paper`, `hard`, `fuzz`, `doors` and `faults`."""
 
 from __future__ import annotations
 
 import argparse
 import math
 import signal
-import sys
 from pathlib import Path
 from typing import Any
 
 from grasp_ros.cli.arguments import add_command, add_output, whole
 from grasp_ros.cli.checks import prepare
 from grasp_ros.physics.errors import Refused
-from lab.commands.docs import add_docs, page_directory
+from lab.commands.shared import add_docs, page_directory
 
 Parser = argparse.ArgumentParser
 QUICK_STARTS = 4
@@ -34,28 +33,10 @@ def _domain(options: argparse.Namespace) -> int:
     return 0
 
 
-def add_certificate(commands: Any) -> Parser:
-    """`python -m lab certificate`."""
-    text = "where the paper's V jumps; limits of the control period"
-    sub = add_command(commands, "certificate", _certificate, text)
-    add_docs(sub)
-    return sub
-
-
-def _certificate(options: argparse.Namespace) -> int:
-    from lab.studies import certificate
-
-    docs = page_directory(options, certificate.PAGE)
-    prepare()
-    certificate.run(docs)
-    return 0
-
-
 def add_paper(commands: Any) -> Parser:
     """`python -m lab paper`."""
     text = "the paper reproduced and judged, with what it lacks"
     sub = add_command(commands, "paper", _paper, text)
-    sub.add_argument("--ros", action="store_true", help="run the eleven cases through the graph as well, some minutes")
     sub.add_argument("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out")
     add_docs(sub)
     add_output(sub, "FILE.html", f"the page, in one file (default {PAPER_PAGE})", PAPER_PAGE)
@@ -63,7 +44,6 @@ def add_paper(commands: Any) -> Parser:
 
 
 def _paper(options: argparse.Namespace) -> int:
-    from grasp_ros.graph.processes import GraphError
     from lab.paper import page, study
     from lab.paper.definitions import RANDOM_STARTS
     from lab.studies import pages
@@ -71,11 +51,7 @@ def _paper(options: argparse.Namespace) -> int:
     docs = page_directory(options, "paper")
     pages.claim(options.output)
     prepare()
-    try:
-        found = study.report(options.ros, QUICK_STARTS if options.quick else RANDOM_STARTS)
-    except GraphError as error:
-        print(f"grasp: {error}", file=sys.stderr)
-        return 1
+    found = study.report(QUICK_STARTS if options.quick else RANDOM_STARTS)
     page.write_html(found, options.output)
     print(found.summary)
     for claim in found.claims:
@@ -108,10 +84,10 @@ def add_fuzz(commands: Any) -> Parser:
     """`python -m lab fuzz`."""
     sub = add_command(commands, "fuzz", _fuzz, "random scenes against all properties")
     sub.add_argument("--seconds", type=float, help="how long (default 60, or until --draws are done)")
-    sub.add_argument("--draws", type=int, help="how many scenes")
-    sub.add_argument("--first", type=int, default=0, help="number of the first draw (default 0)")
-    sub.add_argument("--seed", type=int, default=0, help="another seed draws other scenes (default 0)")
-    sub.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
+    sub.add_argument("--draws", type=whole(1), help="how many scenes")
+    sub.add_argument("--first", type=whole(0), default=0, help="number of the first draw (default 0)")
+    sub.add_argument("--seed", type=whole(0), default=0, help="another seed draws other scenes (default 0)")
+    sub.add_argument("--jobs", type=whole(1), default=1, help="processes (default 1)")
     add_docs(sub)
     text = "where scenes that fail are written (default runs/fuzz); with --docs what is known there is not drawn again"
     add_output(sub, "DIRECTORY", text, Path("runs") / "fuzz")
@@ -122,10 +98,6 @@ def _fuzz(options: argparse.Namespace) -> int:
     from lab.drills import fuzz, random_scenes
 
     seconds = _seconds(options.seconds, options.draws)
-    for name, least in (("draws", 1), ("first", 0), ("seed", 0), ("jobs", 1)):
-        value = getattr(options, name)
-        if value is not None and value < least:
-            raise Refused(f"--{name} {value} is not allowed; allowed: a whole number >= {least}")
     docs = page_directory(options, "fuzz")
     prepare()
     memory = None if docs is None else random_scenes.Kept(options.output, options.seed)

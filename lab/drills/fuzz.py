@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
@@ -23,6 +23,9 @@ from grasp_ros.scene.files import writing
 from lab.cases.degenerate import draw_scene
 from lab.cases.draw import inside
 from lab.oracles.properties import Check, Examination, examine
+
+if TYPE_CHECKING:
+    from lab.drills.random_scenes import Kept
 
 CHUNK = 50  # draws that a process does at once
 COMPARED = 5000  # every how many scenes one is compared with the reference
@@ -118,16 +121,6 @@ def draw(seed: int, number: int) -> Scene:
     return inside(draw_scene, np.random.default_rng((seed, number)))
 
 
-class Memory(Protocol):
-    """What keeps the books of chunks of draws, so that a search goes on where it ended."""
-
-    def get(self, numbers: range) -> Book | None:
-        """What became of these draws, if that is known."""
-
-    def put(self, numbers: range, book: Book) -> None:
-        """Keep what became of these draws."""
-
-
 def check_draws(seed: int, numbers: Iterable[int]) -> Book:
     """Draw scenes and check them; an exception is a failure."""
     book = Book()
@@ -148,7 +141,7 @@ def _check(number: int, scene: Scene) -> Drawn:
 
 
 def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int | None = None, first: int = 0,
-        jobs: int = 1, memory: Memory | None = None) -> Book:
+        jobs: int = 1, memory: Kept | None = None) -> Book:
     """Draw scenes until the time is over or enough are drawn; print what became of them, write those that fail.
 
     Parameters
@@ -162,7 +155,7 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
         Number of the first draw.
     jobs : int
         Processes.
-    memory : Memory, optional
+    memory : Kept, optional
         What it knows is not drawn again.
 
     Returns
@@ -188,7 +181,7 @@ def run(seed: int, directory: Path, *, seconds: float | None = None, draws: int 
     return book
 
 
-def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Memory | None) -> Iterator[Book]:
+def _chunks(seed: int, draws: int | None, first: int, jobs: int, memory: Kept | None) -> Iterator[Book]:
     """The books of all chunks in their order; what is new is kept in `memory`."""
     starts = count(first, CHUNK) if draws is None else range(first, first + draws, CHUNK)
     end = None if draws is None else first + draws

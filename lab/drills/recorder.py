@@ -1,4 +1,4 @@
-"""What the recorder costs and what it survives: bytes and time per tick, and recordings that are killed."""
+"""What the recorder survives: recordings that are killed."""
 
 from __future__ import annotations
 
@@ -64,30 +64,6 @@ def write(path: Path, run: Trajectory) -> None:
     recorder.close()
 
 
-class Cost(NamedTuple):
-    """What a tick takes."""
-
-    raw: float  # bytes of its messages
-    size: float  # bytes in the bag
-    seconds: float  # of the process
-
-
-def cost(scene: Scene) -> Cost:
-    """Bytes and processor time per tick of a recording."""
-    ticks = list(ticks_of(simulate(scene, sampled=True)))
-    with tempfile.TemporaryDirectory() as directory:
-        path = Path(directory) / "bag"
-        recorder = Recorder(path, scene, {})
-        begin = time.process_time()
-        for tick in ticks:
-            recorder.write_tick(*tick)
-        recorder.close()
-        seconds = time.process_time() - begin
-        size = (path / "bag.mcap").stat().st_size
-    raw = sum(len(cdr) for _, messages in ticks for _, cdr in messages)
-    return Cost(raw / len(ticks), size / len(ticks), seconds / len(ticks))
-
-
 class Kill(NamedTuple):
     """A recording that was killed."""
 
@@ -146,12 +122,8 @@ def _record(path: Path, scene: Scene, ticks: list[Tick], times: Array) -> None:
 
 
 def run(scene: Scene, kills: int, seed: int) -> bool:
-    """Print what a tick costs and how many kills were survived; returns whether all were."""
-    found = cost(scene)
+    """Print how many kills were survived; returns whether all were."""
     print(f"{scene.title}: {scene.ticks + 1} ticks")
-    print(f"messages of a tick  {found.raw:.0f} bytes")
-    print(f"in the bag          {found.size:.0f} bytes, with index and metadata")
-    print(f"processor           {1e6 * found.seconds:.1f} us a tick")
     rng, ticks = np.random.default_rng(seed), list(ticks_of(simulate(scene, sampled=True)))
     ends = [kill(scene, ticks, rng.uniform(0.0, LONGEST_SECONDS)) for _ in tqdm(range(kills), unit="kill")]
     survived = sum(end.survived for end in ends)

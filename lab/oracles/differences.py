@@ -6,7 +6,6 @@ STRIDE; where two neighbours agree best, their disagreement is what is left of b
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from typing import NamedTuple
 
@@ -20,7 +19,7 @@ from grasp_ros.scene import Scene, SceneError
 from grasp_ros.sensitivity.directions import check_key
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.sensitivities import sensitivities
-from lab.cases.draw import Draw, draw_ordinary, inside
+from lab.cases.draw import draw_ordinary, inside
 
 SEED = 1990
 STRIDE, STEPS = 8.0, 13  # from a tenth of the number down to some 1e-12 of it
@@ -58,10 +57,10 @@ def smooth_keys(scene: Scene) -> list[tuple[str, float]]:
     return found
 
 
-def judge_draw(number: int, make: Callable[[Draw], Scene] = draw_ordinary) -> tuple[str, Verdict]:
+def judge_draw(number: int) -> tuple[str, Verdict]:
     """Draw a natural scene and one of its numbers, and compare; what was drawn, and what became of it."""
     rng = np.random.default_rng([SEED, number])
-    scene = inside(make, rng)
+    scene = inside(draw_ordinary, rng)
     keys = smooth_keys(scene)
     key, size = keys[int(rng.integers(len(keys)))]
     return f"# draw {number}, by {key}\n{scene.to_yaml()}", judge(scene, key, size)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.layout import EPS, OBJECT, Law, Of, Pair, Slide, Transition
 from grasp_ros.physics.model import Array
-from lab.oracles.rounding_bounds import TINY, Impacts, impacts, push_noise, sizes
+from lab.oracles.rounding_bounds import TINY, Impacts, accelerations, impacts, push_noise, sizes
 from lab.oracles.segments import Detail
 
 BEFORE: dict[Transition, tuple[int, ...]] = {  # modes that an event ends
@@ -42,7 +42,7 @@ def findings(detail: Detail) -> Iterator[Finding]:
     """All relations between events and states."""
     size = sizes(detail)
     pairs = impacts(detail, size)
-    acting = _acceleration(detail, pairs)
+    acting = accelerations(detail, pairs, apart=True)
     for pair in pairs:
         others = [other for other in pairs if other is not pair]
         beside = sum((EPS * other.bounce + other.sudden[:, None] for other in others), np.zeros_like(pair.bounce))
@@ -51,19 +51,6 @@ def findings(detail: Detail) -> Iterator[Finding]:
         yield from _pair_events(detail, pair, unit)
     if detail.run.scene.system.coulomb > 0.0:
         yield from _object(detail, pairs, acting)
-
-
-def _acceleration(detail: Detail, pairs: list[Impacts]) -> Array:
-    """Sizes of the accelerations (k, n + 2, 3), the terms without their signs, in m/s^2."""
-    mass, stiffness, damping, force = (np.abs(detail.bodies[:, None, :, column])
-                                       for column in (Of.MASS, Of.STIFFNESS, Of.DAMPING, Of.FORCE))
-    total = stiffness * np.abs(detail.x) + damping * np.abs(detail.v) + force
-    total[..., OBJECT] += detail.run.scene.system.coulomb
-    for pair in pairs:
-        total[..., pair.side] += pair.force
-        total[..., OBJECT] += pair.force
-    found: Array = total / np.where(mass > 0.0, mass, 1.0)
-    return found
 
 
 def _units(detail: Detail, pair: Impacts, beside: Array, acting: Array) -> Units:

@@ -143,15 +143,19 @@ def _with_way(detail: Detail, own: Array) -> Array:
     return found
 
 
-def accelerations(detail: Detail, pairs: list[Impacts]) -> Array:
-    """Sizes of the accelerations (k, n + 2, 3) in m/s^2, from the model; of dry friction no more than its limit."""
+def accelerations(detail: Detail, pairs: list[Impacts], apart: bool = False) -> Array:
+    """Sizes of the accelerations (k, n + 2, 3) in m/s^2, from the model; of dry friction no more than its limit.
+
+    Terms of other signs cancel, unless each counts apart.
+    """
+    size = np.abs if apart else np.asarray
     mass, stiffness, damping, force = (detail.bodies[:, None, :, column]
                                        for column in (Of.MASS, Of.STIFFNESS, Of.DAMPING, Of.FORCE))
-    total = force - stiffness * detail.x - damping * detail.v
+    total = size(force) + size(-stiffness * detail.x) + size(-damping * detail.v)
     for pair in pairs:
         push = pair.force if pair.side == LEFT else -pair.force
-        total[..., pair.side] -= push
-        total[..., OBJECT] += push
+        total[..., pair.side] += size(-push)
+        total[..., OBJECT] += size(push)
     total = np.abs(total)
     total[..., OBJECT] += detail.run.scene.system.coulomb
     found: Array = total / np.where(mass > 0.0, mass, 1.0)

@@ -102,7 +102,6 @@ class Stepped(NamedTuple):
     step: float  # s
     error: float  # largest error of a position within 20 s, m
     drift: float  # of V_c in case 2 relative; elsewhere of V_c at 20 s against the exact one, in V_c(0)
-    rise: float  # largest rise of V_c, in V_c(0)
     touches: float  # found over those that there are
     first: float  # error of the first time of contact, s
 
@@ -117,13 +116,11 @@ def _stepped(number: int, scene: Scene, step: float) -> Stepped:
     theirs = simulate(scene, method="paper", setting=step)
     level, own = theirs.energy.V_c, exact.energy.V_c
     error = float(np.abs(theirs.state[:, 0::2] - exact.state[:, 0::2]).max())
-    rise = float((level - np.minimum.accumulate(level)).max() / level[0])
     return Stepped(
         number,
         step,
         error,
         float((level[-1] - own[-1]) / own[0]),
-        rise,
         contacts_found(step, scene),
         first_contact_error(step, scene).value,
     )

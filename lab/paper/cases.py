@@ -44,23 +44,15 @@ OFFSETS = tuple(sign * size for size in np.geomspace(1e-12, 1e-6, 32).tolist() f
 SEED = 1990
 NEAREST, FARTHEST = 0.1, 0.5  # m, of random starts
 SIDES = ("left", "right")
+_KEYS = {
+    "m": "arm.mass_kg", "k": "arm.stiffness_N_per_m", "c": "arm.damping_Ns_per_m",
+    "Kp": "feedback.position_gain_N_per_m", "Kv": "feedback.velocity_gain_Ns_per_m",
+    "p": "contact.dissipation_s_per_m", "H": "contact.hertz_N_per_m1_5",
+}
 KEYS: Mapping[str, tuple[str, ...]] = {  # letters of the paper to keys of a scene, both sides where there are two
-    "m": ("left_arm.mass_kg", "right_arm.mass_kg"),
-    "m_l": ("left_arm.mass_kg",),
-    "m_r": ("right_arm.mass_kg",),
-    "k_l": ("left_arm.stiffness_N_per_m",),
-    "c_l": ("left_arm.damping_Ns_per_m",),
-    "Kp_l": ("left_feedback.position_gain_N_per_m",),
-    "Kv_l": ("left_feedback.velocity_gain_Ns_per_m",),
-    "p_l": ("left_contact.dissipation_s_per_m",),
-    "H_l": ("left_contact.hertz_N_per_m1_5",),
+    **{letter: (f"left_{key}", f"right_{key}") for letter, key in _KEYS.items()},
+    **{f"{letter}_{side[0]}": (f"{side}_{key}",) for letter, key in _KEYS.items() for side in SIDES},
     "m_o": ("object.mass_kg",),
-    "k": ("left_arm.stiffness_N_per_m", "right_arm.stiffness_N_per_m"),
-    "c": ("left_arm.damping_Ns_per_m", "right_arm.damping_Ns_per_m"),
-    "Kp": ("left_feedback.position_gain_N_per_m", "right_feedback.position_gain_N_per_m"),
-    "Kv": ("left_feedback.velocity_gain_Ns_per_m", "right_feedback.velocity_gain_Ns_per_m"),
-    "p": ("left_contact.dissipation_s_per_m", "right_contact.dissipation_s_per_m"),
-    "H": ("left_contact.hertz_N_per_m1_5", "right_contact.hertz_N_per_m1_5"),
 }
 UNIT_OF: Mapping[str, str] = {
     "m": "kg", "k": "N/m", "c": "N s/m", "Kp": "N/m", "Kv": "N s/m", "p": "s/m", "H": "N/m^1.5",

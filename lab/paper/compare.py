@@ -124,7 +124,7 @@ class Comparison(NamedTuple):
         share = sum(map(self.true_of, found)) / len(found)
         if np.isnan(found).all():  # equal arms from a symmetric start, say: true, or not, whatever the other scene is
             return Check(Kind.TRIVIAL, text, f"{pairs[0][0]:.4g} against 0: no ratio", 0.0, False)
-        unit = UNITS[self.measure]
+        unit = UNITS.get(self.measure, "")
         a, b = (
             seconds(several) if self.measure.startswith("settling") else f"{several[0]:.4g}{unit}"
             for several in zip(*pairs, strict=True)

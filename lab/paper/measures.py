@@ -45,17 +45,7 @@ NAMES: Mapping[str, str] = {
     "input": "largest input force",
     "lopsided": "largest |x_l + x_r| over 20 s",
 }
-UNITS: Mapping[str, str] = {
-    "settling": " s",
-    "settling_1": " s",
-    "settling_5": " s",
-    "swings": "",
-    "rest": "",
-    "size": "",
-    "frequency": " Hz",
-    "input": " N",
-    "lopsided": "",
-}
+UNITS: Mapping[str, str] = {"frequency": " Hz", "input": " N"}  # times have words of their own, the others none
 SHORT: Mapping[str, str] = {  # ratios, where there is little room
     "settling": "settling time, ratio",
     "rest": "$V_c$ at 20 s, ratio",

@@ -37,7 +37,6 @@ class Rates(NamedTuple):
     V_c_rise: float
     rate: float  # largest V_rate by (18), in V(0) per s
     flight: float  # largest |V_rate| with nothing in contact
-    contact: float  # largest V_rate with something in contact
     clearance: float  # smallest margin of (37), in the larger epsilon
     collision: float  # smallest of the collision terms of (18), W
 
@@ -74,7 +73,6 @@ def rates(scene: Scene) -> Rates:
         float(np.diff(level.V_c).max()) / start,
         float(level.V_rate.max()) / start,
         float(np.abs(level.V_rate[open_]).max(initial=0.0)) / start,
-        float(level.V_rate[~open_].max(initial=-np.inf)) / start,
         clearance / max(float(epsilon.max()), 1e-300),
         min(float(term.min()) for term in terms),
     )
@@ -158,12 +156,13 @@ def distance_of_states(scene: Scene, a: Array, b: Array) -> Array:
     return np.asarray(np.linalg.norm((np.asarray(a) - b) * state_weights(scene.system), axis=-1))
 
 
-def nearest_return(scene: Scene, seconds: float, step: float = 1e-3) -> tuple[float, float]:
+def nearest_return(scene: Scene, seconds: float) -> tuple[float, float]:
     """When a motion comes back nearest to its start, in s, and how near, in sqrt(V(0)).
 
     The first swing away from the start does not count: it ends where the distance is largest within the first second.
     """
     scene = scene.changed({"time.duration_s": seconds})
+    step = 1e-3
     grid = np.linspace(0.0, seconds, round(seconds / step) + 1)
     states = simulate(scene, grid=grid).state
     start = scene.initial_state

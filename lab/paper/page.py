@@ -64,8 +64,6 @@ class Report(NamedTuple):
     results: Sequence[Result]
     doubts: Sequence[tuple[str, str]]
     replays: Sequence[dict[str, Any]]
-    graph_heads: Row
-    graph: Sequence[Row]
     origin: str
     images: Mapping[str, Image]
 
@@ -112,7 +110,7 @@ def write_markdown(report: Report, path: Path) -> None:
     """
     environment = jinja2.Environment(autoescape=False, undefined=jinja2.StrictUndefined)
     told = _told(report.claims)
-    environment.filters |= {"cell": _cell, "row": _row, "rule": _rule, "told": told.__getitem__}
+    environment.filters |= {"cell": _cell, "told": told.__getitem__}
     directory = path.parent / FIGURES
     with writing(directory):
         directory.mkdir(parents=True, exist_ok=True)
@@ -161,11 +159,3 @@ def _figure(svg: bytes, text: str) -> Markup:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(map(_cell, cells))} |"
-
-
-def _rule(cells: Sequence[str]) -> str:
-    return f"|{'---|' * len(cells)}"

@@ -52,7 +52,6 @@ class Reading(NamedTuple):
 class Compared(NamedTuple):
     """A figure of the paper against ours."""
 
-    number: int
     readings: Sequence[Reading]
     claims: Sequence[tuple[str, Verdict]]  # what the paper says of the curves
 
@@ -73,7 +72,7 @@ def compared(figure: Figure, cases: Cases, claims: Sequence[Claim]) -> Compared:
     """Read a figure and judge it; `claims` are those of the whole paper."""
     found = {claim.key: claim.verdict for claim in claims}
     drawn = [(key, found[key]) for key in USED_BY[figure.number]]
-    return Compared(figure.number, list(_readings(figure, cases)), drawn)
+    return Compared(list(_readings(figure, cases)), drawn)
 
 
 def _readings(figure: Figure, cases: Cases) -> Iterator[Reading]:

@@ -43,7 +43,6 @@ from lab.paper.prints import compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import replay
 from lab.paper.results import Beyond, results
-from lab.paper.ros import HEADS, through_the_graph
 from lab.paper.svg import short_svg
 
 DPI = 220
@@ -51,16 +50,8 @@ COLORS = 256  # of a PNG file
 Job = tuple[str, Callable[..., Any], tuple[Any, ...], Known]  # what comes out, how, of what, and what is known
 
 
-def report(graph: bool, starts: int) -> Report:
-    """Compute everything.
-
-    Parameters
-    ----------
-    graph : bool
-        Whether to run the eleven cases through the graph as well.
-    starts : int
-        Random starts.
-    """
+def report(starts: int) -> Report:
+    """Compute everything, with so many random starts."""
     cases, drawn = load_cases(), random_starts(starts)
     wishes = wishes_of(cases, drawn)
     wanted = pieces([*chain.from_iterable(wishes), *arms.wishes(cases, drawn)])
@@ -81,8 +72,7 @@ def report(graph: bool, starts: int) -> Report:
         for key, value in pool.imap_unordered(_called, jobs):
             done.setdefault(key, []).append(value)
             bar.update()
-    rows = through_the_graph(cases) if graph else []
-    return _put_together(cases, drawn, done, rows)
+    return _put_together(cases, drawn, done)
 
 
 def _called(job: Job) -> tuple[str, Any]:
@@ -95,16 +85,16 @@ def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
     """What can be computed at the same time, the longest first."""
     settled = found_of(arms.wishes(cases, drawn))
     several: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = [
-        ("found", _chaos, (cases,)),
-        ("found", _stiffer, (cases, drawn)),
-        ("found", _damped, (cases, drawn)),
+        ("found", _further, ("chaos", beyond.chaos, (cases, started(cases[2], SYMMETRIC)), beyond_figures.chaos)),
+        ("found", _further, ("stiffer", arms.stiffer, (cases, drawn), beyond_figures.stiffer)),
+        ("found", _further, ("damped", arms.damped, (cases, drawn), beyond_figures.damped)),
         ("image", _sheet, (cases,)),
         ("equations", equations, (cases,)),
         *(("image", _large, (figure, cases)) for figure in FIGURES),
-        ("found", _gap, (cases,)),
-        ("found", _tail, (cases,)),
+        ("found", _further, ("gap", beyond.gap, (cases,), beyond_figures.gap)),
+        ("found", _further, ("tail", beyond.tail, (cases[1],), beyond_figures.tail)),
         ("found", _stepped, (cases,)),
-        ("found", _edge, (cases,)),
+        ("found", _further, ("edge", knife_edge, (cases,), beyond_figures.edge)),
         ("quantities", quantities, (cases,)),
         ("doubts", doubts, (cases,)),
         ("replays", _replays, (cases,)),
@@ -142,38 +132,16 @@ def _large(figure: Figure, cases: Cases) -> tuple[str, Image]:
     return f"fig_{figure.number:02d}", image(figures.large(figures.pictured(figure, cases)))
 
 
-def _chaos(cases: Cases) -> tuple[str, Any, Image]:
-    found = beyond.chaos(cases, started(cases[2], SYMMETRIC))
-    return "chaos", found, image(beyond_figures.chaos(found))
-
-
-def _gap(cases: Cases) -> tuple[str, Any, Image]:
-    found = beyond.gap(cases)
-    return "gap", found, image(beyond_figures.gap(found))
-
-
-def _tail(cases: Cases) -> tuple[str, Any, Image]:
-    found = beyond.tail(cases[1])
-    return "tail", found, image(beyond_figures.tail(found))
-
-
-def _stiffer(cases: Cases, drawn: list[Start]) -> tuple[str, Any, Image]:
-    found = arms.stiffer(cases, drawn)
-    return "stiffer", found, image(beyond_figures.stiffer(found))
-
-
-def _damped(cases: Cases, drawn: list[Start]) -> tuple[str, Any, Image]:
-    found = arms.damped(cases, drawn)
-    return "damped", found, image(beyond_figures.damped(found))
+def _further(
+    key: str, compute: Callable[..., Any], arguments: tuple[Any, ...], draw: Callable[[Any], Any]
+) -> tuple[str, Any, Image]:
+    """What the paper lacks, and its figure."""
+    found = compute(*arguments)
+    return key, found, image(draw(found))
 
 
 def _stepped(cases: Cases) -> tuple[str, Any, Image]:
     return "stepped", arms.stepped(cases), image(beyond_figures.stepped(cases))
-
-
-def _edge(cases: Cases) -> tuple[str, Any, Image]:
-    found = knife_edge(cases)
-    return "edge", found, image(beyond_figures.edge(found))
 
 
 def _replays(cases: Cases) -> list[dict[str, Any]]:
@@ -221,9 +189,7 @@ def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]
     return found
 
 
-def _put_together(
-    cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]], graph: list[Any]
-) -> Report:
+def _put_together(cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]]) -> Report:
     claims = claims_of(dict(done["part"]))
     found = {key: value for key, value, _ in done["found"]}
     images = {**dict(done["image"]), **{key: each for key, _, each in done["found"]}}
@@ -238,6 +204,6 @@ def _put_together(
         summary=summary(claims), claims=claims,
         sweeps=SWEEPS, pictures=[picture(figure, cases, claims) for figure in FIGURES], quantity_heads=heads,
         quantities=amounts, prints=PRINTS, agreement=agreement(rows), equations=rows, results=results(further),
-        doubts=doubtful, replays=replays, graph_heads=HEADS, graph=graph, images=images,
+        doubts=doubtful, replays=replays, images=images,
         origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".",
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 import gmpy2
 from gmpy2 import mpfr
@@ -47,8 +46,8 @@ class Run(Automaton):
         Ascending times.
     digits : int
         Each step keeps this many, and some more.
-    seconds, budget : float
-        Limits of wall time and of steps.
+    budget : float
+        Limit of steps.
 
     Attributes
     ----------
@@ -57,14 +56,13 @@ class Run(Automaton):
     steps : int
     """
 
-    def __init__(self, plant: Plant, x: Reals, v: Reals, outputs: Reals, digits: int, seconds: float = math.inf,
-                 budget: float = math.inf) -> None:
+    def __init__(self, plant: Plant, x: Reals, v: Reals, outputs: Reals, digits: int, budget: float) -> None:
         super().__init__(plant, x, v, mpfr(10) ** -(digits + EXTRA_DIGITS))
         self.order = math.ceil(ORDER * (digits + EXTRA_DIGITS))
         self.rows: list[Row] = []
         self.steps = 0
         self._outputs = list(outputs)
-        self._budget, self._last = budget, time.monotonic() + seconds
+        self._budget = budget
         self._lasted = mpfr(0)  # duration of the last step
         self._collocation, self._rest = mpfr(0), 0  # next step of it, Taylor steps before it
 
@@ -74,13 +72,13 @@ class Run(Automaton):
         Raises
         ------
         Deadline
-            If the wall time or the steps are used up; what was reached stays.
+            If the steps are used up; what was reached stays.
         RuntimeError
             If the modes contradict each other.
         """
         still = 0
         while self.state.t < end:
-            if time.monotonic() > self._last or self.steps >= self._budget:
+            if self.steps >= self._budget:
                 raise Deadline
             before = self.state.t
             self._step(end)

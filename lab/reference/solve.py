@@ -121,7 +121,7 @@ def integrate(
         arms = [_arm(arm, push, feedback, decimal) for arm, push in zip((grasp.left, grasp.right), force, strict=True)]
         laws = _law(grasp.left_contact, decimal), _law(grasp.right_contact, decimal)
         plant = Plant((arms[LEFT], arms[RIGHT], Body.of(mass, zero, zero, zero)), laws, zero)
-        run = Run(plant, *_by_body(start), grid, digits, budget=STEP_BUDGET)
+        run = Run(plant, *_by_body(start), grid, digits, STEP_BUDGET)
         try:
             run.advance(grid[-1])
         except Deadline:
@@ -134,8 +134,7 @@ def _by_body(start: Reals) -> tuple[Reals, Reals]:
     return [start[0], start[4], start[2]], [start[1], start[5], start[3]]
 
 
-def integrate_scene(scene: Scene, times: Iterable[float], digits: int = 25, seconds: float = math.inf,
-                    budget: float = math.inf) -> Reference:
+def integrate_scene(scene: Scene, times: Iterable[float], digits: int = 25, budget: float = math.inf) -> Reference:
     """The motion of a scene in high precision.
 
     The floats of the system that the scene makes are taken exactly; forces act from tick to tick, and commands are
@@ -148,9 +147,8 @@ def integrate_scene(scene: Scene, times: Iterable[float], digits: int = 25, seco
         Ascending, within the horizon.
     digits : int
         See `integrate`.
-    seconds, budget : float
-        Limits of wall time, looked at between steps, and of steps; the states at the times reached until then are
-        given.
+    budget : float
+        Limit of steps; the states at the times reached until then are given.
 
     Returns
     -------
@@ -165,7 +163,7 @@ def integrate_scene(scene: Scene, times: Iterable[float], digits: int = 25, seco
         grid = [number(float(t)) for t in times]
         plant = _plant(scene)
         start = [number(value) for value in scene.system.state.tolist()]
-        run = Run(plant, *_by_body(start), grid, digits, seconds, budget)
+        run = Run(plant, *_by_body(start), grid, digits, budget)
         system, waiting = scene.system, [[mpfr(0)] * 3] * scene.system.delay
         try:
             for tick, following in pairwise(_ticks(scene)):

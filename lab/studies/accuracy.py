@@ -14,20 +14,21 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.accuracy.compare import by_method
+from grasp_ros.accuracy.compare import by_method, fastest
 from grasp_ros.accuracy.contender import Contender
 from grasp_ros.accuracy.measure import Record
-from grasp_ros.methods import registry
 from grasp_ros.scene import Scene
 from lab.studies import measure
-from lab.studies.contenders import OURS, all_contenders
 from lab.studies.measure import Effort
-from lab.studies.records import Journal, describe_machine, metric, origin, scene_key, write_csv
+from lab.studies.records import Journal, origin, scene_key
 
 STANDARD = ("case_01", "case_02", "case_03", "case_04")
 STIFF = ("case_01", 1e8)  # ten thousand times the paper's Hertz coefficient
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-11)
-METRIC = metric(simulation.GRID_POINTS, measure.DIGITS)
+METRIC = (  # the label of every axis and column that shows `Record.error`
+    f"largest absolute error over six states (m, m/s) and {simulation.GRID_POINTS} output times,"
+    f" against a reference of {measure.DIGITS} digits"
+)
 
 
 def default_scenes() -> list[Scene]:
@@ -42,17 +43,7 @@ def default_scenes() -> list[Scene]:
 
 
 def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: Sequence[Contender]) -> list[Record]:
-    """Measure what is not in the journal yet; returns all records of these scenes.
-
-    Raises
-    ------
-    Refused
-        If a scene is one that the contenders cannot treat, see `measure.check` and `methods.registry.check`.
-    """
-    for scene in subjects:
-        registry.check("paper", scene, None)
-        if any(contender.name not in registry.METHODS for contender in contenders):
-            measure.check(scene)
+    """Measure what is not in the journal yet; returns all records of these scenes."""
     journal = Journal(directory)
     records: list[Record] = []
     ladders = [contender.ladder[:: effort.stride] for contender in contenders]
@@ -62,7 +53,6 @@ def run(subjects: Sequence[Scene], directory: Path, effort: Effort, contenders: 
                 bar.set_description(f"{scene.name} {contender.name}")
                 records += climb(contender, ladder, scene, journal, effort)
                 bar.update(len(ladder))
-    write_csv(records, directory / "records.csv")
     return records
 
 
@@ -76,7 +66,7 @@ def climb(
         key = f"{scene_key(scene)} {made_by} {contender.name} {setting!r} {effort.budget}"
         kept = journal.get(key, Record)
         if kept is None:
-            record, _ = measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
+            record = measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
             journal.put(key, record)
         else:
             record = kept._replace(scene=scene.name)
@@ -84,12 +74,6 @@ def climb(
         if measure.given_up(record, effort):
             break
     return records
-
-
-def fastest(records: Iterable[Record], error: float) -> Record | None:
-    """The record that reaches an error in the least time."""
-    reached = [record for record in records if record.good and record.error is not None and record.error <= error]
-    return min(reached, key=lambda record: record.time, default=None)
 
 
 def frontier(records: Iterable[Record]) -> list[Record]:
@@ -119,20 +103,3 @@ def summary(records: Sequence[Record]) -> list[str]:
             f"  {last.knob} {last.setting:.0e}: {last.status}"
         )
     return lines
-
-
-def report(records: Sequence[Record]) -> str:
-    """The text that the command prints."""
-    lines = [
-        f"error: {METRIC}", "time: fastest warm run",
-        "misses: settings at which the count of touches is wrong; -: does not look for them",
-    ]
-    lines += [f"{name} {version}" for name, version in describe_machine().items()]
-    for name in dict.fromkeys(record.scene for record in records):
-        lines += ["", name, *summary([record for record in records if record.scene == name])]
-    return "\n".join(lines)
-
-
-def quick_contenders() -> list[Contender]:
-    """Without the outside peers, some of which compile for seconds."""
-    return [contender for contender in all_contenders() if contender.family == OURS]

@@ -10,6 +10,7 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
+from grasp_ros.accuracy.compare import fastest
 from grasp_ros.accuracy.measure import Record, seconds
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
@@ -27,7 +28,7 @@ from lab.studies import (
     speed,
     stability,
 )
-from lab.studies.contenders import all_contenders, own_contenders
+from lab.studies.contenders import OURS, all_contenders, own_contenders
 from lab.studies.records import Journal, write_csv
 
 LOOP_SCENE = "case_01"
@@ -59,12 +60,9 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     subjects = accuracy.default_scenes()
     case = scenes.load(LOOP_SCENE)
     if quick:
-        subjects = [predictability.horizon(scene, QUICK_S) for scene in subjects[:2]]
-        case = predictability.horizon(case, QUICK_S)
-    effort, contenders = (
-        (measure.QUICK, accuracy.quick_contenders()) if quick else (measure.FULL, all_contenders())
-    )
-    records = accuracy.run(subjects, directory, effort, contenders)
+        *subjects, case = (scene.changed({"time.duration_s": QUICK_S}) for scene in (*subjects[:2], case))
+    records = accuracy.run(subjects, directory, measure.QUICK if quick else measure.FULL, [
+        contender for contender in all_contenders() if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
     limits = stability.limits(case.grasp.left)
@@ -91,8 +89,8 @@ def _profiles(subjects: Sequence[Scene], records: Sequence[Record]) -> list[prof
     found = []
     for scene in subjects:
         own = [record for record in records if (record.scene, record.method) == (scene.name, EXACT)]
-        fastest = accuracy.fastest(own, accuracy_rows.ERROR)
-        found.append(profile.profile(scene, METHODS[EXACT].default if fastest is None else fastest.setting))
+        first = fastest(own, accuracy_rows.ERROR)
+        found.append(profile.profile(scene, METHODS[EXACT].default if first is None else first.setting))
     return found
 
 

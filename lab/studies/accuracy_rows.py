@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.accuracy.compare import by_method
+from grasp_ros.accuracy.compare import by_method, fastest
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.contract import TOLERANCE
 from grasp_ros.methods.registry import EXACT, METHODS
@@ -47,7 +47,7 @@ def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
     for name, here in scenes.items():
         mine = [record for record in here if record.method == EXACT]
         others = [record for record in here if record.method != EXACT]
-        pairs = [(accuracy.fastest(mine, error), accuracy.fastest(others, error)) for error in accuracy.TARGETS]
+        pairs = [(fastest(mine, error), fastest(others, error)) for error in accuracy.TARGETS]
         rows.append([name, *(f"{_cell(own)}; {_cell(other)}" for own, other in pairs)])
         own, other = pairs[accuracy.TARGETS.index(ERROR)]
         if own is not None:
@@ -61,7 +61,7 @@ def _choice(scenes: dict[str, list[Record]]) -> dict[str, Any]:
 def _paper(name: str, here: Sequence[Record]) -> list[str]:
     """What the paper's method costs on a scene."""
     runs = [record for record in here if record.method == "paper"]
-    found, own = accuracy.fastest(runs, LOOSE), _fastest(here, [EXACT], LOOSE)
+    found, own = fastest(runs, LOOSE), _fastest(here, [EXACT], LOOSE)
     best = min((record for record in runs if record.good), key=lambda record: record.error or 0.0, default=None)
     return [
         name, "not reached" if found is None else f"step {found.setting:g} s, {milliseconds(found)}",
@@ -130,7 +130,7 @@ def topics(title: str, points: Sequence[Point], limits: Sequence[Limit]) -> dict
     order = np.polyfit(np.log([p.period_ms for p in finest]), np.log([p.deviation for p in finest]), 1)[0]
     edges = []
     for limit in limits:
-        growth = ", ".join(f"{g:.5f} at {1e3 * h:.2f} ms" for h, _, g in limit.checks)
+        growth = ", ".join(f"{g:.5f} at {1e3 * h:.2f} ms" for h, g in limit.checks)
         edges.append([f"{limit.delay} periods", f"{1e3 * limit.period:.10g} ms", growth])
     return {"scene": title, "rows": rows, "order": order, "limits": edges}
 
@@ -159,7 +159,7 @@ def last_state(timings: dict[str, list[Timing]]) -> dict[str, Any]:
 
 
 def _fastest(records: Sequence[Record], names: Sequence[str], error: float) -> Record | None:
-    return accuracy.fastest([record for record in records if record.method in names], error)
+    return fastest([record for record in records if record.method in names], error)
 
 
 def _cell(record: Record | None) -> str:

@@ -82,11 +82,3 @@ def _measure(contender: Contender, scene: Scene, setting: float) -> Drift:
     level = energy(scene.system, answer.state).V_c
     drift = level / energy(scene.system, scene.initial_state).V_c - 1.0
     return Drift(contender.name, text, grid[: len(level)].tolist(), drift.tolist(), seconds, answer.status)
-
-
-def report(drifts: list[Drift]) -> str:
-    """Lines: the largest relative drift, and what it cost."""
-    lines = [f"{'energy drift, largest relative':28}{'setting':18}{'drift':>9}{'seconds':>9}  status"]
-    for row in sorted(drifts, key=lambda row: row.worst):
-        lines.append(f"  {row.method:26}{row.setting:18}{row.worst:9.1e}{row.seconds:9.2f}  {row.status}")
-    return "\n".join(lines)

@@ -20,6 +20,7 @@ from lab.studies.accuracy import frontier
 from lab.studies.drift import Drift
 from lab.studies.loop import Point
 from lab.studies.predictability import LEVELS, Prediction
+from lab.studies.records import by_scene
 
 COLORS = {  # by the beginning of a method's name; distinguishable for colour-blind readers
     "exact": "#000000", "paper": "#d55e00", "rk45": "#56b4e9", "rk4": "#e69f00", "discrete": "#8c6d1f",
@@ -49,10 +50,9 @@ def style(method: str) -> dict[str, Any]:
 
 def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
     """Error against time, one panel a scene, with the frontier that no method passes."""
-    names = list(dict.fromkeys(record.scene for record in records))
-    figure, panels = _panels(len(names) + 1)
-    for axes, name in zip(panels, names, strict=False):
-        here = [record for record in records if record.scene == name]
+    scenes = by_scene(records)
+    figure, panels = _panels(len(scenes) + 1)
+    for axes, (name, here) in zip(panels, scenes.items(), strict=False):
         for method, group in by_method(here).items():
             good = [record for record in group if record.good]
             axes.plot(*_points(good), **style(method))
@@ -71,7 +71,7 @@ def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
             )
         axes.set(xscale="log", yscale="log", ylim=(1e-14, 1e2), xlabel="fastest warm run, s")
         axes.grid(alpha=0.25, which="major")
-    _method_legend(panels[len(names)], list(by_method(records)))
+    _method_legend(panels[len(scenes)], list(by_method(records)))
     figure.supylabel("error: " + metric.replace(", against", ",\nagainst"), fontsize="small")
     save(figure, path, DPI)
 
@@ -94,12 +94,12 @@ def _method_legend(axes: Axes, methods: list[str]) -> None:
 @canvas.style()
 def contacts_missed(records: Sequence[Record], path: Path) -> None:
     """By how much the count of touches is wrong, against tolerance (above) and step (below)."""
-    names = list(dict.fromkeys(record.scene for record in records))
+    scenes = by_scene(records)
     figure, grid = canvas.subplots(
-        2, len(names), figsize=(2.6 * len(names), 5.2), sharey=True, sharex="row", layout="constrained", squeeze=False
+        2, len(scenes), figsize=(2.6 * len(scenes), 5.2), sharey=True, sharex="row", layout="constrained", squeeze=False
     )
-    for column, name in enumerate(names):
-        here = [record for record in records if record.scene == name and record.found is not None]
+    for column, (name, own) in enumerate(scenes.items()):
+        here = [record for record in own if record.found is not None]
         total = sum(here[0].there_are) if here else 0
         grid[0, column].set_title(f"{name}\n{total} touches there are", fontsize="small")
         for method, group in by_method(here).items():

@@ -72,13 +72,3 @@ def _measure(scene: Scene, period_ms: float, grid: Any, ideal: Any, with_graph: 
         pairs = [(graph.bare_speed(TICKS), graph.our_speed(short)) for _ in range(PAIRS)]
         bare, four = (per_tick / max(speeds) for speeds in zip(*pairs, strict=True))
     return Point(period_ms, float(np.abs(state - ideal)[:, ::2].max()), one, four, bare)
-
-
-def report(points: list[Point]) -> str:
-    """Lines: one per control period."""
-    lines = [f"{'period ms':>10}{'deviation m':>13}   wall seconds per simulated second: one process, four, bare rclpy"]
-    for point in points:
-        seconds = (point.one_process, point.four_processes, point.bare)
-        walls = [f"{'-':>10}" if wall is None else f"{wall:10.3g}" for wall in seconds]
-        lines.append(f"{point.period_ms:10g}{point.deviation:13.2e}   {''.join(walls)}")
-    return "\n".join(lines)

@@ -18,7 +18,7 @@ OUTCOMES = ("touches_left", "touches_right", "peak_input_left", "peak_input_righ
             "peak_impact_right")
 
 
-def write(docs: Path, directory: Path, quick: bool, pixels: int = maps.PIXELS) -> Path:
+def write(docs: Path, directory: Path, quick: bool) -> Path:
     """Compute what is not there yet, and write the page with its pictures; returns it.
 
     Raises
@@ -30,7 +30,7 @@ def write(docs: Path, directory: Path, quick: bool, pixels: int = maps.PIXELS) -
     with writing(place):
         place.mkdir(parents=True, exist_ok=True)
         directory.mkdir(parents=True, exist_ok=True)
-    settled = maps.settling(directory, 24 if quick else pixels)
+    settled = maps.settling(directory, 24 if quick else maps.PIXELS)
     limits = maps.limits(*((6, 5) if quick else ()))
     plan, data, seconds = maps.robustness(directory, 64 if quick else maps.SAMPLE)
     map_figures.settling(settled, place / "settling.png")

@@ -10,7 +10,6 @@ instant is not handled: w_l w_r = 0 stops the regularised time, and the attempt 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -31,17 +30,15 @@ FIRST_GAP_M = 1e-15  # at a release, if rounding leaves none
 NEVER_S = 1e9  # end of a contact's variable: the release comes first
 ROUNDING = 4e-16
 MAX_LEG_STEPS = 10_000
-VARIANTS: tuple[dict[str, bool], ...] = (
-    {}, {"fast_math": True}, {"high_accuracy": True}, {"compact_mode": True}, {"slp_vectorize": True},
-)
+VARIANTS: tuple[dict[str, bool], ...] = ({}, {"fast_math": True})  # ways to generate code worth their compile time
 LADDER = (1e-4, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15)
 
 
-def contenders(variants: Sequence[dict[str, bool]] = VARIANTS[:2]) -> list[Contender]:
-    """Ways of heyoka to generate code, over its tolerance; by default the two that are worth their compile time."""
+def contenders() -> list[Contender]:
+    """heyoka over its tolerance."""
     return [
         Contender("heyoka", "_".join(["heyoka", *options]), "tolerance", LADDER, partial(HeyokaGrasp, options))
-        for options in variants
+        for options in VARIANTS
     ]
 
 

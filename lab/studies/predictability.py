@@ -55,19 +55,3 @@ def _predict(scene: Scene, seconds: float) -> Prediction:
 
 def _states(scene: Scene, start: Array, grid: Array) -> Array:
     return Integrator(System.of(scene.grasp, start), continuous=True).advance(float(grid[-1]), grid)
-
-
-def report(predictions: Sequence[Prediction]) -> str:
-    """Lines: growth, and until when two roundings stay below some levels."""
-    heads = "".join(f"{f'> {level:.0e}':>12}" for level in LEVELS)
-    lines = [f"{'two roundings become':22}{heads}   growth of a perturbation over the scene"]
-    for row in predictions:
-        cells = [row.until(level) for level in LEVELS]
-        text = "".join(f"{'never' if at is None else f'{at:.1f} s':>12}" for at in cells)
-        lines.append(f"  {row.scene:20}{text}   {row.growth:.1e}")
-    return "\n".join([*lines, f"  never: not within {predictions[0].t[-1]:g} s"])
-
-
-def horizon(scene: Scene, seconds: float) -> Scene:
-    """The same scene over another horizon."""
-    return scene.changed({"time.duration_s": seconds})

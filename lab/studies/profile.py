@@ -28,7 +28,6 @@ class Profile(NamedTuple):
     scene: str
     accuracy: float
     order: int  # of the series with one side in contact
-    flights: int
     contact_steps: int
     call: float  # `simulation.simulate` with all outputs
     outputs: float  # the integrator alone, with all outputs
@@ -69,7 +68,7 @@ def profile(scene: Scene, accuracy: float) -> Profile:
     call, outputs, end, expansions = (statistics.median(column) for column in times)
     work = integrate(grid[-1:]).work
     return Profile(
-        scene.name, accuracy, order, int(work[Work.FLIGHTS]), int(work[Work.CONTACT_STEPS]), call, outputs, end,
+        scene.name, accuracy, order, int(work[Work.CONTACT_STEPS]), call, outputs, end,
         expansions / EXPANSIONS,
     )
 

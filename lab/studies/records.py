@@ -26,14 +26,6 @@ PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "rclpy", "rosbags", "scip
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
 
 
-def metric(points: int, digits: int) -> str:
-    """What `Record.error` is, in words: the label of every axis and column that shows it."""
-    return (
-        f"largest absolute error over six states (m, m/s) and {points} output times,"
-        f" against a reference of {digits} digits"
-    )
-
-
 def describe_machine() -> dict[str, str]:
     """Platform, processor and versions."""
     cpu = Path("/proc/cpuinfo")

@@ -26,7 +26,7 @@ class Limit(NamedTuple):
 
     delay: int  # periods
     period: float  # s; infinite if there is none
-    checks: tuple[tuple[float, float, float], ...]  # period, spectral radius, growth per period in the simulation
+    checks: tuple[tuple[float, float], ...]  # period, growth per period in the simulation
 
 
 def first_limit(arm: Arm, delay: int) -> float:
@@ -65,19 +65,9 @@ def limits(arm: Arm, delays: tuple[int, ...] = (0, 1)) -> list[Limit]:
     for delay in delays:
         period = first_limit(arm, delay)
         near = [factor * period for factor in NEAR if math.isfinite(period)]
-        checks = tuple((h, spectral_radius(arm, h, delay), simulated_growth(arm, h, delay)) for h in near)
+        checks = tuple((h, simulated_growth(arm, h, delay)) for h in near)
         found.append(Limit(delay, period, checks))
     return found
-
-
-def report(name: str, found: list[Limit]) -> str:
-    """Lines for one arm."""
-    lines = [f"{name}: largest stable control period"]
-    for limit in found:
-        lines.append(f"  delay of {limit.delay} periods: {1e3 * limit.period:.10g} ms (spectral radius 1)")
-        for period, radius, growth in limit.checks:
-            lines.append(f"    at {1e3 * period:8.3f} ms: spectral radius {radius:.6f}, simulated {growth:.6f}")
-    return "\n".join(lines)
 
 
 def curves(
@@ -88,6 +78,6 @@ def curves(
     last = 1.3 * max((limit.period for limit in named.values()), default=FIRST_S)
     periods = np.linspace(last / 300.0, last, 300)
     radii = {label: (periods, spectral_radii(arm, periods, limit.delay)) for label, limit in named.items()}
-    simulated = [(h, growth) for limit in named.values() for h, _, growth in limit.checks]
+    simulated = [check for limit in named.values() for check in limit.checks]
     simulated += [(h, simulated_growth(arm, h, limit.delay, 800)) for limit in named.values() for h in periods[30::45]]
     return radii, simulated, {label: limit.period for label, limit in named.items()}

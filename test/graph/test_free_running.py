@@ -190,9 +190,3 @@ def test_a_plant_takes_the_priority_that_it_is_given_or_says_why_not(launch: Any
     refused = launch(*START, "left_controller", "--ros-args", "-p", "real_time_priority:=100", stderr=subprocess.PIPE)
     assert "real_time_priority: 100 is not allowed; allowed: 0 to 99" in refused.communicate(timeout=DEADLINE)[1]
     assert refused.returncode == 2
-
-
-def test_a_free_run_without_time_is_refused(lab_command: Any) -> None:
-    refused = lab_command("free-running", "case_01", "--factor", "0")
-    assert refused.returncode == 2
-    assert "--seconds 60 --factor 0: not allowed; allowed: a factor > 0" in refused.stderr

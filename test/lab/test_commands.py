@@ -9,18 +9,6 @@ import pytest
 
 pytestmark = pytest.mark.slow  # whole studies, though quick ones
 
-SHORT = "time.duration_s=2"
-
-
-def test_accuracy_quick_writes_records_and_figures(lab_command: Any, tmp_path: Path) -> None:
-    result = lab_command("accuracy", "case_01", "--set", SHORT, "--quick", "-o", "out")
-    assert result.returncode == 0, result.stderr
-    assert {"journal.jsonl", "records.csv", "error_against_time.png", "contacts_missed.png"} <= {
-        path.name for path in (tmp_path / "out").iterdir()
-    }
-    assert "discrete_gradient" in result.stdout
-    assert "largest absolute error over six states" in result.stdout
-
 
 def test_page_quick_has_all_sections_and_figures(lab_command: Any, tmp_path: Path) -> None:
     result = lab_command("accuracy", "--quick", "--docs", "docs", "-o", "journal")
