@@ -11,186 +11,163 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
-from grasp_ros.exact.compilation.vectors import WIDTH, add_product, highest, larger, load, spread, store
-from grasp_ros.exact.contact.series import put
+from grasp_ros.exact.compilation.vectors import (
+    HALF,
+    add_product,
+    highest,
+    larger,
+    load,
+    load_half,
+    spread_half,
+    store,
+)
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, V, X, Z
-from grasp_ros.sensitivity.tangents import BLOCK, STATES, STEP, Motion, Rates, Row, Table
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, U, V, X
+from grasp_ros.sensitivity.base_series import base_series, touches
+from grasp_ros.sensitivity.tangents import BLOCK, ODD, STATES, STEP, SUMS, WEIGHTS, Motion, Rates, Row, Table, Weight
 
 MOST_HALVINGS = 200
 NEGLECTED = 128.0 * EPS
 FIRST = 6  # terms of a series, one of which is about its size
 
 
-@kernel
-def touches(motion: Motion, body: Body) -> bool:
-    """Whether a body takes part in the contacts of a step; the others fly."""
-    return body == OBJECT or motion.mode[body] == Pair.CONTACT
+@inlined
+def apart(side: Body, arm: Array, middle: Array) -> Array:
+    """What changes of x of an arm and the object make of u, or changes of v of u'."""
+    return arm - middle if side == LEFT else middle - arm
 
 
-@kernel
-def multiply(f: Array, g: Array, out: Array, n: int) -> None:
-    """Write the products of eight series with eight others up to the order n; coefficients k stand from 8 k on.
+@inlined
+def sum_products(table: Table, block: int, k: int, side: Body, alone: bool) -> None:
+    """Sum the products of series for coefficients k and k + 1 that a pair in contact brings, of four directions.
 
-    Four at a time: one sum alone would wait for each addition before the next. Behind n there must be room for three.
+    They are x and v of the arm and v of the object times dt/ds, and what the changes of u and u' make of the impact.
+    Two orders share what they take from memory, which is what takes the time; a product with the newest coefficient is
+    left to `add_newest`.
     """
-    for k in range(0, n + 1, 4):
-        a = b = c = d = spread(0.0)
-        place = WIDTH * k
-        for i in range(0, place + WIDTH, WIDTH):
-            x, j = load(f, i), place - i
-            a, b = add_product(a, x, load(g, j)), add_product(b, x, load(g, j + WIDTH))
-            c, d = add_product(c, x, load(g, j + 2 * WIDTH)), add_product(d, x, load(g, j + 3 * WIDTH))
-        x, y, z = load(f, place + WIDTH), load(f, place + 2 * WIDTH), load(f, place + 3 * WIDTH)
-        first, second, third = load(g, 0), load(g, WIDTH), load(g, 2 * WIDTH)
-        store(out, place, a)
-        store(out, place + WIDTH, add_product(b, x, first))
-        store(out, place + 2 * WIDTH, add_product(add_product(c, x, second), y, first))
-        store(out, place + 3 * WIDTH, add_product(add_product(add_product(d, x, third), y, second), z, first))
-
-
-@kernel
-def pair_series(motion: Motion, table: Table, n: int) -> None:
-    """Write the series that both pairs bring, by side; without contact they are 0.
-
-    With s = w dt/ds, a polynomial in w, and h = u s: s (1 + p u') gives dF/du, h gives dF/du', h u' the damping.
-    """
-    c, a, b, (first, second, third) = motion.c, table.factors[0], table.factors[1], table.products
-    pace, pairs = table.rows[Row.PACE], motion.pairs
-    loss_l, loss_r = pairs[LEFT, Law.DISSIPATION], pairs[RIGHT, Law.DISSIPATION]
-    left, right = motion.mode[LEFT] == Pair.CONTACT, motion.mode[RIGHT] == Pair.CONTACT
-    for k in range(n + 1):
-        i = LANES * k
-        w_l, w_r = c[i + Z.L] if left else 0.0, c[i + Z.R] if right else 0.0
-        pace[k] = (k + 1) * c[i + LANES + Lane.TIME] if k < n else 0.0
-        put(a, i, (w_l, w_r, w_l, w_r, 0.0, 0.0, 0.0, 0.0))
-        put(b, i, (w_l, w_r, pace[k], pace[k], 0.0, 0.0, 0.0, 0.0))
-    multiply(a, b, first, n)
-    for k in range(n + 1):
-        i, one = LANES * k, 1.0 if k == 0 else 0.0
-        u_l, u_r, s_l, s_r = first[i], first[i + 1], first[i + 2], first[i + 3]
-        e_l, e_r = one + loss_l * (c[i + V.L] - c[i + V.O]), one + loss_r * (c[i + V.O] - c[i + V.R])
-        put(a, i, (s_l, s_r, u_l, u_r, 0.0, 0.0, 0.0, 0.0))
-        put(b, i, (e_l, e_r, s_l, s_r, 0.0, 0.0, 0.0, 0.0))
-    multiply(a, b, second, n)
-    for k in range(n + 1):
-        i, g, x_o = LANES * k, pace[k], c[LANES * k + X.O]
-        put(a, i, (second[i + 2], second[i + 3], x_o + first[i], x_o, x_o - first[i + 1], c[i + V.L], c[i + V.O],
-                   c[i + V.R]))
-        put(b, i, (c[i + V.L] - c[i + V.O], c[i + V.O] - c[i + V.R], g, g, g, g, g, g))
-    multiply(a, b, third, n)
-
-
-@kernel
-def base_series(motion: Motion, table: Table, n: int) -> None:
-    """Write all series of the run that the tangents' equations need."""
-    pair_series(motion, table, n)
-    (_, second, third), rows = table.products, table.rows
-    for side in (LEFT, RIGHT):
-        hertzian, loss = motion.pairs[side, Law.HERTZIAN], motion.pairs[side, Law.DISSIPATION]
-        slope, drag = rows[Row.SLOPE + side], rows[Row.DRAG + side]
-        stiffer, lost = rows[Row.HERTZIAN + side], rows[Row.LOSS + side]
-        for k in range(n + 1):
-            i = LANES * k + side
-            slope[k], drag[k] = 1.5 * hertzian * second[i], loss * hertzian * second[i + 2]
-            stiffer[k], lost[k] = second[i + 2] + loss * third[i], hertzian * third[i]
-
-
-@inlined
-def impact(law: Array, table: Table, at: tuple[int, int], side: Body, sums: tuple[Array, Array]) -> Array:
-    """Coefficient k of the impact force of a pair, times dt/ds, from the sums of what u and u' change of it."""
-    (block, k), rows = at, table.rows
-    hertzian, loss = load(law[side, Law.HERTZIAN], WIDTH * block), load(law[side, Law.DISSIPATION], WIDTH * block)
-    stiffer = add_product(sums[0] + sums[1], hertzian, rows[Row.HERTZIAN + side, k])
-    return add_product(stiffer, loss, rows[Row.LOSS + side, k])
-
-
-@inlined
-def advance_body(motion: Motion, acting: Array, table: Table, at: tuple[int, int], body: Body,
-                 sums: tuple[Array, Array], push: Array) -> None:
-    """Write coefficient k + 1 of a body, from coefficients k of x dt/ds, v dt/ds and the impacts on it."""
-    (block, k), (x, moved) = at, sums
-    v, row, rates, first = velocity_lane(body), motion.bodies[body], acting[body], WIDTH * block
-    share, inverse = INVERSE[k + 1], 1.0 / row[Of.MASS]
-    place = LANES * k + (3 if body == OBJECT else 2 + 2 * body)  # of its x, and of its v, among the products
-    pace, way, speed = table.rows[Row.PACE, k], table.products[2, place], table.products[2, place + 3]
-    gain = (k + 1) * motion.c[LANES * (k + 1) + v]
-    driven = pace * load(rates[Of.FORCE], first) - gain * load(rates[Of.MASS], first)
-    slowed = way * load(rates[Of.STIFFNESS], first) + speed * load(rates[Of.DAMPING], first)
-    held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * moved
-    place = BLOCK * block + STEP * (k + 1) + WIDTH * (v - 1)
-    store(table.series, place, share * moved)
-    store(table.series, place + WIDTH, share * (inverse * (push + driven - slowed) - held))
-
-
-@inlined
-def advance_block(motion: Motion, rates: Rates, table: Table, at: tuple[int, int]) -> None:
-    """Write coefficient k + 1 of all bodies in contact, of eight directions: one loop sums all products of series."""
-    block, k = at
-    f, rows, i = table.series, table.rows, BLOCK * block
-    left, right = touches(motion, LEFT), touches(motion, RIGHT)
-    x_l = v_l = x_o = v_o = x_r = v_r = spread(0.0)
-    slope_l = drag_l = slope_r = drag_r = on_l = on_r = spread(0.0)
-    for m in range(k, -1, -1):
-        g, x, v = rows[Row.PACE, m], load(f, i + WIDTH * X.O), load(f, i + WIDTH * V.O)
-        x_o, v_o = add_product(x_o, x, g), add_product(v_o, v, g)
-        if left:
-            arm, moved = load(f, i + WIDTH * X.L), load(f, i + WIDTH * V.L)
-            x_l, v_l = add_product(x_l, arm, g), add_product(v_l, moved, g)
-            slope_l = add_product(slope_l, arm - x, rows[Row.SLOPE + LEFT, m])
-            drag_l = add_product(drag_l, moved - v, rows[Row.DRAG + LEFT, m])
-        if right:
-            arm, moved = load(f, i + WIDTH * X.R), load(f, i + WIDTH * V.R)
-            x_r, v_r = add_product(x_r, arm, g), add_product(v_r, moved, g)
-            slope_r = add_product(slope_r, x - arm, rows[Row.SLOPE + RIGHT, m])
-            drag_r = add_product(drag_r, v - moved, rows[Row.DRAG + RIGHT, m])
+    f, weights, i, arm = table.series, table.weights, BLOCK * block, HALF * velocity_lane(side)
+    to_slope, to_drag = WEIGHTS * (Weight.SLOPE + side), WEIGHTS * (Weight.DRAG + side)
+    x_0 = v_0 = o_0 = slope_0 = drag_0 = x_1 = v_1 = o_1 = slope_1 = drag_1 = spread_half(0.0)
+    for m in range(HALF * k, -1, -HALF):
+        pace, later = load_half(weights, m), load_half(weights, m + HALF)
+        x, v, middle = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
+        x_0, x_1 = add_product(x_0, x, pace), add_product(x_1, x, later)
+        v_0, v_1 = add_product(v_0, v, pace), add_product(v_1, v, later)
+        if alone:
+            o_0, o_1 = add_product(o_0, middle, pace), add_product(o_1, middle, later)
+        u, rate = apart(side, x, load_half(f, i + HALF * X.O)), apart(side, v, middle)
+        slope_0 = add_product(slope_0, u, load_half(weights, to_slope + m))
+        slope_1 = add_product(slope_1, u, load_half(weights, to_slope + m + HALF))
+        drag_0 = add_product(drag_0, rate, load_half(weights, to_drag + m))
+        drag_1 = add_product(drag_1, rate, load_half(weights, to_drag + m + HALF))
         i += STEP
-    if left:
-        on_l = impact(rates.law, table, at, LEFT, (slope_l, drag_l))
-        advance_body(motion, rates.acting, table, at, LEFT, (x_l, v_l), spread(0.0) - on_l)
-    if right:
-        on_r = impact(rates.law, table, at, RIGHT, (slope_r, drag_r))
-        advance_body(motion, rates.acting, table, at, RIGHT, (x_r, v_r), on_r)
-    advance_body(motion, rates.acting, table, at, OBJECT, (x_o, v_o), on_l - on_r)
+    store_sums(table.sums, SUMS * block, side, alone, (x_0, v_0, o_0, slope_0 + drag_0))
+    store_sums(table.sums, SUMS * block + ODD, side, alone, (x_1, v_1, o_1, slope_1 + drag_1))
+
+
+@inlined
+def store_sums(sums: Array, first: int, side: Body, alone: bool, found: tuple[Array, Array, Array, Array]) -> None:
+    """Write sums of a pair; those of the object, too, where no other pair has done so."""
+    arm = first + HALF * velocity_lane(side)
+    store(sums, arm - HALF, found[0])
+    store(sums, arm, found[1])
+    if alone:
+        store(sums, first + HALF * V.O, found[2])
+    store(sums, first + HALF * (U.L + side), found[3])
+
+
+@inlined
+def add_newest(table: Table, block: int, k: int, side: Body, alone: bool) -> None:
+    """Add the products with the coefficients k of a pair, which have just been found, to the sums of odd order k."""
+    f, weights, i, arm = table.series, table.weights, BLOCK * block + STEP * k, HALF * velocity_lane(side)
+    sums, first, pace = table.sums, SUMS * block + ODD, load_half(weights, 0)
+    x, v, middle = load_half(f, i + arm - HALF), load_half(f, i + arm), load_half(f, i + HALF * V.O)
+    slope = load_half(weights, WEIGHTS * (Weight.SLOPE + side))
+    drag = load_half(weights, WEIGHTS * (Weight.DRAG + side))
+    u, push = apart(side, x, load_half(f, i + HALF * X.O)), load_half(sums, first + HALF * (U.L + side))
+    store_sums(sums, first, side, alone, (
+        add_product(load_half(sums, first + arm - HALF), x, pace), add_product(load_half(sums, first + arm), v, pace),
+        add_product(load_half(sums, first + HALF * V.O), middle, pace),
+        add_product(add_product(push, u, slope), apart(side, v, middle), drag),
+    ))
+
+
+@inlined
+def impact(rates: Rates, table: Table, block: int, k: int, side: Body) -> Array:
+    """Coefficient k of the change of the impact force of a pair, times dt/ds."""
+    law, first, rows = rates.law[side], HALF * block, table.rows
+    total = load_half(table.sums, SUMS * block + ODD * (k % 2) + HALF * (U.L + side))
+    total = add_product(total, load_half(law[Law.HERTZIAN], first), rows[Row.HERTZIAN + side, k])
+    return add_product(total, load_half(law[Law.DISSIPATION], first), rows[Row.LOSS + side, k])
+
+
+@inlined
+def advance_body(motion: Motion, acting: Array, table: Table, at: tuple[int, int], body: Body, push: Array) -> None:
+    """Write coefficient k + 1 of a body under coefficient k of the change of the impacts on it."""
+    (block, k), rows, row, rates, v = at, table.rows, motion.bodies[body], acting[body], velocity_lane(body)
+    share, inverse, first = INVERSE[k + 1], 1.0 / row[Of.MASS], HALF * block
+    place = SUMS * block + ODD * (k % 2) + HALF * v
+    x, moved = load_half(table.sums, place - HALF), load_half(table.sums, place)
+    driven = rows[Row.PACE, k] * load_half(rates[Of.FORCE], first)
+    driven = driven - rows[Row.GAIN + body, k] * load_half(rates[Of.MASS], first)
+    slowed = rows[Row.WAY + body, k] * load_half(rates[Of.STIFFNESS], first)
+    slowed = slowed + rows[Row.SPEED + body, k] * load_half(rates[Of.DAMPING], first)
+    held = row[Of.STIFFNESS] * inverse * x + row[Of.DAMPING] * inverse * moved
+    place = BLOCK * block + STEP * (k + 1) + HALF * (v - 1)
+    store(table.series, place, share * moved)
+    store(table.series, place + HALF, share * (inverse * (push + driven - slowed) - held))
 
 
 @kernel
 def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
-    """Write the series of the tangents over a Taylor step of degree n."""
+    """Write the series of the tangents over a Taylor step of even degree n."""
     base_series(motion, table, n)
-    blocks = rates.x.shape[1] // WIDTH
-    for block in range(blocks):
+    left, right, nothing = touches(motion, LEFT), touches(motion, RIGHT), spread_half(0.0)
+    for block in range(rates.x.shape[1] // HALF):
         for lane in range(STATES):
-            store(table.series, BLOCK * block + WIDTH * lane, load(rates.x[lane], WIDTH * block))
-    for k in range(n):
-        for block in range(blocks):  # none of which waits for another
-            advance_block(motion, rates, table, (block, k))
+            store(table.series, BLOCK * block + HALF * lane, load_half(rates.x[lane], HALF * block))
+        for k in range(n):
+            on_l = on_r = nothing
+            for side in (LEFT, RIGHT):
+                if touches(motion, side) and k % 2 == 0:
+                    sum_products(table, block, k, side, side == LEFT or not left)
+                elif touches(motion, side):
+                    add_newest(table, block, k, side, side == LEFT or not left)
+            if left:
+                on_l = impact(rates, table, block, k, LEFT)
+                advance_body(motion, rates.acting, table, (block, k), LEFT, nothing - on_l)
+            if right:
+                on_r = impact(rates, table, block, k, RIGHT)
+                advance_body(motion, rates.acting, table, (block, k), RIGHT, on_r)
+            advance_body(motion, rates.acting, table, (block, k), OBJECT, on_l - on_r)
 
 
 @kernel
 def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) -> None:
     """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""
-    for block in range(rates.x.shape[1] // WIDTH):
+    for block in range(rates.x.shape[1] // HALF):
         for body in (LEFT, OBJECT, RIGHT):
             if touches(motion, body):
-                lane, x, v = velocity_lane(body) - 1, spread(0.0), spread(0.0)
+                lane, x, v = velocity_lane(body) - 1, spread_half(0.0), spread_half(0.0)
                 for k in range(n, -1, -1):
-                    place = BLOCK * block + STEP * k + WIDTH * lane
-                    x, v = load(table.series, place) + s * x, load(table.series, place + WIDTH) + s * v
-                store(rates.at[lane], WIDTH * block, x)
-                store(rates.at[lane + 1], WIDTH * block, v)
+                    place = BLOCK * block + STEP * k + HALF * lane
+                    x = add_product(load_half(table.series, place), x, s)
+                    v = add_product(load_half(table.series, place + HALF), v, s)
+                store(rates.at[lane], HALF * block, x)
+                store(rates.at[lane + 1], HALF * block, v)
 
 
 @kernel
 def ends_within(series: Array, first: int, n: int, s: float) -> bool:
-    """Whether the last terms of eight series at s are below NEGLECTED of their first ones."""
-    nothing, power = spread(0.0), s ** (n - 1)
-    last = larger(load(series, first + STEP * (n - 1)), nothing) + s * larger(load(series, first + STEP * n), nothing)
+    """Whether the last terms of four series at s are below NEGLECTED of their first ones."""
+    nothing, power = spread_half(0.0), s ** (n - 1)
+    last = larger(load_half(series, first + STEP * (n - 1)), nothing)
+    last = last + s * larger(load_half(series, first + STEP * n), nothing)
     largest, scale = nothing, 1.0
     for k in range(FIRST):
-        largest, scale = larger(largest, scale * load(series, first + STEP * k)), scale * s
+        largest, scale = larger(largest, scale * load_half(series, first + STEP * k)), scale * s
     return not highest(power * last - NEGLECTED * largest) > 0.0
 
 
@@ -202,9 +179,9 @@ def exact_length(motion: Motion, table: Table, n: int, s: float) -> float:
     """
     for block in range(table.series.shape[0] // BLOCK):
         for body in (LEFT, OBJECT, RIGHT):
-            first, halvings = BLOCK * block + WIDTH * (velocity_lane(body) - 1), 0
+            first, halvings = BLOCK * block + HALF * (velocity_lane(body) - 1), 0
             while touches(motion, body) and halvings < MOST_HALVINGS and not (
-                ends_within(table.series, first, n, s) and ends_within(table.series, first + WIDTH, n, s)
+                ends_within(table.series, first, n, s) and ends_within(table.series, first + HALF, n, s)
             ):
                 s, halvings = 0.5 * s, halvings + 1
     return s

@@ -7,37 +7,48 @@ is exact for the first, one over half a turn for the second.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT
+from grasp_ros.physics.layout import LEFT, OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION, build
 from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.places import place_of
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
     "s": "it moves ticks, which are whole", "Hz": "its effect grows with the time; allowed: phase_rad",
     "1": "it is a seed", "control periods": "it is whole",
 }
 STEPS = (Column.POSITION_STEP, Column.VELOCITY_STEP)
+LARGEST = 1e300  # N, in place of no limit
 
 
 class Directions(NamedTuple):
-    """How n numbers change a system; each array has the directions last. One number: the same without the last axis."""
+    """How n numbers change a system; each array has the directions last."""
 
-    bodies: Array  # (3, 4, n), with the continuous feedback where it is continuous
+    bodies: Array  # (3, 4, n)
     pairs: Array  # (2, 2, n)
     state: Array  # (6, n)
-    coulomb: Array  # (n,)
+    coulomb: Array  # (1, n)
     laws: Array  # (2, k, n)
     external: Array  # (ticks, 3, n); no tick if no direction changes a force
+
+    def closed_loop(self, system: System) -> Directions:
+        """The same with the continuous feedback in the bodies, see `System.closed_loop`."""
+        bodies = self.bodies.copy()
+        for side, law in system.laws.items():
+            gain, damping, set_point, feed_forward = self.laws[side, :4]
+            bodies[side, Of.STIFFNESS] += gain
+            bodies[side, Of.DAMPING] += damping
+            bodies[side, Of.FORCE] += gain * law.set_point + law.position_gain * set_point + feed_forward
+        return self._replace(bodies=bodies)
 
 
 def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
@@ -49,29 +60,35 @@ def directions(scene: Scene, keys: Sequence[str], sampled: bool) -> Directions:
     keys : sequence of str
         "section.key": initial values, and every number that enters smoothly.
     sampled : bool
-        Whether commands are held; otherwise the feedback is a part of the bodies.
+        Whether commands are held.
 
     Raises
     ------
     Refused
         See `check_keys`.
     """
-    check_keys(scene, keys, sampled)
+    parameters = check_keys(scene, keys, sampled)
     forced = any(key.partition(".")[0].endswith(("_pulse", "_sine", "_table")) for key in keys)
-    ticks = scene.ticks if forced else 0
-    here = _numbers(scene.system, ticks, sampled)
-    found = [_derivative(scene, key, here, partial(_numbers, ticks=ticks, sampled=sampled)) for key in keys]
-    return Directions(*(np.ascontiguousarray(np.stack(arrays, axis=-1)) for arrays in zip(*found, strict=True)))
+    found = no_directions(len(keys), scene.ticks if forced else 0)
+    for j, (key, parameter) in enumerate(zip(keys, parameters, strict=True)):
+        if place := place_of(scene, key):
+            array, row, column = place
+            rows = getattr(found, array)
+            rows.reshape(len(rows), -1, len(keys))[row, column, j] = 1.0
+        else:
+            for rows, change in zip(found, _difference(scene, key, parameter, len(found.external)), strict=True):
+                rows[..., j] = change
+    return found
 
 
-def no_directions(n: int) -> Directions:
+def no_directions(n: int, ticks: int = 0) -> Directions:
     """Directions that change nothing."""
-    return Directions(np.zeros((3, 4, n)), np.zeros((2, 2, n)), np.zeros((6, n)), np.zeros(n),
-                      np.zeros((2, len(Column), n)), np.zeros((0, 3, n)))
+    return Directions(np.zeros((3, 4, n)), np.zeros((2, 2, n)), np.zeros((6, n)), np.zeros((1, n)),
+                      np.zeros((2, len(Column), n)), np.zeros((ticks, 3, n)))
 
 
-def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> None:
-    """Refuse numbers by which a run of a scene has no derivatives.
+def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Parameter]:
+    """The numbers behind some keys, by which a run of a scene has derivatives.
 
     Raises
     ------
@@ -85,8 +102,7 @@ def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> None:
         if sampled and law.row[[*STEPS]].any():
             raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
                           " derivative; allowed: a sensor without position_step_m and velocity_step_m_per_s")
-    for key in keys:
-        check_key(scene, key)
+    return [check_key(scene, key) for key in keys]
 
 
 def check_key(scene: Scene, key: str) -> Parameter:
@@ -108,30 +124,27 @@ def check_key(scene: Scene, key: str) -> Parameter:
     return parameter
 
 
-def _derivative(scene: Scene, key: str, here: Directions, numbers: Callable[[System], Directions]) -> Directions:
-    """Derivatives of all arrays of a system by one number, from these arrays."""
-    parameter, (section, _, name) = check_key(scene, key), key.partition(".")
+def _difference(scene: Scene, key: str, parameter: Parameter, ticks: int) -> Iterator[Array]:
+    """Derivatives of all arrays of a system by one number."""
+    section, _, name = key.partition(".")
     value = scene.values[section][name]
 
-    def at(other: float) -> Directions:  # which need not be in its range
-        return numbers(build({**scene.values, section: {**scene.values[section], name: other}}))
+    def at(other: float) -> tuple[Array, ...]:  # which need not be in its range
+        return _numbers(build({**scene.values, section: {**scene.values[section], name: other}}), ticks)
 
     if parameter.unit == "rad":
         low, high, width = at(value - 0.5 * math.pi), at(value + 0.5 * math.pi), 2.0
     else:
         width = float(value) or 1.0
-        low, high = here, at(value + width)
-    return Directions(*((b - a) / width for a, b in zip(low, high, strict=True)))
+        low, high = at(value), at(value + width)
+    return ((b - a) / width for a, b in zip(low, high, strict=True))
 
 
-def _numbers(system: System, ticks: int, sampled: bool) -> Directions:
-    laws = np.zeros((2, len(Column)))
-    if sampled:
-        laws[:] = law_rows(system)
-        laws[:, Column.LIMIT] = np.minimum(laws[:, Column.LIMIT], 1e300)
+def _numbers(system: System, ticks: int) -> tuple[Array, ...]:
+    """The arrays of a system, in the order of `Directions`."""
     external = system.external_over(np.arange(ticks)) if ticks else np.zeros((0, 3))
-    return Directions(system.bodies if sampled else system.closed_loop, system.pairs, system.state,
-                    np.array(system.coulomb), laws, external)
+    return (system.bodies, system.pairs, system.state, np.array([system.coulomb]),
+            np.minimum(law_rows(system), LARGEST), external)
 
 
 def law_rows(system: System) -> Array:

@@ -101,17 +101,19 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     bodies[bodies[:, Of.MASS] == 0.0, Of.MASS] = 1.0  # of what is not there
     found: Array = np.zeros((len(events), moments.rates.shape[2]))
     time, side, kind = events[:, Entry.TIME], events[:, Entry.BODY], events[:, Entry.KIND]
-    moves = (time > 0.0) & ~((kind == Transition.SLIP) & _are_ticks(scene, sampled, time))
-    for body, which in np.unique(events[moves][:, [Entry.BODY, Entry.KIND]].astype(int), axis=0).tolist():
-        rows = moves & (side == body) & (kind == which)
-        these = _Events(bodies, system.pairs, changes, Moments(*(part[rows] for part in moments)))
-        change, rate = FUNCTIONS[Transition(which)](these, body)
-        with np.errstate(divide="ignore", invalid="ignore"):
+    moves = time > 0.0
+    if sampled or scene.system.external:
+        moves &= ~((kind == Transition.SLIP) & _are_ticks(scene, time))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for body, what in {*zip(side[moves].tolist(), kind[moves].tolist(), strict=True)}:
+            rows = moves & (side == body) & (kind == what)
+            these = _Events(bodies, system.pairs, changes, Moments(*(part[rows] for part in moments)))
+            change, rate = FUNCTIONS[what](these, int(body))
             found[rows] = -change / rate[:, None]
     return found
 
 
-def _are_ticks(scene: Scene, sampled: bool, times: Array) -> Any:
-    """Where inputs change at times (e,)."""
+def _are_ticks(scene: Scene, times: Array) -> Any:
+    """Where inputs may change at times (e,)."""
     ticks = times * NANOSECONDS / scene.period_ns
-    return (sampled or bool(scene.system.external)) & (abs(ticks - np.round(ticks)) <= 8.0 * EPS * ticks)
+    return abs(ticks - np.round(ticks)) <= 8.0 * EPS * ticks

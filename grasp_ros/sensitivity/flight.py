@@ -13,7 +13,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import kernel
-from grasp_ros.exact.compilation.vectors import WIDTH, load, store
+from grasp_ros.exact.compilation.vectors import HALF, load_half, store
 from grasp_ros.exact.impact import elastic_force, elastic_slope
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V
@@ -86,10 +86,10 @@ def fly_tangent(motion: Motion, rates: Rates, m: Array, body: Body, span: float)
         by_k = (m[BY_STIFFNESS, i, 0] * x_0 + m[BY_STIFFNESS, i, 1] * v_0 + m[BY_STIFFNESS, i, STEADY] * steady) / mass
         by_c = (m[BY_DAMPING, i, 0] * x_0 + m[BY_DAMPING, i, 1] * v_0 + m[BY_DAMPING, i, STEADY] * steady) / mass
         by_mass = by_k * stiffness + by_c * damping + by_steady * steady
-        for first in range(0, rates.x.shape[1], WIDTH):
-            moved = by_x * load(rates.x[v - 1], first) + by_v * load(rates.x[v], first)
-            stiffer = by_k * load(own[Of.STIFFNESS], first) + by_c * load(own[Of.DAMPING], first)
-            driven = by_steady * load(own[Of.FORCE], first) - by_mass * load(own[Of.MASS], first)
+        for first in range(0, rates.x.shape[1], HALF):
+            moved = by_x * load_half(rates.x[v - 1], first) + by_v * load_half(rates.x[v], first)
+            stiffer = by_k * load_half(own[Of.STIFFNESS], first) + by_c * load_half(own[Of.DAMPING], first)
+            driven = by_steady * load_half(own[Of.FORCE], first) - by_mass * load_half(own[Of.MASS], first)
             store(rates.at[v - 1 + i], first, moved + stiffer + driven)
 
 

@@ -19,13 +19,13 @@ from grasp_ros.exact.kinematics import approach, surface_factor
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, Slide, U, V, X
+from grasp_ros.sensitivity.base_series import touches
 from grasp_ros.sensitivity.contact import (
     exact_length,
     expand_tangents,
     shift,
     step_tangents,
     time_at,
-    touches,
     variable_at,
 )
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent

@@ -41,8 +41,7 @@ class Carrier:
     def __init__(self, integrator: Integrator, directions: Directions, grid: Array) -> None:
         self._tangents = tangents_of(integrator.plant, integrator.records, directions, grid)
         rates, outputs = self._tangents.rates, self._tangents.outputs
-        self.x, self.out, self.forces = rates.x[:, : len(directions.coulomb)], outputs.out, outputs.forces
-        self._block = block_of(self._tangents)
+        self.x, self.out, self.forces = rates.x[:, : directions.state.shape[1]], outputs.out, outputs.forces
 
     def drive_by(self, scene: Scene, directions: Directions, sampled: bool) -> None:
         """Let inputs change at ticks: commands that are held, and external forces."""
@@ -56,7 +55,6 @@ class Carrier:
             self._tangents = self._tangents._replace(inputs=self._tangents.inputs._replace(
                 control=law_rows(system), control_rates=directions.laws, normals=normals,
                 waiting=np.zeros((system.delay, 2, self.x.shape[1]))))
-            self._block = block_of(self._tangents)
 
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""

@@ -14,7 +14,7 @@ import numpy as np
 from numba import typeof
 
 from grasp_ros.exact.compilation.jit import kernel
-from grasp_ros.exact.compilation.vectors import WIDTH
+from grasp_ros.exact.compilation.vectors import HALF
 from grasp_ros.exact.contact.step_order import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
@@ -25,25 +25,37 @@ from grasp_ros.sensitivity.directions import Directions, no_directions
 
 TERMS = higher_order(series_order(FINEST)) + 1  # of the longest series
 STATES = 6
-STEP = STATES * WIDTH  # numbers of one coefficient of all states, for WIDTH directions
+STEP = STATES * HALF  # numbers of one coefficient of all states, for HALF directions
 BLOCK = STEP * TERMS
-ROOM = LANES * (TERMS + 3)  # of eight series for `contact.multiply`
+ODD = LANES * HALF  # sums of one coefficient: of the states, and of the two pairs
+SUMS = 2 * ODD  # of one of even order and of the next one
+WEIGHTS = HALF * TERMS
+ROOM = HALF * (TERMS + 3)  # of four series for `contact.multiply`
 COLUMNS = len(Column)
 UNSEEN = -1  # slide before the first segment
 LINE_BYTES = 64
 
 
 class Row(IntEnum):
-    """Polynomials of a Taylor step of the run, each times dt/ds; the sides have one each."""
+    """Polynomials of a Taylor step of the run, each times dt/ds; the sides, or the bodies, have one each."""
 
     PACE = 0  # dt/ds itself
+    HERTZIAN = 1  # dF/dH
+    LOSS = 3  # dF/dp
+    WAY = 5  # x; of the object, which has no spring, 0
+    SPEED = 8  # x'
+    GAIN = 11  # v'
+
+
+class Weight(IntEnum):
+    """The same that each coefficient of a direction is multiplied with, each number HALF times: as a vector."""
+
+    PACE = 0
     SLOPE = 1  # dF/du
     DRAG = 3  # dF/du'
-    HERTZIAN = 5  # dF/dH
-    LOSS = 7  # dF/dp
 
 
-ROWS = Row.LOSS + 2
+ROWS = Row.GAIN + 3
 
 
 class Count(IntEnum):
@@ -80,7 +92,7 @@ class Motion(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """Derivatives of its state, and of the numbers that act in it; with zeros up to a multiple N of WIDTH."""
+    """Derivatives of its state, and of the numbers that act in it; with zeros up to a multiple N of HALF."""
 
     x: Array  # (6, N) of the state at its begin, then at its end
     at: Array  # (6, N) scratch: the same at some time of the segment
@@ -91,10 +103,12 @@ class Rates(NamedTuple):
 class Table(NamedTuple):
     """Scratch: the series of a Taylor step."""
 
-    series: Array  # (N / WIDTH BLOCK,) of the tangents, WIDTH directions after another
+    series: Array  # (N / HALF BLOCK,) of the tangents, HALF directions after another
     rows: Array  # (ROWS, TERMS) of the run, see `Row`
+    weights: Array  # (5 WEIGHTS,) of the run, see `Weight`
     factors: Array  # (2, ROOM)
     products: Array  # (3, ROOM) see `contact.pair_series`
+    sums: Array  # (N / HALF SUMS,) of products
 
 
 class Inputs(NamedTuple):
@@ -135,28 +149,29 @@ class Tangents(NamedTuple):
 def zeros(*shape: int) -> Array:
     """Zeros that begin on a line of the processor's cache: vectors that lie on two lines take twice as long."""
     count = math.prod(shape)
-    whole = np.zeros(count + WIDTH)
+    whole = np.zeros(count + LINE_BYTES // 8)
     first = -whole.ctypes.data % LINE_BYTES // whole.itemsize
     return whole[first : first + count].reshape(shape)
 
 
 def _padded(array: Array) -> Array:
-    """An array with zeros behind its last axis, up to a multiple of WIDTH."""
+    """An array with zeros behind its last axis, up to a multiple of HALF."""
     n = array.shape[-1]
-    wide = zeros(*array.shape[:-1], n + -n % WIDTH)
+    wide = zeros(*array.shape[:-1], n + -n % HALF)
     wide[..., :n] = array
     return wide
 
 
 def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) -> Tangents:
     """The tangents of a run that begins, without held commands, for output times (m,) in s."""
-    n, m, x = len(changes.coulomb), len(grid), _padded(changes.state)
+    n, m, x = changes.state.shape[1], len(grid), _padded(changes.state)
     wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(NUMBERS)
     counts[Count.TICK], counts[Count.SLIDE], numbers[Number.CORNER] = -1, UNSEEN, math.inf
     motion = Motion(zeros(LANES * TERMS), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
     rates = Rates(x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs))
-    table = Table(zeros(wide // WIDTH * BLOCK), np.zeros((ROWS, TERMS)), zeros(2, ROOM), zeros(3, ROOM))
-    inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb, np.zeros((2, COLUMNS)),
+    table = Table(zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM),
+                  zeros(3, ROOM), zeros(wide // HALF * SUMS))
+    inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
                     np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
     outputs = Outputs(counts, numbers, grid, np.zeros((m, STATES, n)), np.zeros((m, 3, 1 + n)))
     return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), motion.c)

@@ -24,11 +24,12 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.places import SET_POINT
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
 from grasp_ros.simulation.quantities import HORIZONS, SETTLED
-from grasp_ros.simulation.variants import SET_POINT, Variants
+from grasp_ros.simulation.variants import Variants
 
 REFUSED = "REFUSED"
 STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if status is not Status.DONE))

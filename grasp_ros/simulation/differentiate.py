@@ -36,7 +36,6 @@ class Sensitivity:
     t : array (m,), s
     state : array (m, 6), m and m/s
         As `simulate` gives it; NaN for a body that is not there.
-    V_c : array (m,), J
     event_table : array (e, 5)
         As in a trajectory: time in s, body, kind, u in m and u' in m/s.
     state_rates : array (m, 6, n)
@@ -54,12 +53,16 @@ class Sensitivity:
     keys: tuple[str, ...]
     t: Array
     state: Array
-    V_c: Array
     event_table: Array
     state_rates: Array
     V_c_rates: Array
     event_rates: Array
     corner: float | None
+
+    @property
+    def V_c(self) -> Array:
+        """Twice the energy (m,) in J, with continuous feedback."""
+        return energy(self.scene.system, self.state).V_c
 
 
 def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
@@ -82,21 +85,16 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     carrier.finish(scene.duration)
     back = np.argsort(order, kind="stable")
     at, late = back[: len(grid)], back[len(grid) :]
-    state, rates = states[at], carrier.out[at]
-    level = energy(system, state).V_c
-    state[:, system.absent_columns] = np.nan
-    check_same(run, grid, state, integrator.event_table)
-    return Sensitivity(
-        scene, tuple(keys), grid, state, level, events, rates,
-        level_rates(system, directions(scene, keys, False) if sampled else changes, states[at], rates),
-        event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late])),
-        carrier.corner,
-    )
+    rates, levels = carrier.out[at], level_rates(system, changes.closed_loop(system), states[at], carrier.out[at])
+    times = event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late]))
+    states[:, system.absent_columns] = np.nan
+    check_same(run, grid, states[at], integrator.event_table)
+    return Sensitivity(scene, tuple(keys), grid, states[at], events, rates, levels, times, carrier.corner)
 
 
 def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array, sampled: bool) -> Carrier:
     """Let a run carry its tangents along, for output times (m,) in s."""
-    carrier = Carrier(integrator, changes, grid)
+    carrier = Carrier(integrator, changes if sampled else changes.closed_loop(scene.system), grid)
     if sampled or scene.system.external:
         carrier.drive_by(scene, changes, sampled)
     integrator.observer = carrier
@@ -113,11 +111,11 @@ def complete(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -
 
 def level_rates(system: System, changes: Directions, state: Array, rates: Array) -> Array:
     """Derivatives (m, n) of V_c at states (m, 6) with derivatives (m, 6, n); of bodies with the feedback in them."""
-    gradient, explicit, weights = np.zeros_like(state), [], []
+    gradient, explicit, weights, bodies = np.zeros_like(state), [], [], system.closed_loop
     for body in system.present:
         place = COLUMN[body]
         x, v = state[:, place], state[:, place + 1]
-        mass, stiffness, _, force = system.closed_loop[body]
+        mass, stiffness, _, force = bodies[body]
         away = force / stiffness if stiffness > 0.0 else 0.0
         gradient[:, place], gradient[:, place + 1] = 2.0 * (stiffness * x - force), 2.0 * mass * v
         explicit += [v * v, x * x - away * away, 2.0 * (away - x)]
@@ -130,4 +128,4 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
         gradient[:, COLUMN[back]] -= push
         explicit.append(2.0 * stored_energy(1.0, pressed))
         weights.append(changes.pairs[side, Law.HERTZIAN])
-    return np.asarray(np.einsum("mi,min->mn", gradient, rates) + np.stack(explicit, axis=1) @ np.array(weights))
+    return np.asarray((gradient[:, None] @ rates)[:, 0] + np.stack(explicit, axis=1) @ np.array(weights))

@@ -18,36 +18,13 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_ros.physics import given
 from grasp_ros.physics.domain import Systems, outside_rows
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, V, X
+from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.scene.parameter import Parameter
+from grasp_ros.scene.places import FEED_FORWARD, PLACES, POSITION_GAIN, SET_POINT, VELOCITY_GAIN, place_of
 from grasp_ros.scene.suggestion import allowed
-
-POSITION_GAIN, VELOCITY_GAIN, SET_POINT, FEED_FORWARD = range(4)
-Place = tuple[str, int, int]  # array of `Block`, row, column
-_ARM = {"mass_kg": Of.MASS, "stiffness_N_per_m": Of.STIFFNESS, "damping_Ns_per_m": Of.DAMPING}
-_PAIR = {"hertz_N_per_m1_5": Law.HERTZIAN, "dissipation_s_per_m": Law.DISSIPATION}
-_GAIN = {"position_gain_N_per_m": POSITION_GAIN, "velocity_gain_Ns_per_m": VELOCITY_GAIN, "set_point_m": SET_POINT,
-         "feed_forward_N": FEED_FORWARD}
-PLACES: dict[str, Place] = {
-    f"{section}.{key}": place
-    for side, name in ((LEFT, "left"), (RIGHT, "right"))
-    for section, array, columns in (
-        (f"{name}_arm", "bodies", _ARM), (f"{name}_contact", "pairs", _PAIR), (f"{name}_feedback", "laws", _GAIN),
-    )
-    for key, column in columns.items()
-    for place in [(array, int(side), column)]
-} | {
-    f"{section}.{key}": ("state", place, 0)
-    for section, x, v in (("left_arm", X.L, V.L), ("object", X.O, V.O), ("right_arm", X.R, V.R))
-    for key, place in (("position_m", x), ("velocity_m_per_s", v))
-} | {
-    "object.mass_kg": ("bodies", int(OBJECT), Of.MASS),
-    "object_friction.viscous_Ns_per_m": ("bodies", int(OBJECT), Of.DAMPING),
-    "object_friction.coulomb_N": ("coulomb", 0, 0),
-}
 
 
 @dataclass
@@ -97,8 +74,7 @@ class Variants:
     @cached_property
     def is_plain(self) -> bool:
         """Whether all rows follow from arrays: changed are numbers of bodies, pairs and feedback that have a place."""
-        tilted = "tilt" in self.scene.values and any(name.endswith(".mass_kg") for name in self.changes)
-        return not tilted and all(name in PLACES for name in self.changes)
+        return all(place_of(self.scene, name) for name in self.changes)
 
     def faults(self) -> dict[int, str]:
         """Sentences for the rows that the scene's rules refuse."""

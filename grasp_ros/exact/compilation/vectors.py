@@ -1,7 +1,8 @@
-"""Eight numbers at once: vectors that kernels load, combine and store, each operation one or two instructions.
+"""Several numbers at once: vectors that kernels load, combine and store, each operation one or two instructions.
 
 Sums that are written out become vector instructions where the compiler finds them; a vector is one by its type. Each of
-its numbers has the bits that it would have alone.
+its numbers has the bits that it would have alone. A vector has eight numbers, or four: where a loop keeps ten sums,
+eight of each are more than a processor with AVX2 has registers for.
 """
 
 from __future__ import annotations
@@ -21,16 +22,20 @@ from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import COMPILED
 from grasp_ros.exact.records import Array, Lanes
 
-WIDTH = 8
-LANES, INDEX = ir.VectorType(ir.DoubleType(), WIDTH), ir.IntType(32)
+WIDTH, HALF = 8, 4
+INDEX = ir.IntType(32)
 ALIGNMENT = np.dtype(float).alignment  # of arrays: vectors lie anywhere in them
 
 
 class Vector(types.Type):
     """The type of a vector in kernels."""
 
+    def __init__(self, width: int) -> None:
+        super().__init__(f"vector of {width}")
+        self.width, self.lanes = width, ir.VectorType(ir.DoubleType(), width)
 
-VECTOR, REAL = Vector(name="vector"), types.float64
+
+KINDS, REAL = {width: Vector(width) for width in (WIDTH, HALF)}, types.float64
 
 
 @register_model(Vector)
@@ -38,76 +43,91 @@ class VectorModel(models.PrimitiveModel):
     """What a vector is for the machine: a register."""
 
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, LANES)
+        super().__init__(manager, kind, kind.lanes)
 
 
-def _filled(builder: Any, kind: Any, value: Any) -> Any:
+def _filled(builder: Any, kind: Any, value: Any, vector: Any) -> Any:
     """A vector as it is, a number as a vector of it."""
-    if kind == VECTOR:
+    if isinstance(kind, Vector):
         return value
-    nothing = ir.Constant(LANES, ir.Undefined)
-    each = ir.Constant(ir.VectorType(INDEX, WIDTH), [0] * WIDTH)
+    nothing = ir.Constant(vector.lanes, ir.Undefined)
+    each = ir.Constant(ir.VectorType(INDEX, vector.width), [0] * vector.width)
     return builder.shuffle_vector(builder.insert_element(nothing, value, INDEX(0)), nothing, each)
 
 
 def _emit(instruction: Callable[..., Any]) -> Any:
     """Code of an operation on vectors, and on numbers in their place."""
     def code(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
-        return instruction(builder, *(_filled(builder, *pair) for pair in zip(kinds.args, values, strict=True)))
+        filled = (_filled(builder, kind, value, kinds.return_type)
+                  for kind, value in zip(kinds.args, values, strict=True))
+        return instruction(builder, *filled)
 
     return code
 
 
 def _of_llvm(name: str) -> Callable[..., Any]:
     def instruction(builder: Any, *vectors: Any) -> Any:
-        kind = ir.FunctionType(LANES, [LANES] * len(vectors))
-        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{WIDTH}f64"), vectors)
+        lanes = vectors[0].type
+        kind = ir.FunctionType(lanes, [lanes] * len(vectors))
+        return builder.call(get_or_insert_function(builder.module, kind, f"llvm.{name}.v{lanes.count}f64"), vectors)
 
     return instruction
 
 
-def _place(context: Any, builder: Any, kinds: Any, array: Any, index: Any) -> Any:
-    data = context.make_array(kinds.args[0])(context, builder, array).data
-    return builder.bitcast(builder.gep(data, [index]), LANES.as_pointer())
+def _place(context: Any, builder: Any, kinds: Any, values: Any, vector: Any) -> Any:
+    data = context.make_array(kinds.args[0])(context, builder, values[0]).data
+    return builder.bitcast(builder.gep(data, [values[1]]), vector.lanes.as_pointer())
 
 
 def _code_of_load(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    return builder.load(_place(context, builder, kinds, *values), align=ALIGNMENT)
+    return builder.load(_place(context, builder, kinds, values, kinds.return_type), align=ALIGNMENT)
 
 
 def _code_of_store(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-    builder.store(values[2], _place(context, builder, kinds, *values[:2]), align=ALIGNMENT)
+    builder.store(values[2], _place(context, builder, kinds, values, kinds.args[2]), align=ALIGNMENT)
     return context.get_dummy_value()
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def load(_: Any, array: Any, index: Any) -> Any:
     """The eight numbers of an array (n,) from an index on."""
-    return VECTOR(array, types.intp), _code_of_load
+    return KINDS[WIDTH](array, types.intp), _code_of_load
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def load_half(_: Any, array: Any, index: Any) -> Any:
+    """The four numbers of an array (n,) from an index on."""
+    return KINDS[HALF](array, types.intp), _code_of_load
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def store(_: Any, array: Any, index: Any, vector: Any) -> Any:
     """Write a vector to an array (n,) from an index on."""
-    return types.void(array, types.intp, VECTOR), _code_of_store
+    return types.void(array, types.intp, vector), _code_of_store
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def spread(_: Any, number: Any) -> Any:
-    """A vector of one number."""
-    return VECTOR(REAL), _emit(lambda _, vector: vector)
+    """A vector of eight times one number."""
+    return KINDS[WIDTH](REAL), _emit(lambda _, vector: vector)
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def spread_half(_: Any, number: Any) -> Any:
+    """A vector of four times one number."""
+    return KINDS[HALF](REAL), _emit(lambda _, vector: vector)
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def vector_of(_: Any, numbers: Any) -> Any:
     """A vector of eight numbers."""
-    def code(_: Any, builder: Any, __: Any, values: Any) -> Any:
-        found = ir.Constant(LANES, ir.Undefined)
+    def code(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        found = ir.Constant(kinds.return_type.lanes, ir.Undefined)
         for i in range(WIDTH):
             found = builder.insert_element(found, builder.extract_value(values[0], i), INDEX(i))
         return found
 
-    return VECTOR(numbers), code
+    return KINDS[WIDTH](numbers), code
 
 
 @intrinsic  # type: ignore[untyped-decorator]
@@ -123,24 +143,25 @@ def numbers_of(_: Any, vector: Any) -> Any:
 def add_product(_: Any, total: Any, vector: Any, factor: Any) -> Any:
     """A total and the product of a vector with another one or a number, with one rounding."""
     fused = _of_llvm("fma")
-    return VECTOR(total, vector, factor), _emit(lambda builder, c, a, b: fused(builder, a, b, c))
+    kind = next(kind for kind in (total, vector, factor) if isinstance(kind, Vector))
+    return kind(total, vector, factor), _emit(lambda builder, c, a, b: fused(builder, a, b, c))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def sizes(_: Any, vector: Any) -> Any:
     """The absolute numbers of a vector."""
-    return VECTOR(vector), _emit(_of_llvm("fabs"))
+    return vector(vector), _emit(_of_llvm("fabs"))
 
 
 @intrinsic  # type: ignore[untyped-decorator]
 def larger(_: Any, first: Any, second: Any) -> Any:
     """The larger of two sizes, number by number."""
     size, most = _of_llvm("fabs"), _of_llvm("maxnum")
-    return VECTOR(first, second), _emit(lambda builder, a, b: most(builder, size(builder, a), size(builder, b)))
+    return first(first, second), _emit(lambda builder, a, b: most(builder, size(builder, a), size(builder, b)))
 
 
 def _numbers(builder: Any, vector: Any) -> list[Any]:
-    return [builder.extract_element(vector, INDEX(i)) for i in range(WIDTH)]
+    return [builder.extract_element(vector, INDEX(i)) for i in range(vector.type.count)]
 
 
 def _code_of_highest(_: Any, builder: Any, __: Any, values: Any) -> Any:
@@ -163,7 +184,8 @@ for operation, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operato
     class Kinds(ConcreteTemplate):
         """What the operator takes beside numbers."""
 
-        cases = tuple(signature(VECTOR, *pair) for pair in ((VECTOR, VECTOR), (VECTOR, REAL), (REAL, VECTOR)))
+        cases = tuple(signature(kind, *pair) for kind in KINDS.values()
+                      for pair in ((kind, kind), (kind, REAL), (REAL, kind)))
 
     for case in Kinds.cases:
         lower_builtin(operation, *case.args)(_emit(getattr(ir.IRBuilder, name)))
@@ -175,13 +197,21 @@ if not COMPILED:
         """The eight numbers of an array (n,) from an index on."""
         return array[index : index + WIDTH].copy()
 
+    def load_half(array: Array, index: int) -> Array:
+        """The four numbers of an array (n,) from an index on."""
+        return array[index : index + HALF].copy()
+
     def store(array: Array, index: int, vector: Array) -> None:
         """Write a vector to an array (n,) from an index on."""
-        array[index : index + WIDTH] = vector
+        array[index : index + len(vector)] = vector
 
     def spread(number: float) -> Array:
-        """A vector of one number."""
+        """A vector of eight times one number."""
         return np.full(WIDTH, number)
+
+    def spread_half(number: float) -> Array:
+        """A vector of four times one number."""
+        return np.full(HALF, number)
 
     def vector_of(numbers: Lanes) -> Array:
         """A vector of eight numbers."""
@@ -197,7 +227,7 @@ if not COMPILED:
 
     def add_product(total: Array, vector: Array, factor: float | Array) -> Array:
         """A total and the product of a vector with another one or a number, with one rounding."""
-        return np.array([*map(fma, vector, np.broadcast_to(factor, WIDTH), total)])
+        return np.array([*map(fma, *np.broadcast_arrays(vector, factor, total))])
 
     def larger(first: Array, second: Array) -> Array:
         """The larger of two sizes, number by number."""
