@@ -197,19 +197,12 @@ def shift(c: Array, n: int, s: float) -> None:
             store(c, i, above)
 
 
-@inlined
-def time_at(c: Array, n: int, s: float) -> tuple[float, float]:
-    """Time since the begin of a step at s, and its derivative by s."""
-    time, pace, _ = value_and_rate(c[Lane.TIME :: LANES], n, s)
-    return time, pace
-
-
 @kernel
 def variable_at(c: Array, n: int, s: float, tau: float) -> float:
     """The s at which the time of a step is tau, which is within its length: by bisection and Newton's iteration."""
     low, high, at = 0.0, s, 0.5 * s
     for _ in range(MOST_HALVINGS):
-        time, pace = time_at(c, n, at)
+        time, pace, _ = value_and_rate(c[Lane.TIME :: LANES], n, at)
         if time > tau:
             high = at
         else:

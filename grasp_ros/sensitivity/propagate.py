@@ -16,16 +16,16 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, surface_factor
+from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import SURFACE
-from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Law, Of, Pair, Slide, U, V, X
+from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
 from grasp_ros.sensitivity.contact import (
     exact_length,
     expand_tangents,
     shift,
     step_tangents,
-    time_at,
     variable_at,
 )
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
@@ -224,7 +224,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         expand_tangents(motion, rates, t.table, n)
         part = exact_length(motion, t.table, n, left)
         ends = part == left
-        reached = span if ends else time_at(motion.c, n, part)[0]
+        reached = span if ends else value_and_rate(motion.c[Lane.TIME :: LANES], n, part)[0]
         while next_output(t.outputs) < (t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)

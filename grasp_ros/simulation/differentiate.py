@@ -85,7 +85,8 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     carrier.finish(scene.duration)
     back = np.argsort(order, kind="stable")
     at, late = back[: len(grid)], back[len(grid) :]
-    rates, levels = carrier.out[at], level_rates(system, changes.closed_loop(system), states[at], carrier.out[at])
+    rates = carrier.out[at]
+    levels = level_rates(system, changes.closed_loop(system), states[at], rates)
     times = event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late]))
     states[:, system.absent_columns] = np.nan
     check_same(run, grid, states[at], integrator.event_table)
@@ -128,4 +129,4 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
         gradient[:, COLUMN[back]] -= push
         explicit.append(2.0 * stored_energy(1.0, pressed))
         weights.append(changes.pairs[side, Law.HERTZIAN])
-    return np.asarray((gradient[:, None] @ rates)[:, 0] + np.stack(explicit, axis=1) @ np.array(weights))
+    return np.asarray(np.einsum("mi,min->mn", gradient, rates) + np.stack(explicit, axis=1) @ np.array(weights))
