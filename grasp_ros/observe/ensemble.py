@@ -152,7 +152,7 @@ def run_row(door: Any, loop: Loop, rows: Rows, i: int, room: Room, limits: Limit
             room.block, room.order, room.plant_block, room.state_block, room.mode, limits.tolerance, limits.max_work,
             room.times, room.rows, room.events, room.filled, room.work, room.observer, loop)
         events += count_events(rows, i, room)
-    return int(outcome)
+    return int(outcome if events <= limits.max_events else Outcome.EVENTS_FULL.value)
 
 
 @kernel

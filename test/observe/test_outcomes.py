@@ -31,6 +31,14 @@ DENSE = (  # continuous feedback
 SETTLES = ("case_01", "case_04", "case_05", "v_jump_symmetric")  # V_c proves it
 
 
+@pytest.mark.parametrize("most", [1, 9, 87, 88])
+def test_a_row_keeps_the_budget_of_events_that_a_run_keeps(most: int) -> None:
+    scene = scenes.load("case_01")
+    table, run = ensemble(scene, {}, ["touches"], setup=Setup(max_events=most)), simulate(scene, max_events=most)
+    assert table.status_names.tolist() == [run.status.name]
+    assert [*table.stops.values()] == [run.stop] * (most < 88)
+
+
 def outcomes_of(scene: Scene, **settings: object) -> dict[str, float]:
     table: Table = ensemble(scene, {}, EVERY, setup=Setup(**settings))  # type: ignore[arg-type]
     assert not table.stops
