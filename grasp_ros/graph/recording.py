@@ -28,7 +28,7 @@ from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.tables import Tabular
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recording(Tabular, Frozen):
     """What is in a bag.
 

@@ -47,7 +47,7 @@ class Residuals(NamedTuple):
     white: float  # Ljung-Box test: probability of correlations as large by chance; see `whiteness`
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit(Frozen):
     """Numbers of a scene, estimated from a measured motion.
 

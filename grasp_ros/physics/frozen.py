@@ -28,8 +28,35 @@ def _thawed(value: Any) -> Any:
     return {key: _thawed(entry) for key, entry in value.items()} if isinstance(value, Mapping) else value
 
 
+def _values(record: Any) -> tuple[Any, ...]:
+    """What the fields of a record hold."""
+    return tuple(getattr(record, own.name) for own in fields(record))
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values are equal all through; NaN equals NaN in arrays."""
+    if isinstance(one, np.ndarray):
+        return one.dtype == getattr(other, "dtype", None) and np.array_equal(one, other, one.dtype.kind == "f")
+    if isinstance(one, Mapping):
+        return isinstance(other, Mapping) and one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
+    if isinstance(one, tuple):
+        return isinstance(other, tuple) and len(one) == len(other) and all(map(_same, one, other))
+    return bool(one == other)
+
+
 class Frozen:
-    """Base of dataclasses with `frozen=True` whose content is frozen as well; they can be copied and pickled."""
+    """Base of dataclasses with `frozen=True, eq=False` whose content is frozen as well.
+
+    They can be copied, pickled and hashed; equal are those whose fields are.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all fields are equal."""
+        return type(other) is type(self) and all(map(_same, _values(self), _values(other)))
+
+    def __hash__(self) -> int:
+        """By the texts among the fields."""
+        return hash(tuple(text for text in _values(self) if isinstance(text, str)))
 
     def __post_init__(self) -> None:
         """Freeze all fields."""
@@ -38,4 +65,4 @@ class Frozen:
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         """A new record of the same fields."""
-        return type(self), tuple(_thawed(getattr(self, field.name)) for field in fields(self))  # type: ignore[arg-type]
+        return type(self), tuple(map(_thawed, _values(self)))

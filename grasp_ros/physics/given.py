@@ -92,8 +92,10 @@ def column(name: str, values: Any) -> NDArray[np.float64]:
     return array.astype(np.float64)
 
 
-def times(name: str, values: Any) -> NDArray[np.float64]:
+def times(name: str, values: Any, several: bool = False) -> NDArray[np.float64]:
     """Times (n,) in s from numbers, one number, or lengths of time of Python, numpy or pandas; always a new array.
+
+    `several`: of any shape, that of the values.
 
     Raises
     ------
@@ -105,7 +107,8 @@ def times(name: str, values: Any) -> NDArray[np.float64]:
         array = array.astype("timedelta64[us]")
     if array.dtype.kind == "m":
         array = array / SECOND
-    return column(name, array.reshape(1) if array.ndim == 0 else array)
+    found = column(name, array.ravel() if several or array.ndim == 0 else array)
+    return found.reshape(array.shape) if several else found
 
 
 def forces(name: str, values: Any) -> NDArray[np.float64]:

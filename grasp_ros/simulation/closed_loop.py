@@ -63,7 +63,7 @@ def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[
         for name in numbers:
             if name.startswith(replaced):
                 raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
-            if name not in live or not 0 <= tick <= scene.ticks:
+            if name not in live or tick not in range(scene.ticks + 1):
                 raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 

@@ -11,6 +11,7 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.impact_law import elastic_force, stored_energy
 from grasp_ros.physics.layout import LEFT, OBJECT, Entry, Law, Of
 from grasp_ros.physics.model import Array
@@ -24,8 +25,8 @@ from grasp_ros.simulation.repeat import check_same, integrator_of
 from grasp_ros.simulation.trajectory import Trajectory
 
 
-@dataclass(frozen=True)
-class Sensitivity:
+@dataclass(frozen=True, eq=False)
+class Sensitivity(Frozen):
     """The derivatives of a run by n numbers.
 
     Attributes

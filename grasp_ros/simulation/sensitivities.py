@@ -23,7 +23,7 @@ from grasp_ros.simulation.tables import frame_of
 from grasp_ros.simulation.variants import Variants
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SensitivityTable(Frozen):
     """Last states of n variants of a scene, with their derivatives by k numbers.
 

@@ -18,7 +18,8 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
+from grasp_ros.physics.given import times
+from grasp_ros.physics.layout import LEFT, RIGHT, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.scene import Scene
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from grasp_ros.simulation.differentiate import Sensitivity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Trajectory(Tabular, Frozen):
     """A simulated or recorded motion.
 
@@ -168,9 +169,9 @@ class Trajectory(Tabular, Frozen):
         Raises
         ------
         Refused
-            If a time is outside the run, or the run cannot be repeated.
+            If a time is none, or outside the run, or the run cannot be repeated.
         """
-        return states_at(self, np.asarray(t, dtype=float))
+        return states_at(self, times("t", t, several=True))
 
     @cached_property
     def events(self) -> list[Event]:
@@ -232,7 +233,16 @@ class Trajectory(Tabular, Frozen):
         return html_of_run(self)
 
     def times(self, kind: Transition, side: int) -> Array:
-        """Times in s of one side's events of a kind."""
+        """Times in s of one side's events of a kind, LEFT, RIGHT or, of friction, OBJECT.
+
+        Raises
+        ------
+        Refused
+            If there is no such kind or side.
+        """
+        for name, value, known in (("kind", kind, Transition), ("side", side, Body)):
+            if value not in [*known]:
+                raise Refused(f"{name}: {value!r} is not allowed; allowed: {', '.join(one.name for one in known)}")
         chosen: Array = self.event_table[(self.event_table[:, 1] == side) & (self.event_table[:, 2] == kind), 0]
         return chosen
 

@@ -219,6 +219,9 @@ def test_a_change_of_feedback_that_does_not_act_is_refused() -> None:
     change = {5: {"left_feedback.position_gain_N_per_m": 9.0}}
     with pytest.raises(Refused, match="another controller acts"):
         simulate(scenes.load("case_01"), sampled=True, changes=change, controllers={"left": paper})
+    for tick in (1.5, -1, "1", 20_001):
+        with pytest.raises(Refused, match=r"changes: .* at 0 to 20000"):
+            simulate(scenes.load("case_01"), sampled=True, changes={tick: change[min(change)]})  # type: ignore[dict-item]
 
 
 def simulates(scene: Scene) -> Callable[[int, float, float, float], float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ from documents import case_of
 
 from grasp_ros import scene
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation import Trajectory, load, simulate
+from grasp_ros.physics.layout import LEFT, Transition
+from grasp_ros.simulation import Trajectory, ensemble, load, simulate
 
 TIMES = np.array([1.7, 0.0, 0.43070539, 2.0, 0.43070539, 1.23456789])
 RUNS = {
@@ -34,6 +36,37 @@ def test_states_at_any_time_are_those_of_a_run_with_these_output_times(kind: str
     assert run.at(TIMES.reshape(2, 3)).shape == (2, 3, 6)
     assert run.at(1.7).tobytes() == expected[0].tobytes()
     assert run.at([]).shape == (0, 6)
+
+
+@pytest.mark.parametrize("times", [np.timedelta64(1500, "ms"), [np.timedelta64(1500, "ms")], (t for t in (1.5,))])
+def test_times_may_be_lengths_of_time(times: Any) -> None:
+    assert np.ravel(simulate(case_of()).at(times)).tolist() == simulate(case_of(), grid=1.5).state[0].tolist()
+
+
+@pytest.mark.parametrize("times", ["1.5", None, True, [[0.0], [0.0, 1.0]], 1j])
+def test_what_is_no_time_is_refused(times: Any) -> None:
+    with pytest.raises(Refused, match=r"^t: .*; allowed: numbers \(n,\)"):
+        simulate(case_of()).at(times)
+
+
+@pytest.mark.parametrize(("kind", "side"), [("touch", LEFT), (Transition.TOUCH, "left"), (9, LEFT)])
+def test_what_is_no_kind_or_side_is_refused(kind: Any, side: Any) -> None:
+    with pytest.raises(Refused, match=r"allowed: (TOUCH|LEFT), "):
+        simulate(case_of()).times(kind, side)
+
+
+def test_records_are_equal_whose_content_is(tmp_path: Path) -> None:
+    run = simulate(case_of(), sensitivity=["object.mass_kg"])
+    table = ensemble(run.scene, {"object.mass_kg": [1.0, -1.0]}, ["touches"])
+    for record in (run, run.scene, table):
+        again = copy.deepcopy(record)
+        assert again == record
+        assert {again} == {record}
+    other = simulate(case_of(), max_events=3)
+    assert run != other
+    other.save(tmp_path / "run.npz")
+    assert load(tmp_path / "run.npz") == other
+    assert table != ensemble(run.scene, {"object.mass_kg": [1.0, 1.0]}, ["touches"])
 
 
 def test_a_run_from_a_file_is_as_dense(tmp_path: Path) -> None:
