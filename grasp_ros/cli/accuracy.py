@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest, unfinished
@@ -49,7 +49,7 @@ def _accuracy(options: argparse.Namespace) -> int:
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
     late = unfinished(records, contenders)
     more = [f"after {options.seconds:g} s not all settings were measured, --seconds allows more: {', '.join(late)}"]
-    text = [*_table(truth, records), *(more if late else []), *(f"not here: {reason}" for reason in others.values()),
+    text = [*_table(truth, records), *(more if late else []), *_not_here(others),
             *([] if advice is None else _advice(again, options, advice))]
     show(options, "\n".join(text), {
         "scene": scene.name, "uncertainty": truth.uncertainty, "touches": truth.touches, "not_here": others,
@@ -60,6 +60,14 @@ def _accuracy(options: argparse.Namespace) -> int:
 
         write_figure(error_against_time(scene, truth, records, advice, options.error, options.budget), options.output)
     return 0 if advice is None or advice.choice is not None else 1
+
+
+def _not_here(others: Mapping[str, str]) -> list[str]:
+    """A line for each reason, with the names of all methods that it is of."""
+    alike: dict[str, list[str]] = {}
+    for name, reason in others.items():
+        alike.setdefault(reason.removeprefix(f"{name}: "), []).append(name)
+    return [f"not here: {', '.join(names)}: {reason}" for reason, names in alike.items()]
 
 
 def _table(truth: Truth, records: Sequence[Record]) -> list[str]:

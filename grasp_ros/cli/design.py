@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, whole
+from grasp_ros.cli.arguments import add_accuracy, add_command, add_file, add_json, add_scene, named, whole
 from grasp_ros.cli.checks import check_output, load_scene, prepare
 from grasp_ros.cli.output import bar, figure_endings, show, write_figure, write_scene
 from grasp_ros.physics.errors import Refused
@@ -32,7 +31,7 @@ def add_to(commands: Any) -> None:
                      help="largest value of an outcome")
     sub.add_argument("--sampled", action="store_true", help="hold each command over a control period, as a graph does")
     sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the search (default 0)")
-    sub.add_argument("--figure", type=Path, metavar="FIGURE",
+    sub.add_argument("--figure", type=named, metavar="FIGURE",
                      help="draw the outcome along each number, or two outcomes")
     add_accuracy(sub)
     add_file(sub, "FILE.yaml", "write the scene with the numbers chosen; - is the standard output")

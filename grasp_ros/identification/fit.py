@@ -13,7 +13,7 @@ from grasp_ros.identification.result import Against, Fit, residual_table, seen_b
 from grasp_ros.identification.search import Problem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, check_scene
 
 
 def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
@@ -47,6 +47,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         import scipy.optimize  # noqa: F401
     except ModuleNotFoundError as error:
         raise Refused(f"a fit needs {error.name}; pip install '.[fit]' in the checkout") from None
+    if scene is not None:
+        check_scene(scene)
     free, found = [free] if isinstance(free, str) else list(free), measured(data, scene, by_sensors)
     numbers = numbers_of(found.scene, free, found)
     if any(acts(number.key) for number in numbers):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +18,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import reading
+from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.simulation.tables import COLUMNS, HEADS, TIME
 from grasp_ros.simulation.ticks import tick_times
@@ -85,7 +86,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     else:
         path = Path(source)
         found = _of_trajectory(load(path), str(path))
-    return _checked(found if scene is None else found._replace(scene=scene))
+    return _checked(found if scene is None else found._replace(scene=scene, sampled=found.sampled or scene.sampled))
 
 
 def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
@@ -131,12 +132,14 @@ def _of_table(path: Path, scene: Scene) -> Measured:
 
 def _columns(path: Path) -> Mapping[str, Array]:
     """Numbers (n,) by the names in the first line; NaN where nothing stands."""
-    with reading(path):
-        names, *lines = [line.split(",") for line in path.read_text(encoding="utf-8-sig").splitlines()] or [[""]]
+    with reading(path), decoding(path, "a table", also=(csv.Error,)):
+        names, *lines = [*csv.reader(path.read_text(encoding="utf-8-sig").splitlines())] or [[""]]
     if len({*names}) < len(names):
         raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
     rows = []
     for number, line in enumerate(lines, 2):
+        if not line:  # at the end of a file, say
+            continue
         if len(line) != len(names):
             raise Refused(f"{path}: line {number}: {len(line)} entries; allowed: {len(names)}")
         try:

@@ -79,11 +79,8 @@ def _offset(key: str, data: Measured) -> Number:
 
 
 def _number(scene: Scene, key: str) -> Number:
-    section, _, name = key.partition(".")
-    if name not in scene.values.get(section, {}):
-        known = [f"{own}.{entry}" for own, found in scene.values.items() for entry in found]
-        raise Refused(f"--free {key}: not in {scene.name}; {allowed(key, known, f'{OFFSET}CHANNEL, or ')}")
-    parameter, value = check_key(scene, key), float(scene.values[section][name])
+    parameter, section = check_key(scene, key), key.partition(".")[0]
+    value = float(scene.values[section][parameter.key])
     if parameter.low < 0.0:
         return Number(key, value, False, max(abs(value), 1.0))
     if value == 0.0:

@@ -40,7 +40,7 @@ def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
     figure.suptitle(plan.scene.title, fontsize="medium")
     if len(plan.axes) == 1:
         x = plan.axes[0]
-        axes.plot(x.values, values, ".", markersize=DOT)
+        axes.plot(x.values, values, ".", markersize=_dot(len(values)))
         axes.set(xlabel=label_of(x.name), xscale=_scale(x), ylabel=label)
     else:
         heat(axes, plan, values, label)
@@ -68,6 +68,11 @@ def _norm(shown: Any) -> Normalize:
     return Normalize()
 
 
+def _dot(count: int) -> float:
+    """Size of a dot: larger where there are few."""
+    return max(DOT, min(4.0 * DOT, 100.0 * DOT / max(count, 1)))
+
+
 def _scale(axis: Axis) -> str:
     return "log" if axis.log else "linear"
 
@@ -85,7 +90,8 @@ def _sample(data: Any, plan: Plan, values: np.ndarray, label: str, path: Path) -
     first.set_ylabel("runs")
     shown = np.flatnonzero(finite)[:SCATTERED]
     for axes, name in zip(others, strongest, strict=True):
-        axes.plot(data[name].values[shown], values[shown], ".", markersize=DOT, alpha=0.3, color="#333333")
+        axes.plot(data[name].values[shown], values[shown], ".", markersize=_dot(len(shown)), color="#333333",
+                  alpha=max(0.3, min(1.0, 30.0 / max(len(shown), 1))))
         axes.set_xlabel(textwrap.fill(label_of(name), LETTERS), fontsize="small")
         axes.set_ylabel(label, fontsize="small")
         axes.set_xscale(_scale(next(axis for axis in plan.axes if axis.name == name)))

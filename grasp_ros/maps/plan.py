@@ -68,13 +68,9 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
     if points and not grid:
         raise Refused(f"{option} {text}: there is no grid of {points} values; allowed: low:high, and ::log behind it")
     try:
-        axis = Axis(name, read_number(low), read_number(high), int(points or POINTS), bool(log))
+        return Axis(name, read_number(low), read_number(high), int(points or POINTS), bool(log))
     except ValueError:
         raise Refused(f"{option} {text}: not understood; {allowed}") from None
-    finite = math.isfinite(axis.low) and math.isfinite(axis.high)
-    if not (finite and axis.low < axis.high and 2 <= axis.points <= MOST) or (axis.log and axis.low <= 0.0):
-        raise Refused(f"{option} {text}: is not allowed; {allowed}")
-    return axis
 
 
 @dataclass(frozen=True)
@@ -174,6 +170,10 @@ def check(plan: Plan) -> None:
     if not plan.sample and len(plan.axes) > MOST_AXES:
         raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
     for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
+        ascends = -math.inf < axis.low < axis.high < math.inf
+        if not ascends or axis.points > MOST or (axis.log and axis.low <= 0.0):
+            raise Refused(f"{key}: {axis.low!r} to {axis.high!r}, {axis.points} values is not allowed; allowed: low <"
+                          f" high, 2 to {MOST:,} values, and > 0 where logarithmic")
         parameter = parameter_of(plan.scene, key)
         if parameter.whole:
             raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")

@@ -50,7 +50,11 @@ class Store:
         wanted = json.loads(json.dumps(plan.to_document()))
         self._lines = plan.rows // plan.shape[0]
         if not path.exists():
-            _create(path, plan, wanted, max(1, rows // self._lines))
+            try:
+                _create(path, plan, wanted, max(1, rows // self._lines))
+            except Refused:
+                if not path.exists():  # otherwise somebody has begun the same, or another one, in these milliseconds
+                    raise
         self._group = open_group(path, "r+")
         self._check(wanted)
 

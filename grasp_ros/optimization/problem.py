@@ -62,6 +62,9 @@ class Problem:
         if not 1 <= len(minimise) <= 2 or len(set(minimise)) < len(minimise):
             raise Refused(f"minimise: {', '.join(minimise) or 'nothing'}; allowed: one outcome, or two different ones")
         self.scene, self.axes, self.minimise, self.bounds = scene, tuple(axes), tuple(minimise), tuple(bounds)
+        for bound in self.bounds:
+            if not math.isfinite(bound.most):
+                raise Refused(f"{bound.outcome} <= {bound.most!r} is not allowed; allowed: a finite number")
         self.names = tuple(dict.fromkeys([*minimise, *(bound.outcome for bound in bounds)]))
         for name in self.names:
             if len({column.unit for column in find([name])}) > 1:
@@ -105,14 +108,10 @@ def read_bound(text: str) -> Bound:
     Raises
     ------
     Refused
-        If it is written otherwise, or there is no such outcome.
+        If it is written otherwise.
     """
-    name, sign, most = re.sub(r"\s", "", text).partition("<=")
+    name, _, most = re.sub(r"\s", "", text).partition("<=")
     try:
-        bound = Bound(name, read_number(most))
+        return Bound(name, read_number(most))
     except ValueError:
-        bound = Bound(name, math.nan)
-    if not sign or not math.isfinite(bound.most):
-        raise Refused(f"--subject-to {text}: not understood; allowed: OUTCOME<=NUMBER")
-    find([name])
-    return bound
+        raise Refused(f"--subject-to {text}: not understood; allowed: OUTCOME<=NUMBER") from None

@@ -16,6 +16,7 @@ from grasp_ros.maps.plan import Axis
 from grasp_ros.optimization.problem import Bound, Problem
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
+from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup
@@ -26,7 +27,7 @@ FRONT = 12  # choices along two outcomes
 BROKEN, NOTHING = 1e100, 1e140  # above every outcome: a bound is broken; there is no outcome; squares are finite
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Design(Frozen):
     """A choice of the free numbers.
 
@@ -73,8 +74,9 @@ def design(
     Refused
         If a number, a range, an outcome or a bound cannot be; and see `search`.
     """
-    axes = [Axis(name, float(low), float(high)) for name, (low, high) in free.items()]
-    bounds = [Bound(name, float(most)) for name, most in (subject_to or {}).items()]
+    axes = [Axis(name, number(f"{name}: low", low), number(f"{name}: high", high))
+            for name, (low, high) in free.items()]
+    bounds = [Bound(name, number(name, most)) for name, most in (subject_to or {}).items()]
     return search(Problem(scene, axes, [minimise], bounds, setup), seed, progress)
 
 
@@ -98,7 +100,7 @@ def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | 
         from scipy.optimize import differential_evolution
     except ModuleNotFoundError:
         raise Refused("`grasp design` needs scipy; pip install '.[design]' in the checkout") from None
-    runs = 0
+    runs, seed = 0, whole("seed", seed, 0)
 
     def function(parts: Array) -> Array:
         nonlocal runs

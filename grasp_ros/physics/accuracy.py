@@ -17,5 +17,5 @@ def check_accuracy(accuracy: float) -> float:
     """
     found = number("accuracy", accuracy)
     if not FINEST <= found <= COARSEST:
-        raise Refused(f"accuracy: {accuracy!r} is outside [{FINEST}, {COARSEST}]")
+        raise Refused(f"accuracy: {accuracy!r} is not allowed; allowed: {FINEST:g} to {COARSEST:g}")
     return found

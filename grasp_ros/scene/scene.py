@@ -26,6 +26,7 @@ from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import YAML, read_text, reading
 from grasp_ros.scene.html import numbers_of, table
 from grasp_ros.scene.library import names, text_of
+from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.settings import apply
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
@@ -39,7 +40,7 @@ PAPER = frozenset(  # the sections of the paper's grasp
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene(Frozen):
     """A validated scene; `load`, `parse`, `compose` and `changed` make one.
 
@@ -177,12 +178,22 @@ class Scene(Frozen):
         """
         document = self._document()
         for name, number in numbers.items():
-            section, _, key = name.partition(".")
-            if key not in self.values.get(section, {}):
-                known = [f"{own}.{key}" for own, found in self.values.items() for key in found]
-                raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(name, known)}")
-            document[section][key] = number
+            document[name.partition(".")[0]][self.parameter(name).key] = number
         return _read(document, self.name, self.name, self.values)
+
+    def parameter(self, name: str) -> Parameter:
+        """What a number of the scene is, by "section.key".
+
+        Raises
+        ------
+        SceneError
+            If the scene does not name it.
+        """
+        section, _, key = str(name).partition(".")
+        if key not in self.values.get(section, {}):
+            known = [f"{own}.{key}" for own, found in self.values.items() for key in found]
+            raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(str(name), known)}")
+        return next(own for own in BY_SECTION[section].parameters if own.key == key)
 
     def to_yaml(self) -> str:
         """The whole scene as YAML; `parse` of it gives the same scene to the last bit."""
@@ -200,6 +211,13 @@ class Scene(Frozen):
         watch = {"watch": self.watch} if self.watch else {}
         values = {section: dict(numbers) for section, numbers in self.values.items()}
         return {"title": self.title, "readings": self.readings, **watch, **values}
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene."""
+    if not isinstance(scene, Scene):
+        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
+        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
 
 
 def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:

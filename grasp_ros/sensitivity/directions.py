@@ -18,7 +18,7 @@ from grasp_ros.physics.layout import LEFT, OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
-from grasp_ros.scene.effects import BY_SECTION, build
+from grasp_ros.scene.effects import build
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.places import place_of
 
@@ -113,10 +113,7 @@ def check_key(scene: Scene, key: str) -> Parameter:
     Refused
         If the scene does not name it, or it does not enter smoothly.
     """
-    section, _, name = key.partition(".")
-    if name not in scene.values.get(section, {}):
-        raise Refused(f"{scene.name}: {key}: not in this scene; allowed: what it names")
-    (parameter,) = (parameter for parameter in BY_SECTION[section].parameters if parameter.key == name)
+    parameter = scene.parameter(key)
     if parameter.several:
         raise Refused(f"{scene.name}: {key}: it is a list; allowed: single numbers")
     if parameter.unit in NOT_SMOOTH or parameter.whole:

@@ -36,6 +36,7 @@ from matplotlib.figure import Figure  # noqa: E402
 __all__ = ["Axes", "Figure", "LogNorm", "Normalize", "colormaps", "figure", "style", "subplots"]  # behind this door
 OTHERS = ("backend", "backend_fallback", "interactive", "toolbar", "timezone")  # of windows and of dates: we draw none
 DEFAULTS = {name: value for name, value in matplotlib.rcParamsDefault.items() if name not in OTHERS}
+DEFAULTS["axes.formatter.useoffset"] = False  # 19.995, and not 0.005 beside a small +1.999e1
 
 
 @contextmanager

@@ -24,12 +24,11 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, check_scene
 from grasp_ros.scene.files import opened
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
-from grasp_ros.simulation.simulate import check_scene
 from grasp_ros.simulation.tables import frame_of, write_rows
 from grasp_ros.simulation.variants import Variants, parameter_of
 
@@ -38,7 +37,7 @@ Span = tuple[int, int]
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Table(Frozen):
     """An ensemble: its numbers and its outcomes, a row for each run.
 

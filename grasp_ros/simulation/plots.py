@@ -93,8 +93,9 @@ def compose(
 
     By default it is 230 mm wide, or 150 mm for each of several motions, and has the whole motions and all of PANELS.
     """
-    if any(not len(motion.t) for motion in motions):
-        raise Refused("nothing to draw: the motion has no output times")
+    for motion in motions:
+        if not len(motion.t) or motion.t[0] == motion.t[-1]:
+            raise Refused("nothing to draw: the motion has fewer than two output times")
     width = width_mm or (WIDTH_MM if len(motions) == 1 else 150.0 * len(motions))
     if width_mm is not None and not NARROWEST_MM <= width_mm <= WIDEST_MM:
         raise Refused(f"--width {width_mm!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")

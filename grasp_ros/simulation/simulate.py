@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import length_hint
@@ -21,7 +20,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, check_scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, foreign_controllers, solve
 from grasp_ros.simulation.progress import showing
@@ -29,13 +28,6 @@ from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
 
 GRID_POINTS = 2001
-
-
-def check_scene(scene: object) -> None:
-    """Refuse what is no scene."""
-    if not isinstance(scene, Scene):
-        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
-        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
 
 
 def simulate(
@@ -146,4 +138,4 @@ def check_grid(scene: Scene, grid: Array) -> None:
     if not (math.isfinite(first) and math.isfinite(last) and (len(grid) < 2 or (grid[1:] >= grid[:-1]).all())):
         raise Refused("grid: allowed: ascending finite times")
     if not 0.0 <= first <= last <= scene.duration:
-        raise Refused(f"grid: [{grid[0]!r}, {grid[-1]!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")
+        raise Refused(f"grid: [{first!r}, {last!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")

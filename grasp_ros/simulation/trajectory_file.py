@@ -16,7 +16,7 @@ from grasp_ros.physics.lyapunov import Parts
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.files import decoding
+from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.npz import TEXT, Field, read_npz
 from grasp_ros.simulation.ticks import Loop, tick_of
 from grasp_ros.simulation.trajectory import Trajectory
@@ -46,7 +46,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         If the file is not such a file.
     """
     path = Path(path)
-    with decoding(path, "a file of `grasp simulate`"):
+    with decoding(path, "a file of `grasp simulate`"), reading(path):
         data = read_npz(path, FIELDS)
         words = {name: str(data[name]) for name in _WORDS}
         scene, method = scenes.parse(words["scene"], words["scene_name"], str(path)), find(words["method"])

@@ -20,11 +20,9 @@ from grasp_ros.physics.domain import Systems, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene, SceneError
-from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene import Scene, SceneError, check_scene
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.places import FEED_FORWARD, PLACES, POSITION_GAIN, SET_POINT, VELOCITY_GAIN, place_of
-from grasp_ros.scene.suggestion import allowed
 
 
 @dataclass
@@ -118,9 +116,8 @@ class Variants:
 
 
 def parameter_of(scene: Scene, name: str) -> Parameter:
-    """What a number of a scene is, by "section.key"; lists are none."""
-    known = {f"{own}.{parameter.key}": parameter for own in scene.values for parameter in BY_SECTION[own].parameters
-             if parameter.key in scene.values[own] and not parameter.several}
-    if name not in known:
-        raise Refused(f"{scene.name}: {name}: not a number of this scene; {allowed(name, known)}")
-    return known[name]
+    """What a number of a scene is, by "section.key"; lists are refused."""
+    check_scene(scene)
+    if (parameter := scene.parameter(name)).several:
+        raise Refused(f"{scene.name}: {name}: is a list; allowed: single numbers")
+    return parameter

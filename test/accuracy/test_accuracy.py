@@ -18,6 +18,7 @@ from grasp_ros.accuracy.compare import QUICK, advise, compare, fastest, unfinish
 from grasp_ros.accuracy.contender import Answer, Contender, own_contenders
 from grasp_ros.accuracy.measure import NOT_INSTALLED, attempt
 from grasp_ros.accuracy.truth import Truth, finest
+from grasp_ros.cli.accuracy import _not_here
 from grasp_ros.physics.errors import Refused
 
 LAST = [-0.008512122262300985, -0.011087931065097529, -0.005641499599319586, 0.0034325068122038564,
@@ -111,6 +112,7 @@ def test_methods_that_do_not_know_a_scene_are_named() -> None:
     contenders, others = own_contenders(scenes.load("everything"))
     assert [contender.name for contender in contenders] == ["exact"]
     assert "only continuous feedback" in others["rk4"]
+    assert len(_not_here(others)) == 1
 
 
 @pytest.mark.slow

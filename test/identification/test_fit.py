@@ -14,6 +14,7 @@ import pytest
 
 from grasp_ros import fit, load, read_bag, simulate
 from grasp_ros.graph.processes import Graph
+from grasp_ros.identification.measured import measured
 from grasp_ros.identification.result import whiteness
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
@@ -190,6 +191,20 @@ def test_a_bag_whose_sensors_are_noisy(tmp_path: Path) -> None:
     off = np.abs(found.estimates - [*CONTACTS.values()]) / np.sqrt(np.diag(found.covariance))
     assert ((off > 1e-3) & (off < 4.0)).all()
     assert all(contact.white > 1e-4 or np.isnan(contact.white) for contact in found.contacts)
+
+
+def test_a_table_may_be_quoted_and_end_with_an_empty_line(tmp_path: Path) -> None:
+    run = simulate(SCENE)
+    run.to_csv(tmp_path / "plain.csv")
+    lines = [",".join(f'"{word}"' for word in line.split(",")) for line in (tmp_path / "plain.csv").read_text().split()]
+    (tmp_path / "quoted.csv").write_text("\r\n".join([*lines, "", ""]))
+    plain, quoted = (measured(tmp_path / f"{name}.csv", run.scene) for name in ("plain", "quoted"))
+    assert quoted.state.tobytes() == plain.state.tobytes()
+
+
+def test_a_scene_with_a_loop_holds_its_commands_whatever_the_data_came_from() -> None:
+    run, held = simulate(SCENE), load("case_01", ["loop={}"])
+    assert measured(run, held).acting == "the held commands of the scene"
 
 
 ROWS = "t_s,x_left_m,x_object_m\n" + "".join(f"{0.01 * row},{-0.3 + 0.001 * row},0\n" for row in range(20))

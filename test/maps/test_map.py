@@ -261,9 +261,10 @@ def test_a_settling_time_that_nothing_proves_is_counted_and_explained(
 def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words, answer in (
         ([], "axes: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
-        (["--x", f"{GAIN}=9:1:4"], "9:1:4: is not allowed"), (["--x", f"{GAIN}=-1:1:4:log"], "is not allowed"),
+        (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0, 4 values is not allowed"),
+        (["--x", f"{GAIN}=-1:1:4:log"], "> 0 where logarithmic"),
         (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
-        (["--x", "object.weight=1:2"], "object.weight: not a number of this scene"),
+        (["--x", "object.weight=1:2"], "object.weight: not in this scene"),
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
         (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "there is no grid of 3 values; allowed: low:high, and ::log"),

@@ -139,7 +139,7 @@ def test_what_a_method_cannot_do_is_refused(options: dict[str, Any], complaint: 
 
 def test_scenes_with_more_than_the_basic_grasp_are_refused() -> None:
     more = scenes.load("case_01", ["tilt.angle_rad=0.1", "tilt.gravity_m_per_s2=9.81"])
-    with pytest.raises(ValueError, match="case_01: has tilt: rk4 knows the paper's grasp alone"):
+    with pytest.raises(ValueError, match="rk4: case_01 has tilt; it knows the paper's grasp alone"):
         simulate(more, method="rk4")
     less = scenes.compose("case_01", {key: value for key, value in scenes.load("case_01").values.items()
                                       if key not in ("object", "left_contact", "right_contact")})

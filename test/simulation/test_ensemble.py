@@ -114,7 +114,7 @@ def test_arrays_are_built_and_refused_like_scenes() -> None:
 def test_what_cannot_be_varied_is_refused() -> None:
     scene = scenes.load("table")
     for changes, words in (
-        ({"left_arm.weight_kg": [1.0]}, r"left_arm.weight_kg: not a number of this scene; did you mean .*\?"),
+        ({"left_arm.weight_kg": [1.0]}, r"left_arm.weight_kg: not in this scene; did you mean .*\?"),
         ({"left_arm.mass_kg": [1.0], "object.mass_kg": [1.0, 2.0]}, "one length"),
         ({"left_arm.mass_kg": [[1.0]]}, r"left_arm.mass_kg: shape \(1, 1\) .* allowed: \(n,\)"),
     ):

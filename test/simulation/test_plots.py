@@ -62,8 +62,9 @@ def test_what_is_refused(tmp_path: Path) -> None:
     run = simulate(scenes.load("case_01"))
     with pytest.raises(Refused, match=r"--width 1.0 is not allowed; allowed: 60 to 1000 mm"):
         compose([run], [""], width_mm=1.0)
-    with pytest.raises(Refused, match="no output times"):
-        plots.draw(simulate(scenes.load("case_01"), grid=np.zeros(0)), tmp_path / "a.png", "")
+    for grid in ([], [1.0], [1.0, 1.0]):
+        with pytest.raises(Refused, match="fewer than two output times"):
+            plots.draw(simulate(scenes.load("case_01"), grid=grid), tmp_path / "a.png", "")
 
 
 DRAWN = """
