@@ -16,9 +16,8 @@ from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import format_of
-from grasp_ros.simulation.chunk import STATUSES, Setup
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup
 from grasp_ros.simulation.outcomes import GROUPS, find
-from grasp_ros.simulation.quantities import HORIZONS, SETTLED
 
 PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
 RANGE = "KEY[+KEY]=low:high[:n[:log]]"

@@ -16,7 +16,7 @@ from grasp_ros.physics.errors import printable
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
-from grasp_ros.simulation.quantities import SETTLED
+from grasp_ros.simulation.chunk import SETTLED
 from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
 
 Row = tuple[str, str]

@@ -28,9 +28,10 @@ from grasp_ros.scene.places import SET_POINT
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
-from grasp_ros.simulation.quantities import HORIZONS, SETTLED
 from grasp_ros.simulation.variants import Variants
 
+SETTLED = 0.02  # of the largest initial displacement
+HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
 REFUSED = "REFUSED"
 STATUSES = (Status.DONE.name, REFUSED, *(status.name for status in Status if status is not Status.DONE))
 TOUCHES = len((LEFT, RIGHT))
@@ -93,7 +94,7 @@ def check(scene: Scene, setup: Setup) -> list[Outcome]:
     return columns
 
 
-def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -> Chunk:
+def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, in_one_call: bool = True) -> Chunk:
     """Run some rows, one after the other; a `stop` that is not 0 ends it early, with rows left out."""
     columns, n = find(setup.outcomes), variants.rows
     runs = Runs(np.full((n, SEEN), np.nan), np.full((n, 6), np.nan), np.zeros((n, TOUCHES)), np.full(n, np.nan))
@@ -102,7 +103,7 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER) -
         status[i] = STATUSES.index(REFUSED)
     left = np.flatnonzero(status == 0)
     plain = COMPILED and variants.is_plain and not has_inputs(variants.scene, setup)  # rows need no interpreter
-    if plain and all(column.name != LYAPUNOV for column in columns):
+    if in_one_call and plain and all(column.name != LYAPUNOV for column in columns):
         left = _run_plain(variants, setup, wanted_by(columns), runs, left, stop)
     for i in left.tolist():
         if stop[0]:

@@ -6,20 +6,18 @@ other motion what its states at every control period and output time tell.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.observe.sight import Seen, Wanted
 from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.simulation.quantities import by_output_times, watch_again
+from grasp_ros.simulation.quantities import as_row
 from grasp_ros.simulation.repeat import at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory
-
-CAUSES = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
 
 
 class Losses(NamedTuple):
@@ -54,38 +52,15 @@ def power_lost(system: System, state: Array) -> Losses:
     return Losses(dampers, feedback, impacts, friction)
 
 
-def running_losses(run: Trajectory) -> tuple[Array, Losses]:
-    """Energy lost so far by each cause: times (n,) in s, and arrays (n,) in J; see `quantities.by_output_times`.
-
-    The times are those of outputs and events of an exact run, and its begin and end; those of outputs and control
-    periods of any other, whose sums follow the trapezoidal rule.
-    """
-    if not by_output_times(run):
-        times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
-        return times, observed_losses(run, times)
-    run = at_every_tick(run)
-    return run.t, _sums(run)
-
-
-def _sums(run: Trajectory) -> Losses:
-    """Running sums (n,) in J of what its states tell, by the trapezoidal rule."""
+def running_sums(run: Trajectory) -> Losses:
+    """Losses so far (n,) in J, as the states at its output times tell them by the trapezoidal rule."""
     steps = np.diff(run.t)
     rates = power_lost(run.scene.system, run.state)
     return Losses(*(np.concatenate([[0.0], np.cumsum(0.5 * steps * (r[1:] + r[:-1]))]) for r in rates))
 
 
-def observed_losses(run: Trajectory, times: Array) -> Losses:
-    """Energy lost until each of the times (n,) in s, from 0 on: arrays (n,). An exact run is integrated again."""
-    integrator, watcher = watch_again(run, Wanted.LOSSES)
-    lost = np.zeros((len(CAUSES), len(times)))
-    for k, length in enumerate(np.diff(times).tolist(), 1):
-        integrator.advance(length)
-        lost[:, k] = watcher.seen[CAUSES]
-    return Losses(*lost)
-
-
 def losses(run: Trajectory) -> Losses:
-    """Energy lost by each cause over the whole run, in J; see `quantities.by_output_times`.
+    """Energy lost by each cause over the whole run, in J, or up to the last output time where these tell it.
 
     What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
     out of the arms, beside what they have stored in V_c.
@@ -95,22 +70,32 @@ def losses(run: Trajectory) -> Losses:
     Refused
         If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
-    if by_output_times(run):
-        run = at_every_tick(run)
-        sums = _sums(run)
-    else:
-        sums = observed_losses(run, np.array([0.0, run.scene.duration]))
-    found = Losses(*(np.asarray(total[-1]) for total in sums))
-    if not run.sampled:
-        return found
-    system, taken = run.scene.system, 0.0
+    row = None if run.sampled and run.scene.system.external else as_row(run, "energy")
+    return losses_by_ticks(at_every_tick(run)) if row is None else losses_in(run, row)
+
+
+def losses_in(run: Trajectory, row: Mapping[str, float]) -> Losses:
+    """The losses of an exact run from its row, see `quantities.as_row`, that has its energies."""
+    found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
+    return found if not run.sampled else _with_commands(run, found, row["work_inputs"])
+
+
+def losses_by_ticks(run: Trajectory) -> Losses:
+    """The losses of a run whose output times hold every control period, by the trapezoidal rule."""
+    found = Losses(*(np.asarray(total[-1]) for total in running_sums(run)))
+    arms = [side for side in (LEFT, RIGHT) if side in run.scene.system.present]
+    work = sum(float((run.inputs[:-1, side] * np.diff(run.state[:, COLUMN[side]])).sum()) for side in arms)
+    return found if not run.sampled else _with_commands(run, found, work)
+
+
+def _with_commands(run: Trajectory, found: Losses, work: float) -> Losses:
+    """The losses where commands did so much work: what they have not stored in V_c is lost."""
+    system, taken = run.scene.system, -work
     own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
     virtual = own * (system.closed_loop - system.bodies)  # spring and force of the feedback
     for side in (LEFT, RIGHT):
-        if side not in system.present:
-            continue
-        x = run.state[:, COLUMN[side]]
-        work = float((run.inputs[:-1, side] * np.diff(x)).sum())
-        stored = 0.5 * virtual[side, Of.STIFFNESS] * (x**2)[[0, -1]] - virtual[side, Of.FORCE] * x[[0, -1]]
-        taken -= work + float(stored[1] - stored[0])
+        if side in system.present:
+            x = np.array([run.scene.initial_state[COLUMN[side]], run.state[-1, COLUMN[side]]])
+            stored = 0.5 * virtual[side, Of.STIFFNESS] * x**2 - virtual[side, Of.FORCE] * x
+            taken -= float(stored[1] - stored[0])
     return found._replace(feedback=np.asarray(taken))

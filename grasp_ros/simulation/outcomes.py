@@ -112,12 +112,6 @@ LYAPUNOV = "lyapunov"
 LAST = frozenset(GROUPS["last_state"])  # also of a run that stopped
 
 
-def of_one(outcomes: Iterable[Outcome], seen: Array, state: Array) -> list[float]:
-    """Outcomes of one run that need neither touches nor growth, from what was seen (k,) and the last states (m, 6)."""
-    runs = Runs(seen[None], state, np.zeros((1, 2)), np.zeros(1))
-    return [float(outcome.read(runs)[0]) for outcome in outcomes]
-
-
 def find(names: Iterable[str]) -> list[Outcome]:
     """Outcomes by the names of columns or groups, each once."""
     found: dict[str, Outcome] = {}

@@ -7,23 +7,22 @@ horizon until that is decided. What V_c does not prove within HORIZONS horizons 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT
-from grasp_ros.observe.observer import Watcher, settle, watch
-from grasp_ros.observe.sight import Wanted
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
 from grasp_ros.simulation.contacts import intervals
-from grasp_ros.simulation.repeat import integrator_of
+from grasp_ros.simulation.outcomes import GROUPS
+from grasp_ros.simulation.repeat import UNLIMITED
 from grasp_ros.simulation.trajectory import Trajectory
-
-SETTLED = 0.02  # of the largest initial displacement
-HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
+from grasp_ros.simulation.variants import Variants
 
 
 def settled_distance(scene: Scene, part: float = SETTLED) -> float:
@@ -50,15 +49,20 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
     return found
 
 
-def by_output_times(run: Trajectory) -> bool:
-    """Whether what is said of a run is no more exact than its output times are dense; others are integrated again."""
-    return run.method != EXACT or run.status is not Status.DONE or run.sampled or bool(run.scene.system.external)
+def as_row(run: Trajectory, *outcomes: str, part: float = SETTLED, horizons: int = HORIZONS) -> dict[str, float] | None:
+    """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
 
-
-def watch_again(run: Trajectory, wanted: Wanted, part: float = SETTLED) -> tuple[Integrator, Watcher]:
-    """An exact run from its begin, and what watches it."""
-    integrator = integrator_of(run)
-    return integrator, watch(integrator, wanted, part)
+    None for another method, a run that stopped or had controllers from outside, and where a number was set on the way.
+    """
+    if run.method != EXACT or run.status is not Status.DONE or run.controllers:
+        return None
+    setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, part, horizons, UNLIMITED, UNLIMITED)
+    columns = compute(Variants(run.scene, {}), setup, in_one_call=False).columns
+    found = {name: float(own[0]) for name, own in columns.items()}
+    last = [found[name] for name in GROUPS["last_state"]]
+    if run.sampled and not np.array_equal([[run.scene.duration, *last]], np.c_[run.t, run.state][-1:], equal_nan=True):
+        return None
+    return found
 
 
 def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZONS) -> Array:
@@ -67,12 +71,10 @@ def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZ
     Infinite: V_c does not prove it within so many horizons, for which an exact run goes on, or within the output times
     of any other. nan: V_c proves nothing, because it can rise here, or bounds no mass that is not driven to 0.
     """
-    if not _may_settle(run, part):
+    if not may_settle(run, part):
         return np.full(3, np.nan)
-    if not by_output_times(run):
-        integrator, watcher = watch_again(run, Wanted.SETTLING, part)
-        integrator.advance(run.scene.duration)
-        return settling_from(run, integrator, watcher, part, horizons)
+    if (row := as_row(run, "settling_times", part=part, horizons=horizons)) is not None:
+        return settled_in(run, row)
     system, distance = run.scene.system, settled_distance(run.scene, part)
     ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
     if not np.isfinite(ahead).all():
@@ -80,22 +82,20 @@ def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZ
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
 
 
+def settled_in(run: Trajectory, row: Mapping[str, float]) -> Array:
+    """The same of a row that has them; 0 for a mass that is not there."""
+    return np.array([row[f"settling_time_{NAMES[body]}"] if body in run.scene.system.present else 0.0
+                     for body in COLUMN])
+
+
 def may_rise(run: Trajectory) -> bool:
     """Whether V_c may rise, so that it proves nothing of what follows."""
     return bool(run.controllers or run.scene.caveats(run.sampled))
 
 
-def _may_settle(run: Trajectory, part: float) -> bool:
+def may_settle(run: Trajectory, part: float = SETTLED) -> bool:
     """Whether V_c cannot rise, and there is a distance to come into."""
     return not (run.sampled or may_rise(run)) and settled_distance(run.scene, part) > 0.0
-
-
-def settling_from(run: Trajectory, integrator: Integrator, watcher: Watcher, part: float = SETTLED,
-                  horizons: int = HORIZONS) -> Array:
-    """The same of an exact run that was watched again, from its end on, as far as `settling_times` has it."""
-    if not _may_settle(run, part):
-        return np.full(3, np.nan)
-    return settle(integrator, watcher, run.scene.duration, horizons)[[LEFT, OBJECT, RIGHT]]
 
 
 def contact_intervals(run: Trajectory, side: int) -> Array:

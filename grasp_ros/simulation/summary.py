@@ -3,48 +3,36 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
-from grasp_ros.methods.registry import EXACT, METHODS
-from grasp_ros.observe.sight import Wanted
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.simulation.chunk import Setup
-from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.losses import CAUSES, Losses, losses
-from grasp_ros.simulation.outcomes import find, of_one, wanted_by
+from grasp_ros.simulation.chunk import HORIZONS
+from grasp_ros.simulation.losses import losses_by_ticks, losses_in
+from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import (
-    HORIZONS,
-    by_output_times,
+    as_row,
     last_outside,
     may_rise,
+    may_settle,
     settled_distance,
-    settling_from,
+    settled_in,
     settling_times,
-    watch_again,
 )
-from grasp_ros.simulation.repeat import UNLIMITED, at_every_tick
+from grasp_ros.simulation.repeat import at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
 MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
 ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
-PEAKS = find(("peak_input", "peak_impact"))  # in the order of FORCES
-
-
-class _Observed(NamedTuple):
-    """What was seen of a run."""
-
-    settled: Array  # (3,), s: left arm, object, right arm
-    lost: Losses | None  # None: not known, or not told
-    largest_of: str
-    largest: list[float]  # N, see FORCES
+PEAKS = (*GROUPS["peak_input"], *GROUPS["peak_impact"])  # in the order of FORCES
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -76,25 +64,32 @@ def summary(run: Trajectory) -> dict[str, Any]:
 
 def _amounts(run: Trajectory) -> dict[str, Any]:
     """Energies, settling times, largest forces and losses, as far as the scene has them."""
-    level = run.energy.V_c
+    level, distance, settles = run.energy.V_c, settled_distance(run.scene), may_settle(run)
     found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
-    dense = _dense(run) if by_output_times(run) else run
+    row = as_row(run, *PEAKS, "energy", *(["settling_times"] if settles else []))
+    dense = None if row is not None and settles else _dense(run)
     known = run if dense is None else dense
     if not METHODS[run.method].energy_check:
         V_c = known.energy.V_c
         found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
-    observed = _by_states(run, dense) if by_output_times(run) else _of_the_motion(run)
-    distance = settled_distance(run.scene)
+    settled = settled_in(run, row) if row is not None and settles else settling_times(known)
     if may_rise(run) and distance > 0.0:
         if dense is not None:
             found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
-    elif not np.isnan(observed.settled).any():
-        found["settled_s"] = _by_body(run, observed.settled)
-        found["settled_within_s"] = float(run.t[-1]) if by_output_times(run) else HORIZONS * run.scene.duration
-    found["largest_of"], found["largest_N"] = observed.largest_of, dict(zip(FORCES, observed.largest, strict=True))
-    if observed.lost is not None:
-        found["lost_J"] = {cause: float(value) for cause, value in observed.lost._asdict().items()}
-        found["lost_by"] = TICKS if by_output_times(run) else MOTION
+    elif not np.isnan(settled).any():
+        found["settled_s"] = _by_body(run, settled)
+        found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * run.scene.duration
+    if row is None:
+        found["largest_of"] = OUTPUTS if dense is None else TICKS
+        largest = [*np.abs(known.command).max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
+    else:
+        found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
+    found["largest_N"] = dict(zip(FORCES, largest, strict=True))
+    told = row is not None or (dense is not None and len(dense.t) > 1)
+    if told and not run.scene.system.external:
+        lost = losses_by_ticks(known) if row is None else losses_in(run, row)
+        found["lost_J"] = {cause: float(value) for cause, value in lost._asdict().items()}
+        found["lost_by"] = TICKS if row is None else MOTION
     return found
 
 
@@ -108,29 +103,3 @@ def _dense(run: Trajectory) -> Trajectory | None:
 
 def _by_body(run: Trajectory, times: Array) -> dict[str, float]:
     return {NAMES[body]: float(times[COLUMN[body] // 2]) for body in run.scene.system.present}
-
-
-def _of_the_motion(run: Trajectory) -> _Observed:
-    """Of an exact run under continuous feedback, from its closed forms and polynomials: it is integrated once more."""
-    integrator, watcher = watch_again(run, Wanted.LOSSES | Wanted.SETTLING | wanted_by(PEAKS))
-    integrator.advance(run.scene.duration)
-    watcher.finish()
-    seen = watcher.seen.copy()
-    settled, largest = settling_from(run, integrator, watcher), of_one(PEAKS, seen, run.state)
-    return _Observed(settled, Losses(*seen[CAUSES]), MOTION, largest)
-
-
-def _by_states(run: Trajectory, dense: Trajectory | None) -> _Observed:
-    """Of any other run; the largest forces are those of the motion where it can be watched once more."""
-    known = run if dense is None else dense
-    where = OUTPUTS if known is run else TICKS
-    largest = [*np.abs(known.command).max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
-    if run.method == EXACT and run.status is Status.DONE and not run.controllers and run.t[-1] == run.scene.duration:
-        setup = Setup(accuracy=run.setting, sampled=run.sampled, max_events=UNLIMITED, max_work=UNLIMITED)
-        names = [peak.name for peak in PEAKS] + [outcome.name for outcome in find(("last_state",))]
-        columns = [float(column[0]) for column in ensemble(
-            run.scene, {}, names, setup=setup, threads=1).columns.values()]
-        if np.array_equal(columns[len(PEAKS) :], run.state[-1], equal_nan=True):  # nothing was set on the way
-            where, largest = MOTION, columns[: len(PEAKS)]
-    told = dense is not None and len(dense.t) > 1 and not run.scene.system.external
-    return _Observed(settling_times(known), losses(known) if told else None, where, largest)

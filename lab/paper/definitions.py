@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from grasp_ros.simulation.quantities import SETTLED
+from grasp_ros.simulation.chunk import SETTLED
 from lab.paper.cases import FARTHEST, NEAREST, OFFSETS, READ_P, SEED
 from lab.paper.claims import ALMOST_ALL, HALF
 from lab.paper.measures import BOUNDS, LIMIT, MARGIN

@@ -10,15 +10,21 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from grasp_ros.observe.observer import watch
+from grasp_ros.observe.sight import Seen, Wanted
 from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, canvas, plots, simulate
-from grasp_ros.simulation.losses import losses, running_losses
+from grasp_ros.simulation.chunk import SETTLED
+from grasp_ros.simulation.losses import Losses, losses
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, legend_beside, shade_contacts
-from grasp_ros.simulation.quantities import SETTLED, contact_intervals, settling_times
+from grasp_ros.simulation.quantities import contact_intervals, settling_times
+from grasp_ros.simulation.repeat import integrator_of
 from lab.paper.cases import STANDARD, Figure, Start, start_of, started
 
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
+TAKEN = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
 PALE = 0.35  # of the standard case behind a changed one
 CONTACT_POINTS = 400
 IN_CONTACT = 60  # output times in each contact, so that no peak is cut
@@ -140,6 +146,21 @@ def _behind(axes: Axes, draw: object, run: Trajectory) -> None:
     draw(axes, run)
     for line in axes.lines[before:]:
         line.set(alpha=PALE, linewidth=0.8, label="_")
+
+
+def running_losses(run: Trajectory) -> tuple[Array, Losses]:
+    """Energy lost so far by each cause under continuous feedback: times (n,) in s, and arrays (n,) in J.
+
+    The times are those of outputs and events, and the run's begin and end.
+    """
+    times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
+    integrator = integrator_of(run)
+    watcher = watch(integrator, Wanted.LOSSES, SETTLED)
+    lost = np.zeros((len(TAKEN), len(times)))
+    for k, length in enumerate(np.diff(times).tolist(), 1):
+        integrator.advance(length)
+        lost[:, k] = watcher.seen[TAKEN]
+    return times, Losses(*lost)
 
 
 def _losses(axes: Axes, run: Trajectory) -> None:

@@ -12,9 +12,9 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.energy import energy
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup
 from grasp_ros.simulation.ensemble import ensemble
-from grasp_ros.simulation.quantities import HORIZONS, SETTLED, settled_distance
+from grasp_ros.simulation.quantities import settled_distance
 from lab.paper.cases import OFFSETS, Start, columns_of, start_of, started, text_of, value_of
 
 STRETCH = 20.0  # s, the paper's time axis

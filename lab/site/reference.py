@@ -25,7 +25,7 @@ TWINS = ("right_", "object_pulse", "object_sine", "object_table")  # sections th
 PUBLIC = {  # modules and their public names; what has `__all__` says it itself, and is listed where it is met first
     "grasp_ros": (), "grasp_ros.scene": (), "grasp_ros.simulation": (), "grasp_ros.exact": (),
     "grasp_ros.simulation.quantities": ("settling_times", "contact_intervals"),
-    "grasp_ros.simulation.losses": ("losses", "by_output_times"),
+    "grasp_ros.simulation.losses": ("losses",),
     "grasp_ros.simulation.outcomes": ("OUTCOMES",),
     "grasp_ros.simulation.plots": ("draw", "draw_several"),
     "grasp_ros.physics.energy": ("energy", "Energy", "energy_balance", "EnergyBalance"),
