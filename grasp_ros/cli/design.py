@@ -71,6 +71,8 @@ def _design(options: argparse.Namespace) -> int:
 
 def _table(problem: Any, found: Sequence[Any]) -> list[str]:
     """A column for each free number and outcome, a row for each choice; of one choice a line for each of them."""
+    from grasp_ros.cli.report import table
+
     units = problem.units
     if len(found) == 1:
         numbers = found[0].numbers
@@ -79,8 +81,7 @@ def _table(problem: Any, found: Sequence[Any]) -> list[str]:
         rows = [*((key, f"{value:.10g}{END if key in ends else ''}") for key, value in numbers.items()),
                 *((name, f"{value:.10g} {units[name]}") for name, value in found[0].outcomes.items()),
                 ("simulations", str(found[0].runs))]
-        width = max(len(name) for name, _ in rows)
-        return [f"{name:<{width}}  {text}" for name, text in rows]
+        return [table(rows)]
     heads = [*(f"{name}, {unit}" for name, unit in units.items()), *(axis.name for axis in problem.axes)]
     lines = [[*(f"{own.outcomes[name]:.6g}" for name in units),
               *(f"{own.numbers[axis.keys[0]]:.8g}" for axis in problem.axes)] for own in found]

@@ -15,11 +15,10 @@ from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.files import format_of
+from grasp_ros.scene.files import format_of, needing
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup
 from grasp_ros.simulation.outcomes import GROUPS, find
 
-PACKAGES = ("xarray", "zarr", "scipy", "pandas", "numcodecs")
 RANGE = "KEY[+KEY]=low:high[:n[:log]]"
 
 
@@ -54,12 +53,8 @@ def add_to(commands: Any) -> None:
 
 
 def _map(options: argparse.Namespace) -> int:
-    try:
+    with needing("`grasp map`", "map"):
         return _run(options)
-    except ModuleNotFoundError as error:
-        if str(error.name).split(".")[0] not in PACKAGES:
-            raise
-        raise Refused(f"`grasp map` needs {error.name}; pip install '.[map]' in the checkout") from None
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -73,6 +68,8 @@ def _run(options: argparse.Namespace) -> int:
     axes = tuple(read_axis(option, text, grid=not options.sample) for option, text in given if text is not None)
     if options.vary and not options.sample:
         raise Refused("--vary: allowed: with --sample N; a map has --x and --y")
+    if (options.seed or options.independent) and not options.sample:
+        raise Refused("--seed, --independent: allowed: with --sample N, which draws at random")
     outcomes = tuple(options.outcome) or Setup().outcomes
     setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.horizons, options.max_events,
                   options.max_work)

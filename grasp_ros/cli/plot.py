@@ -49,6 +49,8 @@ def _plot(options: argparse.Namespace) -> int:
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
+    if (options.panels and options.animate) or (options.speed != 1.0 and not options.animate):
+        raise Refused("--panel: allowed: without --animate; --speed: with it")
     check_output(output, WRITERS if options.animate else figure_endings(output), options.force, options.sources)
     if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")

@@ -13,7 +13,9 @@ from grasp_ros.identification.result import Against, Fit, residual_table, seen_b
 from grasp_ros.identification.search import Problem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene, check_scene
+from grasp_ros.scene import Scene
+from grasp_ros.scene.files import needing
+from grasp_ros.simulation.variants import check_scene
 
 
 def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
@@ -43,10 +45,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     Refused
         If scipy is not installed, the data or the keys are not allowed, or there are too few samples.
     """
-    try:
+    with needing("a fit", "fit"):
         import scipy.optimize  # noqa: F401
-    except ModuleNotFoundError as error:
-        raise Refused(f"a fit needs {error.name}; pip install '.[fit]' in the checkout") from None
     if scene is not None:
         check_scene(scene)
     free, found = [free] if isinstance(free, str) else list(free), measured(data, scene, by_sensors)
@@ -73,15 +73,15 @@ def _result(problem: Problem, y: Array, against: Mapping[str, float]) -> Fit:
     values, slopes = problem.residuals(y, rows)
     states, _, touches = problem.predict(y, rows)
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
-    sight = seen_by(slopes, values, len(y))
+    covariance, reach, unseen = seen_by(slopes, values, len(y))
     estimates = problem.values(y)
     scale = [number.slope(value) for number, value in zip(problem.numbers, estimates.values(), strict=True)]
     low, high = ([float(number.at(end)) for number, end in zip(problem.numbers, ends.tolist(), strict=True)]
-                 for ends in (y - sight.reach, y + sight.reach))
+                 for ends in (y - reach, y + reach))
     return Fit(
         problem.scene_at(y), data.name, data.acting, tuple(estimates), np.array([*estimates.values()]), np.array(low),
-        np.array(high), sight.covariance * np.outer(scale, scale),
-        tuple(tuple(problem.numbers[place].key for place in places) for places in sight.unseen),
+        np.array(high), covariance * np.outer(scale, scale),
+        tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
         residual_table(values.reshape(rows, -1), data.t, touches),
         {key: _test(problem, y, key, value, values) for key, value in against.items()},

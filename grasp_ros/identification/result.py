@@ -110,18 +110,11 @@ class Fit(Frozen):
         return "\n".join(_lines(self))
 
 
-class Sight(NamedTuple):
-    """What the data see of n numbers y."""
-
-    covariance: Array  # (n, n); NaN: not identifiable
-    reach: Array  # (n,) half of the confidence interval; inf: not identifiable
-    unseen: list[list[int]]  # places of the numbers of each direction that is not seen
-
-
-def seen_by(slopes: Array, residuals: Array, n: int) -> Sight:
+def seen_by(slopes: Array, residuals: Array, n: int) -> tuple[Array, Array, list[list[int]]]:
     """What residuals (m,) in standard deviations, with derivatives (m, n), say of n numbers y.
 
-    A direction of the derivatives is seen if its standard deviation is below 1.
+    Their covariance (n, n), NaN for what is not identifiable; half of their confidence intervals (n,), inf for that;
+    and places of the numbers of each direction that is not seen, whose standard deviation is not below 1.
     """
     from scipy import stats
 
@@ -137,7 +130,7 @@ def seen_by(slopes: Array, residuals: Array, n: int) -> Sight:
     reach = np.sqrt(np.diag(covariance)) * stats.t.ppf(0.5 + 0.5 * CONFIDENCE, free)
     reach[lost] = np.inf
     covariance[lost], covariance[:, lost] = np.nan, np.nan
-    return Sight(covariance, reach, unseen)
+    return covariance, reach, unseen
 
 
 def residual_table(residuals: Array, t: Array, touches: Array) -> tuple[Residuals, ...]:

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from functools import cache
 from itertools import islice
 from typing import Any
 
 from grasp_ros.maps.plan import Plan
 from grasp_ros.physics.errors import Refused
+from grasp_ros.scene.files import needing
 from grasp_ros.scene.versions import versions
 from grasp_ros.simulation.chunk import Chunk, compute
 from grasp_ros.simulation.ensemble import Span
@@ -34,24 +34,16 @@ def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
     return found, compute(plan.variants(*span), plan.setup)
 
 
-@contextmanager
-def connect(workers: int, scheduler: str) -> Iterator[Any]:
+def connect(workers: int, scheduler: str) -> Any:
     """A client of a new cluster of so many processes on this machine, or of the scheduler at an address."""
+    with needing("--workers or --scheduler", "cluster"):
+        from distributed import Client
+    if not scheduler:
+        return Client(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
     try:
-        from distributed import Client, LocalCluster
-    except ModuleNotFoundError as error:
-        raise Refused(f"--workers, --scheduler: need {error.name}; pip install '.[cluster]' in the checkout") from None
-    if scheduler:
-        try:
-            client = Client(scheduler, timeout=TIMEOUT_S)
-        except (OSError, ValueError) as error:
-            raise Refused(f"--scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
-        with client:
-            yield client
-        return
-    with LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as cluster, (
-            Client(cluster)) as client:
-        yield client
+        return Client(scheduler, timeout=TIMEOUT_S)
+    except (OSError, ValueError) as error:
+        raise Refused(f"--scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
 
 
 def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple[Span, Chunk]]:

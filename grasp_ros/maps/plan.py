@@ -16,6 +16,7 @@ from grasp_ros.physics.given import number, read_number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import Setup, checked
+from grasp_ros.simulation.chunk import check as check_setup
 from grasp_ros.simulation.variants import Variants, parameter_of
 
 POINTS, MOST, MOST_AXES = 101, 10**9, 2
@@ -157,13 +158,14 @@ class Plan:
 
 
 def check(plan: Plan) -> None:
-    """Refuse axes that the scene has not, or whose ends it refuses.
+    """Refuse a setup that the scene has not, axes that it has not, or whose ends it refuses.
 
     Raises
     ------
     Refused
-        Names the axis.
+        Names what is wrong.
     """
+    check_setup(plan.scene, plan.setup)
     names = [key for axis in plan.axes for key in axis.keys]
     if not names or len(set(names)) < len(names):
         raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.maps import cluster
-from grasp_ros.maps.plan import Plan
-from grasp_ros.maps.plan import check as check_plan
+from grasp_ros.maps.plan import Plan, check
 from grasp_ros.maps.store import Store
-from grasp_ros.simulation.chunk import Chunk, check, compute
+from grasp_ros.simulation.chunk import Chunk, compute
 from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
 
 
@@ -43,16 +42,24 @@ def run(
         If the plan cannot be run, the file is something else or cannot be written, or workers die again and again.
         What is done is kept.
     """
-    check(plan.scene, plan.setup)
-    check_plan(plan)
+    check(plan)
     store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
     spans, begin = store.spans, time.monotonic()
     done, told = plan.rows - sum(last - first for first, last in spans), progress or (lambda _: None)
     told(done)
     if not spans:
         return store
+
+    def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
+        return compute(plan.variants(*span), plan.setup, stop)
+
     try:
-        with _source(plan, spans, workers, scheduler) as found:
+        with ExitStack() as stack:
+            found: Iterator[tuple[Span, Chunk]]
+            if workers or scheduler:
+                found = cluster.on_cluster(stack.enter_context(cluster.connect(workers, scheduler)), plan, spans)
+            else:
+                found = stack.enter_context(closing(in_threads(work, spans)))
             for span, chunk in found:
                 store.write(span, chunk)
                 done += span[1] - span[0]
@@ -60,17 +67,3 @@ def run(
     finally:
         store.add_seconds(time.monotonic() - begin)
     return store
-
-
-@contextmanager
-def _source(plan: Plan, spans: Sequence[Span], workers: int, scheduler: str) -> Iterator[Iterator[tuple[Span, Chunk]]]:
-    """Chunks as they are done, here or on a cluster."""
-    def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
-        return compute(plan.variants(*span), plan.setup, stop)
-
-    if workers or scheduler:
-        with cluster.connect(workers, scheduler) as client:
-            yield cluster.on_cluster(client, plan, spans)
-    else:
-        with closing(in_threads(work, spans)) as found:
-            yield found

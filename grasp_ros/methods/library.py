@@ -1,7 +1,7 @@
 """scipy's solvers on the grasp, with a compiled right-hand side: explicit pairs and implicit methods.
 
-Two ways: `straight` leaves (6), (7) and (10) to the right-hand side. `restarted` freezes the mode, lets scipy find
-the events of (10) as terminal events, and starts afresh after each.
+Two ways: (6), (7) and (10) are left to the right-hand side; or the mode is frozen, scipy finds the events of (10) as
+terminal events, and starts afresh after each.
 """
 
 from __future__ import annotations
@@ -67,30 +67,20 @@ def jacobian(t: float, y: Any, q: Any, push_l: bool, push_r: bool) -> Any:
     return j
 
 
-def straight(name: str, problem: Problem) -> Solution:
-    """Integrate over everything with one of scipy's solvers, rtol = atol."""
-    system, work = problem.system, np.zeros(len(Work), dtype=np.int64)
-    grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
-    args = (parameters(system), True, True)
-    result = _integrate(name, (0.0, problem.duration), system.state, grid, args, problem, None, work)
-    status = Status.STALLED if result.status < 0 else Status.DONE
-    return Solution(_spread(_rows(result), place), np.empty((0, 5)), work, status)
-
-
-def restarted(name: str, problem: Problem) -> Solution:
-    """Integrate from event to event with one of scipy's solvers, rtol = atol."""
+def solve(name: str, located: bool, problem: Problem) -> Solution:
+    """Integrate with one of scipy's solvers, rtol = atol: from event to event if they are located, or at one go."""
     q, work = parameters(problem.system), np.zeros(len(Work), dtype=np.int64)
-    grid, place = np.unique(problem.grid, return_inverse=True)
+    grid, place = np.unique(problem.grid, return_inverse=True)  # scipy refuses a time that comes twice
     t, y, row, idle, states = 0.0, problem.system.state, 0, 0, []
-    mode = [int(condition(q, tuple(y), side)) for side in SIDES]
-    gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in SIDES]
+    mode = [int(condition(q, tuple(y), side)) if located else CONTACT for side in SIDES]
+    gaps = [_gaps(side, problem.system.pairs[side, Law.DISSIPATION], work) for side in SIDES if located]
     events: list[tuple[float, ...]] = []
     status: Status | None = None
     while status is None:
-        active = [*gaps[LEFT][mode[LEFT]], *gaps[RIGHT][mode[RIGHT]]]
+        active = [gap for side, own in enumerate(gaps) for gap in own[mode[side]]]
         args = (q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT)
-        result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active, work)
-        states.append(_rows(result))
+        result = _integrate(name, (t, problem.duration), y, grid[row:], args, problem, active or None, work)
+        states.append(np.reshape(result.y, (6, -1)).T)
         row += len(states[-1])
         if result.status != AT_EVENT or idle > MAX_IDLE:
             status = Status.DONE if result.status == AT_END else Status.STALLED
@@ -105,7 +95,8 @@ def restarted(name: str, problem: Problem) -> Solution:
             events.append((t, gap.side, kind_of(mode[gap.side], gap.after), *relative(y, gap.side)))
             mode[gap.side] = gap.after
         status = Status.EVENT_BUDGET if len(events) > problem.max_events else None
-    return Solution(_spread(np.concatenate(states), place), np.array(events).reshape(-1, 5), work, status)
+    found = np.concatenate(states)  # as far as it came, at distinct times
+    return Solution(found[place[place < len(found)]], np.array(events).reshape(-1, 5), work, status)
 
 
 class _Gap:
@@ -168,12 +159,3 @@ def _integrate(
     work[Work.RIGHT_HAND_SIDES] += result.nfev
     work[Work.IMPLICIT_ITERATIONS] += result.nlu
     return result
-
-
-def _rows(result: Any) -> Array:
-    return np.reshape(result.y, (6, -1)).T
-
-
-def _spread(states: Array, place: Any) -> Array:
-    """Rows of distinct times at the places of all output times, as far as there are rows."""
-    return states[place[place < len(states)]]

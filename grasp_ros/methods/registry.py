@@ -44,12 +44,10 @@ def _scipy(solver: str, order: str, source: str) -> list[Method]:
     ladder = (*_tens(3, 13), 3e-14)  # solve_ivp takes no less than 100 roundings
     return [
         Method(
-            name, order, source, text, TOLERANCE, 1e-9, ladder, 2.3e-14, 1e-2, partial(solve, solver), Work,
-            events=solve is library.restarted, package="scipy",
+            name, order, source, text, TOLERANCE, 1e-9, ladder, 2.3e-14, 1e-2, partial(library.solve, solver, located),
+            Work, events=located, package="scipy",
         )
-        for name, text, solve in (
-            (solver.lower(), _INSIDE, library.straight), (f"{solver.lower()}_events", _RESTART, library.restarted),
-        )
+        for name, text, located in ((solver.lower(), _INSIDE, False), (f"{solver.lower()}_events", _RESTART, True))
     ]
 
 

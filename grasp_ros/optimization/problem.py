@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.maps.plan import Axis, Plan
-from grasp_ros.maps.plan import check as check_plan
+from grasp_ros.maps.plan import Axis, Plan, check
 from grasp_ros.observe.sight import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import read_number
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import Setup, check
+from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
 
@@ -70,8 +69,7 @@ class Problem:
             if len({column.unit for column in find([name])}) > 1:
                 raise Refused(f"outcome {name}: has several units; allowed: one of {', '.join(GROUPS[name])}")
         self.setup = (setup or Setup())._replace(outcomes=self.names)
-        check_plan(Plan(scene, self.setup, self.axes, sample=1))
-        check(scene, self.setup)
+        check(Plan(scene, self.setup, self.axes, sample=1))
 
     def why_unsettled(self) -> str:
         """Why no run is known to settle, where that is asked for and V_c may rise."""

@@ -19,6 +19,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.files import needing
 from grasp_ros.simulation.chunk import Setup
 
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
@@ -96,10 +97,8 @@ def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | 
     Refused
         If no choice was found that keeps the bounds and has the outcome, or scipy is not installed.
     """
-    try:
+    with needing("`grasp design`", "design"):
         from scipy.optimize import differential_evolution
-    except ModuleNotFoundError:
-        raise Refused("`grasp design` needs scipy; pip install '.[design]' in the checkout") from None
     runs, seed = 0, whole("seed", seed, 0)
 
     def function(parts: Array) -> Array:

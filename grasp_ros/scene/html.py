@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from grasp_ros.scene.effects.base import Effect, Sections
+if TYPE_CHECKING:  # it imports this file
+    from grasp_ros.scene.scene import Scene
 
 LEFT_ALIGNED = "style='text-align:left'"
 
@@ -18,15 +19,15 @@ def table(rows: Iterable[tuple[str, str]]) -> str:
     return f"<table>{cells}</table>"
 
 
-def numbers_of(effects: Iterable[Effect], values: Sections) -> Iterable[tuple[str, str]]:
-    """Every number of a scene with its unit, and every section without numbers."""
-    for effect in effects:
-        own = values[effect.section]
-        for parameter in effect.parameters:
-            if parameter.key in own:
-                yield f"{effect.section}.{parameter.key}", f"{_shown(own[parameter.key])} {parameter.unit}"
-        if not own:
-            yield effect.section, effect.text
+def html_of_scene(scene: Scene) -> str:
+    """What is said of it, every number of it with its unit, and every section without numbers."""
+    rows = [("scene", f"{scene.name}: {scene.title}"), ("watch", scene.watch),
+            *(("reading", text) for text in scene.readings), *(("warning", text) for text in scene.warnings)]
+    for effect in scene.effects:
+        own = scene.values[effect.section]
+        rows += [(f"{effect.section}.{parameter.key}", f"{_shown(own[parameter.key])} {parameter.unit}")
+                 for parameter in effect.parameters if parameter.key in own] or [(effect.section, effect.text)]
+    return table(rows)
 
 
 def _shown(value: Any) -> str:

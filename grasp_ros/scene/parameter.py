@@ -52,7 +52,7 @@ class Parameter(NamedTuple):
         kind = "a whole number" if self.whole else "a number"
         span = f"{kind} {'>' if self.open_low else '>='} {_short(self.low)} and <= {_short(self.high)}"
         if self.has_smallest:
-            span += f", of a size >= {self.smallest:g} or 0"
+            span += f", of a size >= {self.smallest:g}" + ("" if self.open_low and self.low == 0.0 else " or 0")
         return f"a list of at least one entry, each {span}" if self.several else span
 
     @property
@@ -73,11 +73,11 @@ class Parameter(NamedTuple):
             return tuple(float(entry) for entry in value)
         return int(value) if self.whole else float(value)
 
+    def holds(self, values: Any) -> Any:
+        """Whether a number, or each of some in an array, is in the range; NaN is in none."""
+        within = (self.low < values if self.open_low else self.low <= values) & (values <= self.high)
+        return within & ((values == 0.0) | (abs(values) >= self.smallest)) if self.has_smallest else within
+
     def _accepts_one(self, value: int | float | None) -> bool:
-        if value is None:
-            return False
-        if self.whole and value != value // 1:  # 7.0 is whole: messages carry nothing else
-            return False
-        if self.has_smallest and 0.0 < abs(value) < self.smallest:
-            return False
-        return bool((self.low < value if self.open_low else self.low <= value) and value <= self.high)
+        # 7.0 is whole: messages carry nothing else
+        return value is not None and not (self.whole and value != value // 1) and bool(self.holds(value))

@@ -24,7 +24,7 @@ from grasp_ros.scene.effects import BY_SECTION, build, named
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import YAML, read_text, reading
-from grasp_ros.scene.html import numbers_of, table
+from grasp_ros.scene.html import html_of_scene
 from grasp_ros.scene.library import names, text_of
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.settings import apply
@@ -90,10 +90,8 @@ class Scene(Frozen):
         system = self.system
         if self.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
             raise Refused(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
-        left, right = (system.arm(side) for side in (LEFT, RIGHT))
-        (hertz_l, loss_l), (hertz_r, loss_r) = system.pairs.tolist()
-        mass = float(system.bodies[OBJECT, Of.MASS])
-        return Grasp(left, right, Contact(hertz_l, loss_l), Contact(hertz_r, loss_r), mass)
+        left, right = (Contact(*pair) for pair in system.pairs.tolist())
+        return Grasp(system.arm(LEFT), system.arm(RIGHT), left, right, float(system.bodies[OBJECT, Of.MASS]))
 
     @property
     def initial_state(self) -> Array:
@@ -178,7 +176,8 @@ class Scene(Frozen):
         """
         document = self._document()
         for name, number in numbers.items():
-            document[name.partition(".")[0]][self.parameter(name).key] = number
+            key = self.parameter(name).key
+            document[name.partition(".")[0]][key] = number
         return _read(document, self.name, self.name, self.values)
 
     def parameter(self, name: str) -> Parameter:
@@ -201,23 +200,13 @@ class Scene(Frozen):
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
-        words = [("scene", f"{self.name}: {self.title}"), ("watch", self.watch)]
-        words += [(name, text) for name, texts in (("reading", self.readings), ("warning", self.warnings))
-                  for text in texts]
-        return table([*words, *numbers_of(self.effects, self.values)])
+        return html_of_scene(self)
 
     def _document(self) -> dict[str, Any]:
         """What a file with this scene holds."""
         watch = {"watch": self.watch} if self.watch else {}
         values = {section: dict(numbers) for section, numbers in self.values.items()}
         return {"title": self.title, "readings": self.readings, **watch, **values}
-
-
-def check_scene(scene: object) -> None:
-    """Refuse what is no scene."""
-    if not isinstance(scene, Scene):
-        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
-        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
 
 
 def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:
@@ -241,8 +230,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
         with reading(reference, SceneError):
             if not path.is_file():
                 raise SceneError(f"{reference}: {'is no file' if path.exists() else 'no such file'}")
-        text = read_text(path, SceneError)
-        return parse(text, path.stem, str(path), settings)
+        return parse(read_text(path, SceneError), path.stem, str(path), settings)
     if reference not in names():
         known = allowed(reference, names(), "a path that ends in .yaml, or one of ")
         raise SceneError(f"{reference}: no such scene; {known}")

@@ -24,13 +24,13 @@ from numpy.typing import ArrayLike, NDArray
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene, check_scene
+from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
-from grasp_ros.simulation.variants import Variants, parameter_of
+from grasp_ros.simulation.variants import Variants, check_scene, parameter_of
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]

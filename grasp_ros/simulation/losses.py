@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import as_row
@@ -36,27 +36,14 @@ class Losses(NamedTuple):
 
 def power_lost(system: System, state: Array) -> Losses:
     """Rates of the losses in W at states (n, 6), under continuous feedback; half of (18), and what effects add."""
-    zero: Array = np.zeros(len(state))
-    speed = {body: state[:, COLUMN[body] + 1] for body in system.present}
-    arms = [body for body in system.present if body != OBJECT]
+    speed = np.nan_to_num(state[:, [COLUMN[body] + 1 for body in Body]])
     damping, loop = system.bodies[:, Of.DAMPING], system.closed_loop[:, Of.DAMPING]
-    dampers = sum((damping[body] * speed[body] ** 2 for body in arms), zero)
-    feedback = sum(((loop - damping)[body] * speed[body] ** 2 for body in arms), zero)
-    impacts = zero
+    arms, impacts = speed[:, :OBJECT] ** 2, np.zeros(len(state))
     for side, u, d in pairs_of(system, state):
         contact = Contact(*system.pairs[side])
-        impacts = impacts + (impact_force(contact, u, d) - hertzian_force(contact, u)) * d
-    friction = zero
-    if OBJECT in system.present:
-        friction = damping[OBJECT] * speed[OBJECT] ** 2 + system.coulomb * np.abs(speed[OBJECT])
-    return Losses(dampers, feedback, impacts, friction)
-
-
-def running_sums(run: Trajectory) -> Losses:
-    """Losses so far (n,) in J, as the states at its output times tell them by the trapezoidal rule."""
-    steps = np.diff(run.t)
-    rates = power_lost(run.scene.system, run.state)
-    return Losses(*(np.concatenate([[0.0], np.cumsum(0.5 * steps * (r[1:] + r[:-1]))]) for r in rates))
+        impacts += (impact_force(contact, u, d) - hertzian_force(contact, u)) * d
+    friction = damping[OBJECT] * speed[:, OBJECT] ** 2 + system.coulomb * np.abs(speed[:, OBJECT])
+    return Losses(arms @ damping[:OBJECT], arms @ (loop - damping)[:OBJECT], impacts, friction)
 
 
 def losses(run: Trajectory) -> Losses:
@@ -82,20 +69,16 @@ def losses_in(run: Trajectory, row: Mapping[str, float]) -> Losses:
 
 def losses_by_ticks(run: Trajectory) -> Losses:
     """The losses of a run whose output times hold every control period, by the trapezoidal rule."""
-    found = Losses(*(np.asarray(total[-1]) for total in running_sums(run)))
-    arms = [side for side in (LEFT, RIGHT) if side in run.scene.system.present]
-    work = sum(float((run.inputs[:-1, side] * np.diff(run.state[:, COLUMN[side]])).sum()) for side in arms)
-    return found if not run.sampled else _with_commands(run, found, work)
+    found = Losses(*(np.asarray(np.trapezoid(rate, run.t)) for rate in power_lost(run.scene.system, run.state)))
+    moves = np.diff(np.nan_to_num(run.state[:, [COLUMN[side] for side in (LEFT, RIGHT)]]), axis=0)
+    return found if not run.sampled else _with_commands(run, found, float((run.inputs[:-1, :OBJECT] * moves).sum()))
 
 
 def _with_commands(run: Trajectory, found: Losses, work: float) -> Losses:
     """The losses where commands did so much work: what they have not stored in V_c is lost."""
-    system, taken = run.scene.system, -work
+    system = run.scene.system
     own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
-    virtual = own * (system.closed_loop - system.bodies)  # spring and force of the feedback
-    for side in (LEFT, RIGHT):
-        if side in system.present:
-            x = np.array([run.scene.initial_state[COLUMN[side]], run.state[-1, COLUMN[side]]])
-            stored = 0.5 * virtual[side, Of.STIFFNESS] * x**2 - virtual[side, Of.FORCE] * x
-            taken -= float(stored[1] - stored[0])
-    return found._replace(feedback=np.asarray(taken))
+    _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
+    ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, [COLUMN[LEFT], COLUMN[RIGHT]]]
+    before, after = (0.5 * stiffness * ends**2 - force * ends).sum(axis=1)
+    return found._replace(feedback=np.asarray(before - after - work))

@@ -20,12 +20,13 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import times, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
-from grasp_ros.scene import Scene, check_scene
+from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, foreign_controllers, solve
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.variants import check_scene
 
 GRID_POINTS = 2001
 

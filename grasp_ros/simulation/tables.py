@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
 import numpy as np
 
 from grasp_ros.physics.energy import Energy
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
-from grasp_ros.scene.files import opened
+from grasp_ros.scene.files import needing, opened
 from grasp_ros.scene.parameter import UNITS as KEYS
 
 if TYPE_CHECKING:
@@ -97,10 +96,8 @@ class Tabular:
         Refused
             If xarray is not installed.
         """
-        try:
+        with needing("dataset()", "data"):
             import xarray
-        except ModuleNotFoundError as error:
-            raise Refused(f"dataset() needs {error.name}; pip install '.[data]' in the checkout") from None
         values = {TIME.name: self.t, **_values_of(self)}
         return xarray.Dataset({own.name: (TIME.name, values[own.name], {"units": own.unit, "long_name": own.text})
                                 for own in (TIME, *COLUMNS)}, attrs=_attributes_of(self))
@@ -148,10 +145,8 @@ def _attributes_of(motion: Motion) -> dict[str, Any]:
 
 def frame_of(columns: Mapping[str, np.ndarray]) -> Any:
     """A `pandas.DataFrame`; without pandas it is refused."""
-    try:
+    with needing("dataframe()", "data"):
         import pandas
-    except ModuleNotFoundError as error:
-        raise Refused(f"dataframe() needs {error.name}; pip install '.[data]' in the checkout") from None
     return pandas.DataFrame(dict(columns))
 
 

@@ -7,6 +7,7 @@ so that the rules and the sentences are those of `scene.validation` alone.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from grasp_ros.physics.domain import Systems, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene, SceneError, check_scene
+from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.places import FEED_FORWARD, PLACES, POSITION_GAIN, SET_POINT, VELOCITY_GAIN, place_of
 
@@ -89,11 +90,7 @@ class Variants:
         """Rows with a number outside its range, with a negative sum of an arm's own and its feedback's, or outside."""
         doubt = np.zeros(self.rows, dtype=bool)
         for name, column in self.changes.items():
-            allowed = self._parameters[name]
-            above = column > allowed.low if allowed.open_low else column >= allowed.low
-            doubt |= ~(above & (column <= allowed.high))
-            if allowed.has_smallest:
-                doubt |= (column != 0.0) & (np.abs(column) < allowed.smallest)
+            doubt |= ~self._parameters[name].holds(column)
         block = self.block()
         doubt |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
         with np.errstate(all="ignore"):  # a row in doubt may hold any number
@@ -113,6 +110,13 @@ class Variants:
             array, row, place = PLACES[name]
             getattr(block, array)[:, row, place] = column
         return block
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene."""
+    if not isinstance(scene, Scene):
+        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
+        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
 
 
 def parameter_of(scene: Scene, name: str) -> Parameter:

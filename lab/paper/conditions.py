@@ -8,7 +8,7 @@ from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
-from lab.paper import by_hand
+from lab.paper import by_hand, quadratic_form
 from lab.paper.sample import ALGEBRA, Equation, Sample
 
 DRAWS = 4000  # random states at which positivity is looked at
@@ -101,7 +101,7 @@ def _constant(samples: list[Sample], number: str) -> Equation:
     return Equation(
         number,
         "a = b = 4/5",
-        "physics.lyapunov.A",
+        "lab.paper.quadratic_form.A",
         "a fitted to the motion, its distance from 4/5",
         abs(above / below),
         1e-8,
@@ -173,11 +173,11 @@ def _enclosure(samples: list[Sample]) -> list[Equation]:
     for sample in samples:
         run = sample.run
         epsilon = run.epsilon[-1]
-        allowed = lyapunov.deformation_bound(sample.system, float(run.energy.V_c[0]))
+        allowed = quadratic_form.deformation_bound(sample.system, float(run.energy.V_c[0]))
         bound = np.minimum(bound, allowed / epsilon)
         x_l, x_o, x_r = run.state[:, 0], run.state[:, 2], run.state[:, 4]
         margin = min(margin, float((x_o - x_l + allowed[LEFT]).min()), float((x_r + allowed[RIGHT] - x_o).min()))
-    function = "physics.lyapunov.largest_deformation, deformation_bound"
+    function = "physics.lyapunov.largest_deformation"
     text = "smallest of (5 V_c(0) / 4H)^(2/5) over the largest deformation, less 1"
     return [
         Equation(

@@ -15,7 +15,7 @@ from grasp_ros.physics import lyapunov
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, X
 from grasp_ros.physics.model import acceleration, impact_force, in_contact, penetration
 from grasp_ros.scene import SceneError
-from lab.paper import by_hand
+from lab.paper import by_hand, quadratic_form
 from lab.paper.cases import Cases, with_values
 from lab.paper.conditions import condition_rows
 from lab.paper.sample import ALGEBRA, Equation, Sample, relative
@@ -143,12 +143,12 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
     form, order, stiffness, entries = 0.0, 0.0, np.zeros(2), 0.0
     for sample in samples:
         y = sample.state
-        P = lyapunov.matrix(sample.system, y)
+        P = quadratic_form.matrix(sample.system, y)
         written = np.array([by_hand.matrix(sample.scene, each) for each in y])
         entries = max(entries, float(np.abs(P - written).max() / np.abs(written).max()))
         squared = np.einsum("ni,nij,nj->n", y, written, y)
         form = max(form, relative(squared, sample.level.V))
-        form = max(form, relative(lyapunov.quadratic_form(sample.system, y), squared))
+        form = max(form, relative(quadratic_form.quadratic_form(sample.system, y), squared))
         moving = [x for x in (X.L, X.O, X.R) if y[:, x + 1].any()]  # the object of a symmetric case rests
         order = max(order, *(relative(sample.rate[:, x], y[:, x + 1]) for x in moving))
         for side, stored in enumerate(lyapunov.parts(sample.system, y)[3:]):
@@ -157,12 +157,12 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
                 stiffness[side] = max(stiffness[side], relative(-P[:, x, 2] * sample.pair(side)[0] ** 2, stored))
     return [
         Equation(
-            "(11)", "V = x' P(x) x", "physics.lyapunov.quadratic_form",
+            "(11)", "V = x' P(x) x", "lab.paper.quadratic_form.quadratic_form",
             "x' P x, with P by hand and without, against V, relative", form, 1e-13, by=ALGEBRA,
         ),
         Equation(
-            "(12)", "P(x)", "physics.lyapunov.matrix", "its 36 entries against (12) by hand, relative", entries, 1e-15,
-            by=ALGEBRA,
+            "(12)", "P(x)", "lab.paper.quadratic_form.matrix", "its 36 entries against (12) by hand, relative", entries,
+            1e-15, by=ALGEBRA,
         ),
         Equation(
             "(13)",
@@ -176,7 +176,7 @@ def form_equations(samples: list[Sample]) -> list[Equation]:
             Equation(
                 f"({14 + side})",
                 f"Delta k of the {name} contact",
-                "physics.lyapunov.contact_stiffness",
+                "lab.paper.quadratic_form.contact_stiffness",
                 "Delta k u^2 against the elastic part of V, relative",
                 float(stiffness[side]),
                 1e-12,

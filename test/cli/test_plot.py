@@ -62,6 +62,8 @@ def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
         (("--to", "21"), "--to 21.0 is not allowed; allowed: up to 20 s"),
         (("case_03", "--sensitivity", "object.mass_kg"), "--sensitivity: allowed: one scene, --method exact"),
         (("--sensitivity", "object.colour"), "object.colour: not in this scene"),
+        (("--animate", "--panel", "input"), "--panel: allowed: without --animate"),
+        (("--speed", "2"), "--speed: with it"),
         (("--width", "5"), "--width 5.0 is not allowed; allowed: 60 to 1000 mm"),
     ],
 )

@@ -267,6 +267,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", "object.weight=1:2"], "object.weight: not in this scene"),
         (["--x", f"{GAIN}=1:2", "--outcome", "joy"], "outcome joy: not known; allowed: settling_time"),
         (["--vary", f"{GAIN}=1:2"], "--vary: allowed: with --sample N"),
+        (["--x", f"{GAIN}=1:2:2", "--independent"], "--independent: allowed: with --sample N"),
         (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "there is no grid of 3 values; allowed: low:high, and ::log"),
         (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
         (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),

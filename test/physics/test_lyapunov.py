@@ -9,14 +9,12 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.lyapunov import (
     deformation,
-    deformation_bound,
     displacement_bound,
     largest_deformation,
-    matrix,
     parts,
-    quadratic_form,
 )
 from grasp_ros.simulation import simulate
+from lab.paper.quadratic_form import deformation_bound, matrix, quadratic_form
 
 CASE = scenes.load("case_01").system
 RNG = np.random.default_rng(3)
