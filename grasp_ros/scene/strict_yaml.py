@@ -102,7 +102,7 @@ def load(text: str) -> Any:
     except Refused:
         raise
     except yaml.YAMLError as error:
-        raise Refused(" ".join(str(error).split())) from None
+        raise Refused(" ".join(str(error).split()).replace(' in "<unicode string>",', " at")) from None
     except MISFITS as error:  # before there is a node
         raise Refused(f"line {loader.line + 1}: a value cannot be read: {error}") from None
 

@@ -28,7 +28,7 @@ from grasp_ros.scene.places import SET_POINT
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
-from grasp_ros.simulation.variants import Variants
+from grasp_ros.simulation.variants import Variants, check_scene
 
 SETTLED = 0.02  # of the largest initial displacement
 HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
@@ -86,6 +86,7 @@ def checked(setup: Setup) -> Setup:
 
 def check(scene: Scene, setup: Setup) -> list[Outcome]:
     """The columns that are asked for, if they are to be had and the setting is allowed."""
+    check_scene(scene)
     columns = find(setup.outcomes)
     if not 0.0 < setup.settled < 1.0:
         raise Refused(f"settled: {setup.settled!r} is not allowed; allowed: a number > 0 and < 1")
@@ -111,11 +112,10 @@ def compute(variants: Variants, setup: Setup, stop: NDArray[np.int64] = NEVER, i
         run = _run(variants.row(i), setup, columns, runs, i)
         if run.status is not Status.DONE:
             status[i], stops[i] = STATUSES.index(run.status.name), run.stop
-    absent = variants.scene.system.absent_columns
-    runs.seen[:, [Seen.OUTSIDE + body for body in variants.scene.system.absent]] = np.nan
-    runs.state[:, absent] = np.nan
-    for first in (Seen.LOW, Seen.HIGH):
-        runs.seen[:, [first + place for place in absent]] = np.nan
+    system = variants.scene.system
+    runs.state[:, system.absent_columns] = np.nan
+    runs.seen[:, [*(Seen.OUTSIDE + body for body in system.absent),
+                  *(first + place for first in (Seen.LOW, Seen.HIGH) for place in system.absent_columns)]] = np.nan
     found = {column.name: np.array(column.read(runs)) for column in columns}
     for name, values in found.items():
         values[status != 0 if name not in LAST else status == STATUSES.index(REFUSED)] = np.nan

@@ -30,7 +30,7 @@ from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, c
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
-from grasp_ros.simulation.variants import Variants, check_scene, parameter_of
+from grasp_ros.simulation.variants import Variants, parameter_of
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]
@@ -134,7 +134,6 @@ def ensemble(
     Refused
         If a key or an outcome is not known, or a setting is outside its range.
     """
-    check_scene(scene)
     setup = checked((setup or Setup())._replace(outcomes=tuple([outcomes] if isinstance(outcomes, str) else outcomes)))
     columns, variants = check(scene, setup), Variants(scene, changes)
     found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}

@@ -69,7 +69,7 @@ def test_only_a_plain_number_is_a_number(value: str) -> None:
         (CASE.replace("title: ", 'title: "\\ud800" #'), "without control characters"),
         (CASE.replace("title: ", 'title: "\\e]0;owned\\a" #'), "without control characters"),
         (CASE.replace("title: ", "title: ['" + "x" * 100_000 + "'] #"), "is not allowed"),
-        (CASE + "\0", "special characters are not allowed"),
+        (CASE + "\0", "special characters are not allowed"), (CASE + "loop: {", "column 8: loop: {"),
         ('title: x\nwatch: "\\UFFFFFFFF"\n', "line 2: a value cannot be read: "),
         ('title: x\nwatch: "\\U00110000"\n', "line 2: a value cannot be read: "),
     ],
