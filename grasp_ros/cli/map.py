@@ -59,7 +59,7 @@ def _map(options: argparse.Namespace) -> int:
 
 def _run(options: argparse.Namespace) -> int:
     from grasp_ros.maps import figures, store
-    from grasp_ros.maps.plan import Plan, read_axis
+    from grasp_ros.maps.plan import Plan, check, read_axis
     from grasp_ros.maps.run import run
 
     scene = load_scene(options.scene, options.settings)
@@ -74,6 +74,7 @@ def _run(options: argparse.Namespace) -> int:
     setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.horizons, options.max_events,
                   options.max_work)
     plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
+    check(plan)
     prepare()
     with bar(plan.rows, "run", scene.name) as told:
         run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=told)
