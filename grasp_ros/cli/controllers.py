@@ -7,11 +7,12 @@ import select
 import signal
 from collections.abc import Sequence
 from contextlib import suppress
+from inspect import isfunction
 
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.own_law import find_law
+from grasp_ros.scene.own_law import begin, find_law
 
 MOST_BYTES = 2**16  # of a refusal
 
@@ -46,19 +47,20 @@ def check_controllers(words: Sequence[str], seconds: float) -> None:
     reader, writer = os.pipe()
     if (child := os.fork()) == 0:
         try:
-            nothing = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nothing, 1)
-            os.dup2(nothing, 2)
+            nothing = os.open(os.devnull, os.O_RDWR)
+            for stream in range(3):
+                os.dup2(nothing, stream)
             os.write(writer, _refusal(words).encode())
         finally:
             os._exit(0)
+    os.setpgid(child, child)  # with what the module starts
     os.close(writer)
     try:
         refusal = os.read(reader, MOST_BYTES).decode() if select.select([reader], [], [], seconds)[0] else ""
     finally:
         os.close(reader)
         with suppress(ProcessLookupError):
-            os.kill(child, signal.SIGKILL)
+            os.killpg(child, signal.SIGKILL)
         os.waitpid(child, 0)
     if refusal:
         raise Refused(refusal)
@@ -66,7 +68,9 @@ def check_controllers(words: Sequence[str], seconds: float) -> None:
 
 def _refusal(words: Sequence[str]) -> str:
     try:
-        load_controllers(words)
+        for side, law in load_controllers(words).items():
+            if isfunction(law):  # an object may open, when it begins, what belongs to its node
+                begin(law, f"--controller: {side}")
     except Refused as error:
         return str(error)
     return ""

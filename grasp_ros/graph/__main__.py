@@ -18,9 +18,10 @@ from typing import Any
 from grasp_ros.graph.host import check_reach, this_host
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.shared_memory import remove_left
-from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
 
+INTERRUPTED = 130  # as everywhere in `grasp`; the other nodes are ended by a signal as a rule
 
 def main(name: str, child: bool = False) -> int:
     """Run the node of that name; returns the exit status of the process.
@@ -56,6 +57,9 @@ def main(name: str, child: bool = False) -> int:
     status: int = import_module("grasp_ros.graph.ros.life").run(makes, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)
+    if received and name in TOOLS:
+        status = status or INTERRUPTED
+    end_by_force(name, status)  # a thread that a law has left would keep the interpreter
     return status
 
 

@@ -19,12 +19,12 @@ from typing import NoReturn
 from grasp_ros.graph import shared_memory
 from grasp_ros.graph.host import hold
 from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts, quoted
-from grasp_ros.graph.stopping import STOP_SIGNALS
+from grasp_ros.graph.stopping import GRACE_SECONDS, STOP_SIGNALS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
 
-STOP_SECONDS = 10.0
+STOP_SECONDS = GRACE_SECONDS + 1.0  # a node says itself that it ends by force
 TOGETHER_SECONDS = 15.0  # plant and monitor end within this time of each other
 POLL_SECONDS = 0.02
 # For the nodes to say it themselves, which know more; they cannot while a lock of shared memory is held by the one that
@@ -231,11 +231,11 @@ class Graph:
                 process.send_signal(signal.SIGCONT)  # in case it was stopped
         deadline = time.monotonic() + STOP_SECONDS
         for process in self.processes.values():
-            try:
+            with suppress(subprocess.TimeoutExpired):
                 process.wait(max(0.0, deadline - time.monotonic()))
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            with suppress(ProcessLookupError):  # its session: what a law has started, too, with itself as the first
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
         for held in filter(None, (self._lifeline, self._place)):
             held.close()
         self._lifeline = self._place = None

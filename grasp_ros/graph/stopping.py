@@ -46,17 +46,21 @@ def end_late_by_force(name: str) -> None:
     def watch() -> None:
         with reader, writer:
             reader.recv(1)
-            _end_late(name)
+            end_by_force(name)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()
 
 
-def _end_late(name: str) -> None:
-    threading.Event().wait(GRACE_SECONDS)
-    with suppress(OSError):  # nobody may read it
-        print(f"{name}: has not ended {GRACE_SECONDS:g} s after it was asked to: ended by force", file=sys.stderr,
-              flush=True)
-    os._exit(1)
+def end_by_force(name: str, status: int = 1) -> None:
+    """Give this process GRACE_SECONDS to end."""
+    def end() -> None:
+        time.sleep(GRACE_SECONDS)
+        with suppress(OSError):  # nobody may read it
+            print(f"{name}: has not ended {GRACE_SECONDS:g} s after it was to: ended by force", file=sys.stderr,
+                  flush=True)
+        os._exit(status)
+
+    threading.Thread(target=end, name="end", daemon=True).start()
 
 
 def raise_on_signals() -> None:
@@ -111,6 +115,6 @@ def end_with_parent(received: list[int], name: str) -> None:
         with suppress(OSError):  # nobody may read it
             print(f"{name}: what started this process has ended; it ends, too", file=sys.stderr)
         received.append(signal.SIGHUP)
-        _end_late(name)
+        end_by_force(name)
 
     threading.Thread(target=watch, name="parent", daemon=True).start()

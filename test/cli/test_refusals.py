@@ -52,6 +52,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate case_01 --max-work 1e3", "argument --max-work: 1e3 is not allowed; allowed: a whole number >= 1"),
         ("simulate case_01 --controller laws:soft", "laws:soft is not allowed; allowed: side=module:object"),
         ("run case_01 --controller laws:soft", "laws:soft is not allowed; allowed: side=module:object"),
+        ("run case_01 --controller left=grasp_ros.cli.main:main", "too many positional arguments; allowed: a"),
         ("run case_01 --controller left=laws", "left=laws is not allowed; allowed: side=module:object"),
         ("run case_01 --controller left=math:sin --controller left=math:cos", "allowed: one for the left side"),
         ("simulate case_01 --controller up=laws:soft", "allowed: side=module:object, with the side left or right"),

@@ -60,6 +60,8 @@ def test_a_node_takes_what_it_dumps(loop: tuple[Any, ...]) -> None:
             assert node.set_parameters_atomically([parameter]).successful, parameter.name
         fixed = node.set_parameters_atomically([Parameter("peer_timeout_s", value=3.0)])
         assert not fixed.successful
+        unknown = node.set_parameters_atomically([Parameter("peer_timeout", value=3.0)])
+        assert unknown.reason == "peer_timeout: no such parameter; did you mean peer_timeout_s?"
 
 
 def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -164,6 +165,17 @@ def test_a_shell_ends_with_its_reader_and_without_an_input(words: str) -> None:
     command = "set -o pipefail; " + words.format(f"{sys.executable} -m grasp_ros.cli ctl")
     found = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=DEADLINE, check=False)
     assert (found.returncode in (0, 141), found.stderr) == (True, "")  # 141: `yes`, which nobody reads any more
+
+
+def test_a_shell_that_waits_for_words_ends_with_a_signal(launch: Any) -> None:
+    shell = launch(sys.executable, "-m", "grasp_ros.cli", "ctl", stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                   stderr=subprocess.PIPE)
+    shell.stdin.write("help\n")
+    shell.stdin.flush()
+    assert shell.stdout.readline().startswith("pause, resume")
+    shell.send_signal(signal.SIGINT)
+    assert shell.wait(DEADLINE) == 130
+    assert shell.communicate() == ("", "")
 
 
 def test_an_output_that_is_full_is_a_sentence() -> None:

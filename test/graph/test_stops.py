@@ -31,6 +31,14 @@ from lab.drills import recorder
 pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
 
 
+def _words(process: str) -> str:
+    """Its command line; none of one that is gone."""
+    try:
+        return Path(f"/proc/{process}/cmdline").read_text()
+    except FileNotFoundError:
+        return ""
+
+
 @pytest.mark.parametrize(
     ("number", "moment"),
     [(signal.SIGINT, "recording"), (signal.SIGHUP, "recording"), (signal.SIGTERM, "starting"),
@@ -131,8 +139,32 @@ def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signa
     assert process.stdout.readline() == "there\n"
     process.send_signal(number)
     _, err = process.communicate(timeout=DEADLINE)
-    assert err == "left_controller: has not ended 0.5 s after it was asked to: ended by force\n"
+    assert err == "left_controller: has not ended 0.5 s after it was to: ended by force\n"
     assert process.returncode == 1
+
+
+def test_a_thread_that_a_law_has_left_keeps_no_node() -> None:
+    words = "import sys, threading; from grasp_ros.graph import __main__, stopping; stopping.GRACE_SECONDS = 0.5;" \
+        "threading.Thread(target=threading.Event().wait).start(); sys.exit(__main__.start())"
+    command = [sys.executable, "-c", words, "plant", "--ros-args", "-p", "scene:=nowhere"]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    assert found.returncode == 2
+    assert found.stderr.endswith("plant: has not ended 0.5 s after it was to: ended by force\n")
+
+
+def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> None:
+    """Nor does one that was left when the law was tried."""
+    (tmp_path / "laws.py").write_text(
+        "import subprocess\nleft = subprocess.Popen(['sleep', '3600'])\n"
+        "open('left', 'a').write(f'{left.pid} ')\nlaw = lambda tick, time, x, v: -x - v\n"
+    )
+    words = ["run", "arm_alone", "--set", "time.duration_s=0.1", "--controller", "left=laws:law", "--no-figure"]
+    found = subprocess.run([sys.executable, "-m", "grasp_ros.cli", *words, "-o", "run"], cwd=tmp_path, check=False,
+                           stdout=subprocess.DEVNULL, timeout=DEADLINE)
+    assert found.returncode == 0
+    left = (tmp_path / "left").read_text().split()
+    assert len(left) == 2
+    assert all("sleep" not in _words(process) for process in left)
 
 
 @pytest.mark.parametrize(

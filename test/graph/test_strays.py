@@ -11,8 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import WrenchStamped
 from processes import DEADLINE, START, wait_for
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, GIVE_UP_SECONDS, Arrival, Ticks
@@ -20,7 +24,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.rosbag2 import force_message
 from grasp_ros.graph.verify import verify
 from grasp_ros.physics.layout import LEFT
-from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT
+from grasp_ros.scene.topics import ALIVE, JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT, SCENE
 from lab.drills.nodes import plain_messages
 
 pytestmark = pytest.mark.alone  # it judges by wall time
@@ -171,6 +175,24 @@ def test_a_command_beyond_the_actuator_is_named_and_does_not_act(launch: Any, tm
     recording = bag.read(tmp_path / "run" / "bag")
     assert verify(recording).holds
     assert set(recording.effort[:, LEFT]) <= {0.0, 0.25}
+
+
+@pytest.mark.slow  # real processes
+def test_whom_dds_does_not_connect_holds_nobody_up(launch: Any, tmp_path: Path, node: tuple[Any, Any]) -> None:
+    """Readers and writers of another type, or of a quality of service that is not offered, from before the start on."""
+    peer, _ = node
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    hasty = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+    for kind, topic, qos in ((String, LEFT_COMMAND, 1), (WrenchStamped, LEFT_CONTACT, hasty), (JointState, ALIVE, 1)):
+        peer.create_publisher(kind, topic.name, qos)
+    peer.create_publisher(JointState, JOINT_STATES.name, hasty)
+    peer.create_subscription(JointState, JOINT_STATES.name, print, latched)
+    peer.create_subscription(JointState, SCENE.name, print, 1)
+    words = ["arm_alone", "--set", "time.duration_s=1", "-o", "run", "--no-figure"]
+    run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    out, err = run.communicate(timeout=DEADLINE)
+    assert run.returncode == 0, err
+    assert "same without ROS          equal, bit for bit" in out
 
 
 @pytest.mark.slow  # real processes

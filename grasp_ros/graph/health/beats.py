@@ -138,8 +138,8 @@ class Beats:
         return [sign for sign in self._signs.values() if sign.node in names]
 
     def quiet(self, names: Sequence[str], limit: float) -> list[str]:
-        """Those of some nodes that gave a sign once, but none since a wall time."""
-        heard = {sign.node: sign.heard for sign in self.of(names)}
+        """Those of some nodes that gave a sign once, but none since a wall time; not one after its last words."""
+        heard = {sign.node: sign.heard for sign in self.of(names) if not sign.ended}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
 
     def living(self, names: Sequence[str], limit: float) -> list[str]:

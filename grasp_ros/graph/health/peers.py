@@ -180,9 +180,10 @@ class PeerNode(GraspNode):
     def _names(self, topic: Topic, now: float) -> list[str]:
         """Sources of a topic, as of the last second unless their number has changed: names cost more than numbers."""
         when, number, names = self._cached.get(topic, (-math.inf, 0, []))
-        if now - when > REPORT_SECONDS or number != self.count_publishers(topic.name):
+        there = self.count_publishers(topic.name)
+        if now - when > REPORT_SECONDS or number != there:
             names = self.sources(topic)
-            self._cached[topic] = now, len(names), names
+            self._cached[topic] = now, there, names
         return names
 
     def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:

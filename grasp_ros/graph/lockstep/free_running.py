@@ -75,7 +75,7 @@ class FreeRunning:
     def missing(self) -> list[str]:
         """Commands that nobody sends yet, where it waits for them; else it begins without controllers."""
         topics = self._plant.scene.controllers.values() if self._awaits else ()
-        return [topic.name for topic in topics if not self._plant.count_publishers(topic.name)]
+        return [topic.name for topic in topics if not self._plant.writers(topic)]
 
     def needs(self) -> Iterator[Need]:
         """The monitor alone: commands have timeouts of their own."""

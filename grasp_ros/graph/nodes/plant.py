@@ -162,7 +162,7 @@ class Plant(PeerNode):
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         self.words = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
         # Who has been here with another plant must have this scene before its first state.
-        known = all(publisher.get_subscription_count() >= self.count_subscribers(publisher.topic_name)
+        known = all(publisher.get_subscription_count() >= len(self.readers(publisher))
                     and self.delivered(publisher) for publisher in (*self._descriptions, self.beats.publisher))
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _ in self._forces

@@ -23,7 +23,7 @@ BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before 
 POLL_SECONDS = 0.2
 
 
-def run(makes: Mapping[str, Callable[[], GraspNode]], received: Sequence[int]) -> int:
+def run(makes: Mapping[str, Callable[[], GraspNode]], received: list[int]) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
 
     0 after a finished run or a signal, 2 if a node refuses its parameters, otherwise the first status of a node that is
@@ -36,7 +36,7 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: Sequence[int]) -
         try:
             rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         except RuntimeError as error:  # the base of what rcl raises
-            raise Refused(f"--ros-args: {error}") from None
+            raise Refused(f"--ros-args: {' '.join(str(error).split())}") from None
         for names, make in makes.items():  # noqa: B007 - which one is refused
             nodes.append(make())
         names = together

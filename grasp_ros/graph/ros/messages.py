@@ -72,6 +72,12 @@ def glance_qos(topic: Topic) -> QoSProfile:
     return qos(topic) if topic.latched else QoSProfile(depth=topic.depth, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
+def connects(writer: QoSProfile, reader: QoSProfile) -> bool:
+    """Whether DDS connects them; `rclpy.qos.qos_check_compatible` takes an infinite deadline for a finite one."""
+    # Of these enums the smaller ones promise more.
+    return writer.reliability <= reader.reliability and writer.durability <= reader.durability
+
+
 def to_time(time_ns: int) -> Time:
     """Stamp of an integer time in ns."""
     return Time(sec=time_ns // NANOSECONDS, nanosec=time_ns % NANOSECONDS)

@@ -18,6 +18,7 @@ from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
@@ -109,8 +110,19 @@ class GraspNode(ParameterNode):
         """Full names of the nodes that publish on a topic, as far as discovery has them."""
         return sorted(
             NEW if writer.node_name == UNKNOWN else f"{writer.node_namespace.rstrip('/')}/{writer.node_name}"
-            for writer in self.get_publishers_info_by_topic(topic.name)
+            for writer in self.writers(topic)
         )
+
+    def writers(self, topic: Topic) -> list[TopicEndpointInfo]:
+        """Publishers that a reader of a topic is connected with; not those of another type or quality of service."""
+        return [writer for writer in self.get_publishers_info_by_topic(topic.name) if writer.topic_type == topic.type
+                and messages.connects(writer.qos_profile, messages.reader_qos(topic))]
+
+    def readers(self, publisher: Publisher) -> list[TopicEndpointInfo]:
+        """Subscriptions that a publisher is connected with, as soon as discovery is through."""
+        return [reader for reader in self.get_subscriptions_info_by_topic(publisher.topic_name)
+                if messages.TYPES.get(reader.topic_type) is publisher.msg_type
+                and messages.connects(publisher.qos_profile, reader.qos_profile)]
 
     def wall_timer(self, seconds: float, callback: Callable[[], None]) -> Any:
         """Timer on wall time: simulated time waits for the nodes, so no node may wait for it."""
@@ -134,11 +146,10 @@ class GraspNode(ParameterNode):
         Matching is asynchronous and messages sent before it are lost. Names come from discovery, which is earlier
         than matching; so every discovered subscription must also have been matched. A stranger may publish unheard.
         """
-        readers = self.get_subscriptions_info_by_topic(publisher.topic_name)
+        readers = self.readers(publisher)
         listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
         for source in sources:
-            writers = self.get_publishers_info_by_topic(source.name)
-            if not any((writer.node_namespace, writer.node_name) in listening for writer in writers):
+            if not any((writer.node_namespace, writer.node_name) in listening for writer in self.writers(source)):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
 
@@ -231,7 +242,7 @@ class GraspNode(ParameterNode):
             if header is not None:
                 service.send_response(service.callback(request, service.srv_type.Response()), header)
 
-    def work(self, received: Sequence[int]) -> bool:
+    def work(self, received: list[int]) -> bool:
         """Do in place of a spin what has an order of its own, until something is received; whether there is any."""
         return False
 

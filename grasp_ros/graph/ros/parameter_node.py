@@ -84,21 +84,19 @@ class ParameterNode(Node):
         """
         numbers = []
         for parameter in parameter_list:
-            if self.has_parameter(parameter.name) and self.describe_parameter(parameter.name).read_only:
-                if _plain(parameter.value) == _plain(self.get_parameter(parameter.name).value):
+            name = parameter.name
+            if not self.has_parameter(name):
+                why = f"no such parameter; {allowed(name, sorted(self._parameters))}"
+                return SetParametersResult(successful=False, reason=f"{name}: {why}")
+            declared = self.describe_parameter(name)
+            if declared.read_only:
+                if _plain(parameter.value) == _plain(self.get_parameter(name).value):
                     continue
-                of_scene = "." in parameter.name
-                why = self.why_read_only if of_scene else ParameterNode.why_read_only
-                return SetParametersResult(successful=False, reason=f"{parameter.name}: {why}")
-            whole = parameter.type_ == RosParameter.Type.INTEGER and not self._is_whole(parameter.name)
-            numbers.append(RosParameter(parameter.name, value=float(parameter.value)) if whole else parameter)
+                why = self.why_read_only if "." in name else ParameterNode.why_read_only
+                return SetParametersResult(successful=False, reason=f"{name}: {why}")
+            whole = parameter.type_ == RosParameter.Type.INTEGER and declared.dynamic_typing
+            numbers.append(RosParameter(name, value=float(parameter.value)) if whole else parameter)
         return super().set_parameters_atomically(numbers) if numbers else SetParametersResult(successful=True)
-
-    def _is_whole(self, name: str) -> bool:
-        """Whether a parameter was declared as an integer for good."""
-        if not self.has_parameter(name) or self.describe_parameter(name).dynamic_typing:
-            return False
-        return bool(self.get_parameter(name).type_ == RosParameter.Type.INTEGER)
 
 
 def _plain(value: Any) -> Any:

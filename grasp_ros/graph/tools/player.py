@@ -37,8 +37,8 @@ class Player(GraspNode):
         self.when(self._ready, self._start)
 
     def _ready(self) -> bool:
-        """Whether somebody is there, and connected; what others of another quality of service want never is."""
-        readers = [(publisher.get_subscription_count(), self.count_subscribers(publisher.topic_name))
+        """Whether somebody is there, and connected."""
+        readers = [(publisher.get_subscription_count(), len(self.readers(publisher)))
                    for publisher in self._outputs.values()]
         matched = any(there for _, there in readers) and all(own >= there for own, there in readers)
         waited = time.monotonic() - self._created

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
 import time
 from array import array
@@ -22,6 +23,7 @@ from std_srvs.srv import Trigger
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
+from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.suggestion import allowed
@@ -47,7 +49,7 @@ class Remote(GraspNode):
     def __init__(self) -> None:
         super().__init__("remote")
         self._wanted: list[str] = json.loads(self.read_only("words", "[]"))
-        self._received: Sequence[int] = ()
+        self._received: list[int] = []
         self._known: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
@@ -56,7 +58,7 @@ class Remote(GraspNode):
             "step": self.step, "get": self.get, "set": self.put, "echo": self.echo, "help": lambda: HELP,
         }
 
-    def work(self, received: Sequence[int]) -> bool:
+    def work(self, received: list[int]) -> bool:
         """Ask once, or be a shell; the exit code is that of the last answer."""
         self._received = received
         try:
@@ -69,6 +71,20 @@ class Remote(GraspNode):
                 print(f"standard input or output: {error.strerror}", file=sys.stderr)
                 self.exit_code = 1
         return True
+
+    def read(self) -> str:
+        """The next line of the standard input; a signal ends the wait for it, which Python would go on with."""
+        def stop(number: int, _: object) -> None:
+            self._received.append(number)
+            raise Stopped
+
+        for number in STOP_SIGNALS:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                signal.signal(number, stop)
+        try:
+            return "" if self._received else sys.stdin.readline()
+        finally:
+            note_signals(self._received)
 
     def do(self, words: Sequence[str]) -> str:
         """Do what some words ask for; returns what there is to say.
@@ -226,7 +242,7 @@ def _shell(remote: Remote) -> int:
     status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
     while True:
         print(prompt, end="", flush=True)
-        words = sys.stdin.readline()
+        words = remote.read()
         if not words or words.strip() in FAREWELL:
             return status
         if words.strip():

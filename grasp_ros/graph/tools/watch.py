@@ -149,9 +149,9 @@ class Watch(GraspNode):
 
     def _draw(self) -> None:
         held = COMMANDS.values() if self._lockstep else ()  # in a free run they belong to no state of their own
-        there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.count_publishers(topic.name))
+        there = (topic for topic in (LYAPUNOV, *CONTACTS.values(), *held) if self.writers(topic))
         self._needed = {JOINT_STATES, *there}
-        alone = not self.count_publishers(JOINT_STATES.name)
+        alone = not self.writers(JOINT_STATES)
         if self._view is not None and self._newest.found:
             with suppress(*messages.UNREADABLE):  # of a sender that says something else
                 moment = self._moment(self._newest.found, alone)
