@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+from array import array
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,21 +16,21 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.columns import Alike, alike
 from grasp_ros.graph.opening import Opened, decoding_bag
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording, acted_from
-from grasp_ros.graph.rosbag2 import BagError, decode
+from grasp_ros.graph.rosbag2 import BagError, decode, force_template, lyapunov_template, state_template
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
 from grasp_ros.scene.topics import (
     CHANGES,
+    FORCE,
     JOINT_STATES,
     LYAPUNOV,
-    LYAPUNOV_NAMES,
     TIMING,
     Numbers,
     Topic,
@@ -37,9 +38,7 @@ from grasp_ros.scene.topics import (
 )
 
 __all__ = ["BagError", "Recorder", "Recording", "read"]
-BATCH_BYTES = 2**18  # of the messages of a topic that are decoded at once
 MOST_NS = 2**63 - 1
-WIDTH = {JOINT_STATES: 9, LYAPUNOV: len(LYAPUNOV_NAMES)}  # numbers of a message; 1 of a force
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
@@ -55,7 +54,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
         content = _Content(opened)
         for stored in opened.messages:
             content.take(stored)
-        if not len(content.columns[JOINT_STATES].of()[0]):
+        if not content.columns[JOINT_STATES].times:
             raise BagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)
         return content.recording()
@@ -100,11 +99,14 @@ class _Content:
     def recording(self) -> Recording:
         """All of it, as arrays."""
         scene = self._bag.scene
-        ticks, joints = self.columns[JOINT_STATES].of()
-        joints, stamps = joints[:, :8], joints[:, 8]
+        ticks, rows, stamps = self.columns[JOINT_STATES].of()
+        lists = dict(zip(("position", "velocity", "effort"), np.split(rows.T, 3), strict=True))
+        named = SimpleNamespace(name=self.columns[JOINT_STATES].names, **lists)
+        state, inputs = (values.T for values in state_of(named, ticks.shape))
+        effort = np.ascontiguousarray(inputs[:, [LEFT, RIGHT]])
 
         def aligned(topic: Topic) -> Array:
-            found, values = self.columns[topic].of()
+            found, values, _ = self.columns[topic].of()
             result = np.full((len(ticks), values.shape[1]), np.nan)
             _, here, there = np.intersect1d(ticks, found, return_indices=True)
             result[here] = values[there]
@@ -112,66 +114,58 @@ class _Content:
 
         command, held = np.zeros((len(ticks), 2)), self._bag.held
         for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-            command[:, side] = acted_from(ticks, joints[:, 6 + side]) if topic in held else aligned(topic)[:, 0]
+            command[:, side] = acted_from(ticks, effort[:, side]) if topic in held else aligned(topic)[:, 0]
         return Recording(
             self._bag.path, scene, self._bag.versions,
-            {topic.name: count for topic, count in self._counts.items()}, ticks, joints[:, :6], joints[:, 6:], command,
+            {topic.name: count for topic, count in self._counts.items()}, ticks, np.ascontiguousarray(state), effort,
+            command,
             {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-            dict(self._changes), self._bag.running, ticks[stamps == 0.0], _lost(self._bag.storage),
+            dict(self._changes), self._bag.running, ticks[stamps == 0], _lost(self._bag.storage),
             _table(self._timing), dict(+self._changes.unheard),
         )
 
 
 class _Columns:
-    """Ticks and numbers of one topic: taken as they come, and decoded many at a time."""
+    """Ticks and numbers of one topic, taken as they come.
+
+    A recorder writes messages that differ from each other in time and numbers alone; any other is decoded as a whole.
+    """
 
     def __init__(self, name: str, topic: Topic, scene: scenes.Scene) -> None:
-        self._name, self._topic, self._width = name, topic, WIDTH.get(topic, 1)
+        self._name, self._topic = name, topic
         self._period_ns, self._end_ns = scene.period_ns, scene.ticks * scene.period_ns
-        self._times: list[int] = []
-        self._cdrs: list[bytes] = []
-        self._bytes = 0
-        self._ticks, self._rows = [np.array([-1])], [np.zeros((1, self._width))]  # before the first
+        self.names = [NAMES[body] for body in scene.system.present]
+        self._template = (state_template(self.names) if topic == JOINT_STATES else
+                          lyapunov_template() if topic == LYAPUNOV else force_template())
+        self.times, self._rows = array("Q"), array("d")
 
     def add(self, stored: Stored) -> None:
         """Take a message."""
-        self._times.append(stored.time_ns)
-        self._cdrs.append(stored.cdr)
-        self._bytes += len(stored.cdr)
-        if self._bytes > BATCH_BYTES:
-            self._decode()
+        self.times.append(stored.time_ns)
+        self._rows.extend(self._template.read(stored.cdr) or self._decoded(stored.cdr))
 
-    def of(self) -> tuple[np.ndarray, Array]:
-        """Ticks (n,) and rows (n, k)."""
-        if self._cdrs:
-            self._decode()
-        ticks, rows = np.concatenate(self._ticks), np.concatenate(self._rows)
-        self._ticks, self._rows = [ticks], [rows]
-        return ticks[1:], rows[1:]
-
-    def _decode(self) -> None:
-        rows = np.empty((len(self._cdrs), self._width))
-        for group in alike(self._topic, self._cdrs):
-            found = _values(self._topic, group)
-            if found.shape[1] != self._width:
-                raise BagError(f"{self._name}: {found.shape[1]} numbers; allowed: {self._width}")
-            rows[group.places] = found
-        ticks = self._checked(rows)
-        self._ticks.append(ticks)
-        self._rows.append(rows)
-        self._times, self._cdrs, self._bytes = [], [], 0
-
-    def _checked(self, rows: Array) -> np.ndarray:
-        """Ticks of the rows."""
-        times, period = np.array(self._times, dtype=np.uint64), np.uint64(self._period_ns)
-        ticks = (times // period).astype(np.int64)
-        wrong = (times % period != 0) | (times > MOST_NS) | (np.diff(ticks, prepend=self._ticks[-1][-1]) <= 0)
+    def _decoded(self, cdr: bytes) -> list[float]:
+        """Time and numbers of a message of another make, in the order of those of a recorder."""
+        message = decode(self._topic, cdr)
+        numbers = [message.wrench.force.x] if self._topic.type == FORCE else message.position
         if self._topic == JOINT_STATES:
-            wrong |= rows[:, -1] > self._end_ns
+            rows = [message.name.index(name) for name in self.names]
+            numbers = np.array([message.position, message.velocity, message.effort])[:, rows].ravel()
+        if len(numbers) != self._template.count:
+            raise BagError(f"{self._name}: {len(numbers)} numbers; allowed: {self._template.count}")
+        return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
+
+    def of(self) -> tuple[np.ndarray, Array, Array]:
+        """Ticks (n,), rows (n, k) of numbers, and their stamps (n,) in ns."""
+        rows, times = np.array(self._rows).reshape(-1, 2 + self._template.count), np.array(self.times)
+        ticks, stamps = (times // np.uint64(self._period_ns)).astype(np.int64), rows[:, :2] @ (NANOSECONDS, 1)
+        wrong = (times % np.uint64(self._period_ns) != 0) | (times > MOST_NS) | (np.diff(ticks, prepend=-1) <= 0)
+        if self._topic == JOINT_STATES:
+            wrong |= stamps > self._end_ns
         if wrong.any():
-            time_ns = self._times[int(np.argmax(wrong))]
+            time_ns = times[int(np.argmax(wrong))]
             raise BagError(f"{self._name}: {time_ns} ns; allowed: ticks of the scene in their order")
-        return ticks
+        return ticks, rows[:, 2:], stamps
 
 
 class _Changes(dict[int, dict[str, float]]):
@@ -202,17 +196,6 @@ def _table(messages: Sequence[Any]) -> dict[str, Array]:
     names = messages[-1].name
     columns = np.array([message.position for message in messages if message.name == names]).T
     return dict(zip(names, columns, strict=True))
-
-
-def _values(topic: Topic, group: Alike) -> Array:
-    """Numbers (n, k) of messages that a recording has."""
-    numbers = group.numbers
-    if topic == JOINT_STATES:
-        lists = {name: numbers[name].T for name in ("position", "velocity", "effort")}
-        state, inputs = state_of(SimpleNamespace(name=group.first.name, **lists), numbers.shape)
-        stamps = numbers["header.stamp.sec"].astype(np.int64) * NANOSECONDS + numbers["header.stamp.nanosec"]
-        return np.vstack([state, inputs[[LEFT, RIGHT]], stamps]).T
-    return np.asarray(numbers["position"] if topic == LYAPUNOV else numbers["wrench.force.x"][:, None])
 
 
 def _lost(storage: Storage) -> dict[str, str]:

@@ -126,6 +126,7 @@ class Template:
     """
 
     def __init__(self, serialize: Callable[[list[float]], bytes], count: int) -> None:
+        self.count = count
         marks = [_MARK * (number + 1) for number in range(count)]
         cdr = bytes(serialize(marks))
         self._cdr = bytearray(cdr)
@@ -136,6 +137,11 @@ class Template:
             if last == count or places[last] != place + size:
                 self._runs.append((slice(places[first], place + size), slice(size * first, size * last)))
                 first = last
+        ends = [_STAMP_AT + _STAMP.size, *(place + size for place in places)]
+        gaps = [begin - end for end, begin in zip(ends, [*places, len(cdr)], strict=True)]  # before, between and behind
+        self._all = struct.Struct(f"<{_STAMP_AT}xiI" + "d".join(f"{gap}x" for gap in gaps))
+        self._rest = struct.Struct(f"<{_STAMP_AT}s{_STAMP.size}x" + f"{size}x".join(f"{gap}s" for gap in gaps))
+        self._same = self._rest.unpack(cdr)
 
     def fill(self, time_ns: int, numbers: Sequence[float]) -> bytes:
         """The serialized message of a time and some numbers."""
@@ -144,6 +150,12 @@ class Template:
         for place, which in self._runs:
             self._cdr[place] = packed[which]
         return bytes(self._cdr)
+
+    def read(self, cdr: bytes) -> tuple[Any, ...] | None:
+        """Seconds, nanoseconds and numbers of a message that differs in nothing else; None of any other."""
+        if len(cdr) != len(self._cdr) or self._rest.unpack(cdr) != self._same:
+            return None
+        return self._all.unpack(cdr)
 
 
 def lyapunov_template() -> Template:
@@ -179,11 +191,6 @@ def _header(time_ns: int, frame: str = "") -> Any:
     seconds, nanoseconds = divmod(time_ns, NANOSECONDS)
     stamp = _TYPES.types["builtin_interfaces/msg/Time"](sec=seconds, nanosec=nanoseconds)
     return _TYPES.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame)
-
-
-def fields_of(kind: str) -> list[tuple[str, Any]]:
-    """Names and descriptions of the fields of a message type."""
-    return list(_TYPES.get_msgdef(kind).fields)
 
 
 def decode(topic: Topic, cdr: bytes) -> Any:

@@ -22,6 +22,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
+from grasp_ros.graph.rosbag2 import state_template
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import SCENE, Topic
@@ -37,7 +38,6 @@ TYPES = {
 _STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
 _LENGTH, _NUMBER = struct.Struct("<I"), struct.Struct("<d")
 _HEAD = 4  # bytes of CDR before the content
-_STAMP_END = _HEAD + _STAMP.size
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
 Command = tuple[int, float]  # time in ns of the state that it answers, force in N
@@ -140,14 +140,12 @@ class State(NamedTuple):
 
 
 class StateReader:
-    """Reads serialized states; one that differs from the last in its time and its numbers alone costs a tenth."""
+    """Reads serialized states; of those that differ from the last in time and numbers alone at a tenth of the cost."""
 
     def __init__(self, names: Collection[str]) -> None:
         self._needed = names  # of bodies that every state has
         self._name: tuple[str, ...] = ()
-        self._head = self._fixed = b""  # of the last message, before its stamp and from there to its numbers
-        self._begin, self._length = 0, -1  # of the numbers, and of the message; -1: there is no pattern
-        self._numbers = struct.Struct("")
+        self._template = state_template(())
 
     def read(self, cdr: bytes) -> State | None:
         """A state; None if a message is none: lists that differ in length, names that are missing or there twice, NaN.
@@ -157,31 +155,22 @@ class StateReader:
         RuntimeError, ValueError or struct.error, which is `UNREADABLE`
             If it cannot be decoded.
         """
-        if len(cdr) == self._length and cdr[_STAMP_END : self._begin] == self._fixed and cdr[:_HEAD] == self._head:
-            n, numbers = len(self._name), self._numbers.unpack_from(cdr, self._begin)
-            if numbers[n] == numbers[2 * n + 1] == n:
-                lists = numbers[:n], numbers[n + 1 : 2 * n + 1], numbers[2 * n + 2 :]
-                return State(raw_stamp_ns(cdr), self._name, *lists) if _finite(*lists) else None
+        lists: tuple[tuple[float, ...], ...]
+        if (found := self._template.read(cdr)) is not None:
+            n, numbers = len(self._name), found[2:]
+            lists = numbers[:n], numbers[n : 2 * n], numbers[2 * n :]
+            return State(raw_stamp_ns(cdr), self._name, *lists) if _finite(*lists) else None
         message = deserialize_message(cdr, JointState)
         lists = tuple(message.position), tuple(message.velocity), tuple(message.effort)
-        number = len(message.name)
+        name = tuple(message.name)
         if not (
-            all(len(values) == number for values in lists) and len(set(message.name)) == number
-            and all(name in message.name for name in self._needed) and _finite(*lists)
+            all(len(values) == len(name) for values in lists) and len(set(name)) == len(name)
+            and all(needed in name for needed in self._needed) and _finite(*lists)
         ):
             return None
-        self._learn(cdr, tuple(message.name), lists)
-        return State(to_ns(message.header.stamp), self._name, *lists)
-
-    def _learn(self, cdr: bytes, name: tuple[str, ...], lists: tuple[tuple[float, ...], ...]) -> None:
-        """Take a message as a pattern, if its numbers lie where those of CDR in little-endian order do."""
-        n = len(name)
-        numbers = struct.Struct(f"<{n}dI4x{n}dI4x{n}d")
-        begin = len(cdr) - numbers.size
-        self._name, self._length = name, -1
-        if begin > _STAMP_END and numbers.unpack_from(cdr, begin) == (*lists[0], n, *lists[1], n, *lists[2]):
-            self._numbers, self._begin, self._length = numbers, begin, len(cdr)
-            self._head, self._fixed = cdr[:_HEAD], cdr[_STAMP_END:begin]
+        if name != self._name:
+            self._name, self._template = name, state_template(name)
+        return State(to_ns(message.header.stamp), name, *lists)
 
 
 def _finite(*lists: Sequence[float]) -> bool:

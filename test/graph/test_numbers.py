@@ -1,0 +1,108 @@
+"""Messages of a bag have the numbers that rosbags gives them, whoever has written them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+from rosbags.typesys import Stores, get_typestore
+
+from grasp_ros import scene as scenes
+from grasp_ros.graph import bag
+from grasp_ros.graph.recorder import Recorder
+from grasp_ros.graph.rosbag2 import list_message
+from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
+from grasp_ros.simulation import simulate
+from lab.drills import recorder as study
+
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def again(topic: Topic, cdr: bytes, little: bool, frame: str) -> bytes:
+    """A message as another program may write it."""
+    content: Any = STORE.deserialize_cdr(cdr, topic.type)
+    content.header.frame_id = frame
+    if topic == JOINT_STATES:
+        for name in ("name", "position", "velocity", "effort"):
+            setattr(content, name, getattr(content, name)[::-1].copy())
+    return bytes(STORE.serialize_cdr(content, topic.type, little_endian=little))
+
+
+@pytest.mark.parametrize("little", [True, False])
+def test_messages_of_another_make_have_the_same_numbers(tmp_path: Path, little: bool) -> None:
+    """In another order of bytes or of bodies, in other frames; some of them among those of the recorder."""
+    run = simulate(scenes.load("everything", ["time.duration_s=0.05"]), sampled=True)
+    study.write(tmp_path / "bag", run)
+    recorder = Recorder(tmp_path / "other", run.scene, {})
+    for number, (time_ns, messages) in enumerate(study.ticks_of(run)):
+        other = [(topic, again(topic, cdr, little, "x" * number)) for topic, cdr in messages if topic != CLOCK]
+        recorder.write_tick(time_ns, other if number % 3 else messages)
+    recorder.close()
+    bags = [bag.read(tmp_path / name) for name in ("bag", "other")]
+    for name in ("tick", "state", "effort", "command", "lyapunov", "starts"):
+        assert len({getattr(found, name).tobytes() for found in bags}) == 1, name
+    assert len({b"".join(values.tobytes() for values in found.outputs.values()) for found in bags}) == 1
+
+
+@pytest.mark.parametrize("topic", [JOINT_STATES, LEFT_COMMAND, LYAPUNOV])
+def test_what_is_no_message_is_refused_wherever_it_stands(tmp_path: Path, topic: Topic) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    for number in range(4):
+        recorder = Recorder(tmp_path / str(number), run.scene, {})
+        for time_ns, messages in study.ticks_of(run):
+            cdr = dict(messages)[topic]
+            wrong = [cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:]][number]
+            at = [(other, wrong if (other, time_ns) == (topic, 5_000_000) else found) for other, found in messages]
+            recorder.write_tick(time_ns, at)
+        recorder.close()
+        with pytest.raises(bag.BagError, match="not a bag of this package"):
+            bag.read(tmp_path / str(number))
+
+
+@pytest.mark.parametrize("name", ["case_01", "everything", "arm_alone"])
+def test_a_recording_has_the_numbers_that_another_reader_decodes(tmp_path: Path, name: str) -> None:
+    run = simulate(scenes.load(name, ["time.duration_s=0.5"]), sampled=True)
+    study.write(tmp_path / "bag", run)
+    recording, scene = bag.read(tmp_path / "bag"), run.scene
+    found: dict[str, list[Any]] = {}
+    with Reader(tmp_path / "bag") as reader:
+        for connection, time_ns, raw in reader.messages():
+            found.setdefault(connection.topic, []).append((time_ns, STORE.deserialize_cdr(raw, connection.msgtype)))
+    times, states = zip(*found["/joint_states"], strict=True)
+    assert [tick * scene.period_ns for tick in recording.tick.tolist()] == list(times)
+    assert recording.state.tobytes() == np.array([state_of(one)[0] for one in states]).tobytes()
+    assert recording.effort.tobytes() == np.array([state_of(one)[1][:2] for one in states]).tobytes()
+    assert recording.lyapunov.tobytes() == np.array([one.position for _, one in found["/lyapunov"]]).tobytes()
+    for topic, column in recording.outputs.items():
+        assert column.tobytes() == np.array([one.wrench.force.x for _, one in found[f"/{topic}"]]).tobytes()
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        commands = np.array([one.wrench.force.x for _, one in found[f"/{topic.name}"]])
+        assert recording.command[:, side].tobytes() == commands.tobytes()
+
+
+def test_a_list_of_another_length_is_refused(tmp_path: Path) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    recorder = Recorder(tmp_path / "bag", run.scene, {})
+    for time_ns, messages in study.ticks_of(run):
+        if time_ns == 10_000_000:
+            messages[-1] = LYAPUNOV, list_message(time_ns, LYAPUNOV_NAMES[:8], np.zeros(8))
+        recorder.write_tick(time_ns, messages)
+    recorder.close()
+    with pytest.raises(bag.BagError, match="/lyapunov: 8 numbers; allowed: 9"):
+        bag.read(tmp_path / "bag")
+
+
+@pytest.mark.parametrize("times", [(0, 1, 1), (0, 2, 1), (0, 1, 0.5)])
+def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...]) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    _, messages = next(study.ticks_of(run))
+    recorder = Recorder(tmp_path / "bag", run.scene, {})
+    for time in times:
+        recorder.write_tick(round(time * run.scene.period_ns), messages)
+    recorder.close()
+    wrong = round(times[-1] * run.scene.period_ns)
+    with pytest.raises(bag.BagError, match=f": {wrong} ns; allowed: ticks of the scene in their order"):
+        bag.read(tmp_path / "bag")
