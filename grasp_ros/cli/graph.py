@@ -9,7 +9,9 @@ import re
 import signal
 import sys
 import time
+from collections.abc import Sequence
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -107,15 +109,14 @@ def _run(options: argparse.Namespace) -> int:
     directory = options.output or Path("runs") / f"{scene.name}_{datetime.now():%Y_%m_%d-%H_%M_%S}"
     check_limits(options, lockstep=options.free_running is None)
     Running(options.accuracy)  # refuses what is wrong before anything is there, as those around it do
-    if options.free_running is not None:
-        check_factor(options.free_running)
-    spent = Spent()
-    if not kernels_on_disk():  # otherwise the plant alone loads them
-        prepare()
-        spent.note("compilation")
     plant = {"paused": str(options.paused).lower()}
     if options.free_running is not None:
+        check_factor(options.free_running)
         plant.update(free_running="true", real_time_factor=repr(options.free_running), wait_for_controllers="true")
+    spent = [(time.monotonic(), "begin")]
+    if not kernels_on_disk():  # otherwise the plant alone loads them
+        prepare()
+        spent.append((time.monotonic(), "compilation"))
     graph = Graph(
         scene, directory, options.accuracy, progress=True, without=options.without, laws=laws,
         plant=plant, one_process=options.one_process, namespace=options.namespace,
@@ -141,26 +142,13 @@ def _has_ticks(path: Path) -> bool:
     return closed and any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in Opened(path).messages)
 
 
-class Spent:
-    """Wall time of a command, by what took it."""
-
-    def __init__(self) -> None:
-        self._begin = self._last = time.monotonic()
-        self._parts: list[str] = []
-
-    def note(self, what: str, until: float | None = None) -> None:
-        """Something has ended."""
-        now = time.monotonic() if until is None else until
-        self._parts.append(f"{what} {now - self._last:.1f}")
-        self._last = now
-
-    @property
-    def words(self) -> str:
-        """For a reader."""
-        return f"{time.monotonic() - self._begin:.1f} s: {', '.join(self._parts)}"
+def _in_words(spent: Sequence[tuple[float, str]]) -> str:
+    """Wall times of a command at which something had ended, as how long each took."""
+    parts = [f"{what} {end - begin:.1f}" for (begin, _), (end, what) in pairwise(spent)]
+    return f"{time.monotonic() - spent[0][0]:.1f} s: {', '.join(parts)}"
 
 
-def _live(graph: Graph, spent: Spent) -> bool:
+def _live(graph: Graph, spent: list[tuple[float, str]]) -> bool:
     """Start a graph, wait for its end and stop it; returns whether a signal has ended it."""
     received: list[int] = []
     before = {number: signal.getsignal(number) for number in STOP_SIGNALS}
@@ -168,17 +156,17 @@ def _live(graph: Graph, spent: Spent) -> bool:
     try:
         graph.start()
         graph.wait(received)
-        spent.note("start", graph.begun)
-        spent.note("run")
+        spent.append((graph.begun or time.monotonic(), "start"))
+        spent.append((time.monotonic(), "run"))
     finally:
         graph.stop()
-        spent.note("stop")
+        spent.append((time.monotonic(), "stop"))
         for number, handler in before.items():
             signal.signal(number, handler)
     return bool(received)
 
 
-def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespace) -> int:
+def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options: argparse.Namespace) -> int:
     """Print and draw what a run has recorded; the exit status says whether it is all there and right."""
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
@@ -187,7 +175,7 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
 
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
-    spent.note("reading")
+    spent.append((time.monotonic(), "reading"))
     if stopped:
         rows.append(("interrupted", f"not verified and not drawn; `grasp verify` and `grasp plot` {graph.bag} do that"))
     else:
@@ -198,15 +186,15 @@ def _report(graph: Graph, stopped: bool, spent: Spent, options: argparse.Namespa
     if not (stopped or options.no_check):
         comparison = compare_recording(recording)
         whole, rows = whole and comparison.equal, rows + comparison.rows
-        spent.note("check")
+        spent.append((time.monotonic(), "check"))
     if not (stopped or options.no_figure):
         from grasp_ros.simulation import plots
 
         figure = graph.directory / "figure.png"
         plots.draw(recording, figure)
         rows.append(("figure", str(figure)))
-        spent.note("figure")
-    print(report.table([*rows, ("wall time", spent.words)]))
+        spent.append((time.monotonic(), "figure"))
+    print(report.table([*rows, ("wall time", _in_words(spent))]))
     return 0 if whole else 1
 
 

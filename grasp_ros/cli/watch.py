@@ -12,7 +12,6 @@ from grasp_ros.graph.keys import Key, Keys
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.view import Moment, View, named
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import CONTACTS
 
@@ -37,68 +36,24 @@ def play(recording: Recording, rate: float, first: float | None = None) -> None:
         raise Refused(f"--rate: {rate!r} is not allowed; allowed: a number > 0")
     if not times[0] <= first <= times[-1]:
         raise Refused(f"--from: {first!r} is not allowed; allowed: {times[0]:g} to {times[-1]:g} s")
-    position = Position(times, rate, first)
+    row, paused, at, since = 0, False, first, time.monotonic()  # what is shown; since when time goes by, from where
     with closing(Keys()) as keys, Live(auto_refresh=False) as live:
         keys.start()
         view = View(recording.scene, HINT if keys.there else "")
         while True:
-            words = "paused" if position.paused else f"{rate:g} s in a second"
-            moment = moment_of(recording, position.row, words)
+            if not paused:
+                row = int(np.searchsorted(times, at + (time.monotonic() - since) * rate, side="right")) - 1
+            moment = moment_of(recording, row, "paused" if paused else f"{rate:g} s in a second")
             live.update(view.draw(moment, live.console.width), refresh=True)
-            if position.ended:
+            if not paused and row == len(times) - 1:
                 return
             for key in keys.pressed(FRAME_SECONDS):
                 if key is Key.QUIT:
                     return
-                position.press(key)
-            position.go_on()
-
-
-class Position:
-    """Which tick of a recording is shown: time goes by, or stands and is moved a tick on or back.
-
-    Parameters
-    ----------
-    times : array (n,), s
-        Of the ticks.
-    rate : float
-        Seconds of the recording in a second.
-    first : float, s
-        Where it begins.
-
-    Attributes
-    ----------
-    row : int
-        The last tick that has been reached.
-    paused : bool
-    """
-
-    def __init__(self, times: Array, rate: float, first: float) -> None:
-        self._times, self._rate, self.paused, self.row = times, rate, False, 0
-        self._begin(first)
-        self.go_on()
-
-    def _begin(self, at: float) -> None:
-        """Go on from a time of the recording."""
-        self._at, self._since = at, time.monotonic()
-
-    def go_on(self) -> None:
-        """See how far it has come by now."""
-        if not self.paused:
-            reached = self._at + (time.monotonic() - self._since) * self._rate
-            self.row = int(np.searchsorted(self._times, reached, side="right")) - 1
-
-    def press(self, key: Key) -> None:
-        """Pause or go on, or step, which pauses, too."""
-        self.paused = key is not Key.PAUSE or not self.paused
-        if key is not Key.PAUSE:
-            self.row = min(max(self.row + (1 if key is Key.FORWARD else -1), 0), len(self._times) - 1)
-        self._begin(float(self._times[self.row]))
-
-    @property
-    def ended(self) -> bool:
-        """Whether it has gone by."""
-        return not self.paused and self.row == len(self._times) - 1
+                paused = key is not Key.PAUSE or not paused  # a step pauses, too
+                if key is not Key.PAUSE:
+                    row = min(max(row + (1 if key is Key.FORWARD else -1), 0), len(times) - 1)
+                at, since = float(times[row]), time.monotonic()
 
 
 def moment_of(recording: Recording, row: int, words: str) -> Moment:

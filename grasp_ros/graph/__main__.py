@@ -51,7 +51,10 @@ def main(name: str, child: bool = False) -> int:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, STOP_SIGNALS)  # `grasp run` starts us with all blocked
     os.environ.update(this_host(os.environ))  # before rclpy looks
     if name == "plant":
-        _spare_the_plant()
+        # Numba is not to find what it would import beside itself, which takes half as long as all else: scipy has BLAS,
+        # which no kernel uses. A plant runs no code but the package's own.
+        for module in ("coverage", "scipy"):
+            sys.modules.setdefault(module, None)  # type: ignore[arg-type]
     names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
     makes = {each: _maker(each) for each in names}
     status: int = import_module("grasp_ros.graph.ros.life").run(makes, received)
@@ -79,15 +82,6 @@ def _own_words() -> list[str]:
     begin = words.index("--ros-args")
     end = words.index("--", begin) + 1 if "--" in words[begin:] else len(words)
     return words[:begin] + words[end:]
-
-
-def _spare_the_plant() -> None:
-    """Let numba not find what it would import beside itself, which takes half as long as all the rest of the plant.
-
-    scipy has BLAS, which no kernel uses; a plant runs no code but the package's own.
-    """
-    for module in ("coverage", "scipy"):
-        sys.modules.setdefault(module, None)  # type: ignore[arg-type]
 
 
 def start() -> int:

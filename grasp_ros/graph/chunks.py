@@ -48,10 +48,10 @@ class Messages:
         self._first = self._last = 0
 
     def add(self, channel: int, time_ns: int, data: bytes) -> None:
-        """Add one to the current chunk; its number is that of those before it on the channel."""
+        """Add one to the current chunk, not earlier than the last; its number is that of those before there."""
         records = self._records
         if not records:
-            self._begin, self._first, self._last = self._chunk.count, time_ns, time_ns
+            self._begin, self._first = self._chunk.count, time_ns
         entries = self._entries.get(channel)
         if entries is None:
             entries = self._entries[channel] = bytearray()
@@ -60,10 +60,7 @@ class Messages:
         self.counts[channel] = number + 1
         records += RECORD.pack(_MESSAGE, _OWN_BYTES + len(data), channel, number, time_ns, time_ns)
         records += data
-        if time_ns > self._last:
-            self._last = time_ns
-        elif time_ns < self._first:
-            self._first = time_ns
+        self._last = time_ns
 
     def flush(self) -> None:
         """End the chunk, and hand it to the writer's stream."""
@@ -81,9 +78,9 @@ class Messages:
         })
         chunk.num_messages = sum(len(entries) // ENTRY.size for entries in self._entries.values())
         chunk.message_start_time, chunk.message_end_time = self._first, self._last
-        begun = statistics.message_count > 0
-        statistics.message_start_time = min(self._first, statistics.message_start_time) if begun else self._first
-        statistics.message_end_time = max(self._last, statistics.message_end_time)
+        if not statistics.message_count:
+            statistics.message_start_time = self._first
+        statistics.message_end_time = self._last
         statistics.message_count += chunk.num_messages
         statistics.channel_message_counts.update(self.counts)
         self._records.clear()

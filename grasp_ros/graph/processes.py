@@ -189,7 +189,11 @@ class Graph:
     def _check(self) -> None:
         """Nobody has failed, or stands still; the one to name is the first that has said why, or that was killed."""
         ended = {name: process.returncode for name, process in self.processes.items() if process.poll() is not None}
-        self._hear()
+        assert self._lifeline is not None
+        with suppress(BlockingIOError):
+            while content := self._lifeline.recv(LONGEST):
+                when, node, why = json.loads(content)
+                self._causes.append((when, f"{node}: {why}"))
         for name, status in ended.items():
             if status < 0:
                 self._causes.append((time.monotonic(), f"{name}: was killed by {signal.Signals(-status).name}"))
@@ -201,24 +205,11 @@ class Graph:
         for name, process in self.processes.items():
             self._see_whether_stopped(name, process)
 
-    def _hear(self) -> None:
-        """Take what the nodes have said about their ends."""
-        assert self._lifeline is not None
-        with suppress(BlockingIOError):
-            while content := self._lifeline.recv(LONGEST):
-                when, node, why = json.loads(content)
-                self._causes.append((when, f"{node}: {why}"))
-
     def _see_whether_stopped(self, name: str, process: subprocess.Popen[bytes]) -> None:
         """Nobody else is there to notice it when all nodes are in one process, or when all are stopped."""
-        if process.returncode is None:
-            found = None
-            with suppress(ChildProcessError):  # of one that has ended since it was asked
-                found = os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WCONTINUED | os.WNOHANG)
-            if found is not None and found.si_code == os.CLD_CONTINUED:
-                self._stopped.pop(name, None)
-            elif found is not None:
-                self._stopped[name] = time.monotonic()
+        with suppress(ChildProcessError):  # of one that has ended
+            if found := os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WCONTINUED | os.WNOHANG):
+                self._stopped[name] = math.inf if found.si_code == os.CLD_CONTINUED else time.monotonic()
         patience = self.peer_timeout + (0.0 if self.one_process else NODES_SECONDS)
         if self.on_silence == "end" and time.monotonic() - self._stopped.get(name, math.inf) > patience:
             raise GraphError(f"{name}: was stopped, and did not go on for {patience:g} s")

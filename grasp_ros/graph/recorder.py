@@ -48,11 +48,6 @@ def signed(record: Mapping[str, str]) -> dict[str, str]:
     return {**content, DIGEST: checksum(repr(sorted(content.items())))}
 
 
-def ranges(ticks: Iterable[tuple[int, int]]) -> str:
-    """First and last ticks as text."""
-    return ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in ticks) or "none"
-
-
 class Recorder:
     """Writes one bag, into a directory that does not exist yet: the scene and the versions first, then ticks.
 
@@ -233,7 +228,8 @@ class Recorder:
         counts = {topic: self._messages.counts[channel] for topic, channel in self._channels.items()}
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)
-        lost = {"end": why, "ticks that are missing": ranges(self._gaps), **counters, BESIDE: checksum(text)}
+        gaps = ", ".join(f"{first}" if first == last else f"{first}-{last}" for first, last in self._gaps) or "none"
+        lost = {"end": why, "ticks that are missing": gaps, **counters, BESIDE: checksum(text)}
         self._writer.add_metadata(LOST_RECORD, signed(lost))
         self._writer.add_metadata(rosbag2.METADATA_RECORD, {
             rosbag2.METADATA_KEY: dump(document[rosbag2.INFORMATION]).strip()

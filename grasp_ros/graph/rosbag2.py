@@ -120,42 +120,34 @@ def numbers_message(time_ns: int, numbers: Mapping[str, float], number: int = 0)
 
 
 class Template:
-    """A message that is serialized once; then its time and numbers are replaced, which costs a tenth of making it anew.
+    """A message that is serialized once; with another time and other numbers it costs a tenth of making it anew.
 
-    `serialize` makes it of a list of so many numbers; it begins with a stamp.
+    `serialize` makes it of a list of `count` numbers; it begins with a stamp. What it writes it also reads.
     """
 
     def __init__(self, serialize: Callable[[list[float]], bytes], count: int) -> None:
-        self.count = count
+        self.count, size = count, _NUMBER.size
         marks = [_MARK * (number + 1) for number in range(count)]
         cdr = bytes(serialize(marks))
-        self._cdr = bytearray(cdr)
-        self._numbers, size = struct.Struct(f"<{count}d"), _NUMBER.size
-        self._runs: list[tuple[slice, slice]] = []  # where numbers lie side by side, in the message and among all
-        places, first = [cdr.index(_NUMBER.pack(mark)) for mark in marks], 0
-        for last, place in enumerate(places, 1):
-            if last == count or places[last] != place + size:
-                self._runs.append((slice(places[first], place + size), slice(size * first, size * last)))
-                first = last
+        places = [cdr.index(_NUMBER.pack(mark)) for mark in marks]
         ends = [_STAMP_AT + _STAMP.size, *(place + size for place in places)]
         gaps = [begin - end for end, begin in zip(ends, [*places, len(cdr)], strict=True)]  # before, between and behind
-        self._all = struct.Struct(f"<{_STAMP_AT}xiI" + "d".join(f"{gap}x" for gap in gaps))
-        self._rest = struct.Struct(f"<{_STAMP_AT}s{_STAMP.size}x" + f"{size}x".join(f"{gap}s" for gap in gaps))
-        self._same = self._rest.unpack(cdr)
+        self._form = struct.Struct(f"<{_STAMP_AT}siI" + "d".join(f"{gap}s" for gap in gaps))
+        self._parts = list(self._form.unpack(cdr))  # head, seconds, nanoseconds; then gaps and numbers in turn
+        self._gaps = tuple(self._parts[3::2])
 
     def fill(self, time_ns: int, numbers: Sequence[float]) -> bytes:
         """The serialized message of a time and some numbers."""
-        _STAMP.pack_into(self._cdr, _STAMP_AT, *divmod(time_ns, NANOSECONDS))
-        packed = self._numbers.pack(*numbers)
-        for place, which in self._runs:
-            self._cdr[place] = packed[which]
-        return bytes(self._cdr)
+        self._parts[1:3] = divmod(time_ns, NANOSECONDS)
+        self._parts[4::2] = numbers
+        return self._form.pack(*self._parts)
 
     def read(self, cdr: bytes) -> tuple[Any, ...] | None:
         """Seconds, nanoseconds and numbers of a message that differs in nothing else; None of any other."""
-        if len(cdr) != len(self._cdr) or self._rest.unpack(cdr) != self._same:
+        if len(cdr) != self._form.size:
             return None
-        return self._all.unpack(cdr)
+        parts = self._form.unpack(cdr)
+        return parts[1:3] + parts[4::2] if parts[0] == self._parts[0] and parts[3::2] == self._gaps else None
 
 
 def lyapunov_template() -> Template:

@@ -64,13 +64,7 @@ class Verification(NamedTuple):
         return f"{equal}; {self.problem}" if self.problem else equal
 
 
-class _Column(NamedTuple):
-    """Numbers that were recorded, beside what they should be."""
-
-    topic: str
-    name: str
-    recorded: Array
-    computed: Array
+_Column = tuple[str, str, Array, Array]  # topic, name, what was recorded, and what it should be
 
 
 def verify(recording: Recording) -> Verification:
@@ -82,7 +76,7 @@ def verify(recording: Recording) -> Verification:
         ticks += len(states)
         problem = problem or stop
         part = rows[: len(states)]
-        found = [found for column in _columns(recording, part, states) if (found := _first(recording, part, column))]
+        found = [found for column in _columns(recording, part, states) if (found := _first(recording, part, *column))]
         if found:
             first = min(found, key=lambda difference: difference.tick)
             break
@@ -143,18 +137,14 @@ def _gap(recording: Recording) -> str:
     missing = np.flatnonzero(np.diff(recording.tick) != 1)
     if len(missing):
         return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
-    lost = {name: np.flatnonzero(np.isnan(values)) for name, values in _numbers(recording)}
+    columns = {**recording.outputs, LYAPUNOV.name: recording.lyapunov[:, LYAPUNOV_NAMES.index("V_plant")]}
+    if recording.running.lockstep:
+        columns |= {topic.name: recording.command[:, SIDES[name.removesuffix("_controller")]]
+                    for name, topic in recording.scene.controllers.items()}
+    lost = {name: np.flatnonzero(np.isnan(values)) for name, values in columns.items()}
     words = [f"{name} of {len(rows)} ticks, the first {recording.tick[rows[0]]}" for name, rows in lost.items()
              if len(rows)]
     return f"the bag lacks {' and '.join(words)}" if words else ""
-
-
-def _numbers(recording: Recording) -> Iterator[tuple[str, Array]]:
-    """What comes with every tick, by topic; NaN where it did not."""
-    yield from recording.outputs.items()
-    yield LYAPUNOV.name, recording.lyapunov[:, LYAPUNOV_NAMES.index("V_plant")]
-    for name, topic in recording.scene.controllers.items() if recording.running.lockstep else ():
-        yield topic.name, recording.command[:, SIDES[name.removesuffix("_controller")]]
 
 
 def _episodes(recording: Recording) -> Iterator[np.ndarray]:
@@ -185,44 +175,37 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
     system, present = recording.scene.system, recording.scene.system.present
     for number, name in enumerate(STATES):
         if any(COLUMN[body] == number // 2 * 2 for body in present):
-            yield _Column(JOINT_STATES.name, name, recording.state[rows, number], states[:, number])
-    yield from _effort(recording, rows)
+            yield (JOINT_STATES.name, name, recording.state[rows, number], states[:, number])
+    if recording.running.lockstep:  # the force that acted until a tick is the command that had arrived: after the delay
+        wait = system.delay + 1
+        for body in system.laws:
+            acted = np.concatenate([np.zeros(wait), recording.command[rows, body]])[: len(rows)]
+            yield (JOINT_STATES.name, f"{NAMES[body]} effort", recording.effort[rows, body], acted)
     u_l, d_l, u_r, d_r = penetration(states)
     for side, u, d in (("left", u_l, d_l), ("right", u_r, d_r)):
         if (topic := CONTACTS[side].name) in recording.outputs:
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
-            yield _Column(topic, "force", recording.outputs[topic][rows], force)
+            yield (topic, "force", recording.outputs[topic][rows], force)
     external = system.external_over(np.arange(len(rows))) if system.external else None
     for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
         if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
-            yield _Column(topic, "force", recording.outputs[topic][rows], external[:, body])
+            yield (topic, "force", recording.outputs[topic][rows], external[:, body])
     alone = energy(system, states, feedback=False)
     for name, values in (("V_plant", alone.V_c), ("mode", alone.mode.astype(float))):
-        yield _Column(LYAPUNOV.name, name, recording.lyapunov[rows, LYAPUNOV_NAMES.index(name)], values)
+        yield (LYAPUNOV.name, name, recording.lyapunov[rows, LYAPUNOV_NAMES.index(name)], values)
 
 
-def _effort(recording: Recording, rows: np.ndarray) -> Iterator[_Column]:
-    """In lockstep the force that acted until a tick is the command that had arrived: after the delay."""
-    if not recording.running.lockstep:
-        return
-    wait = recording.scene.system.delay + 1
-    for side in (LEFT, RIGHT):
-        if side in recording.scene.system.laws:
-            acted = np.concatenate([np.zeros(wait), recording.command[rows, side]])[: len(rows)]
-            yield _Column(JOINT_STATES.name, f"{NAMES[side]} effort", recording.effort[rows, side], acted)
-
-
-def _first(recording: Recording, rows: np.ndarray, column: _Column) -> Difference | None:
+def _first(
+    recording: Recording, rows: np.ndarray, topic: str, name: str, recorded: Array, computed: Array
+) -> Difference | None:
     """The first number whose bits differ; NaN, in place of what the bag has lost, is left out, and named by `_gap`."""
-    recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (column.recorded, column.computed))
+    recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (recorded, computed))
     lost = np.isnan(recorded) | np.isnan(computed)
     differ = (recorded.view(np.int64) != computed.view(np.int64)) & ~lost
     if not differ.any():
         return None
     place = int(np.argmax(differ))
-    return Difference(
-        int(recording.tick[rows[place]]), column.topic, column.name, float(recorded[place]), float(computed[place])
-    )
+    return Difference(int(recording.tick[rows[place]]), topic, name, float(recorded[place]), float(computed[place]))
 
 
 class Comparison(NamedTuple):

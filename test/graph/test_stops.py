@@ -19,7 +19,7 @@ import rclpy
 from processes import DEADLINE, START, wait_for
 
 from grasp_ros import scene
-from grasp_ros.cli.graph import Spent, _report
+from grasp_ros.cli.graph import _report
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.stopping import STOP_SIGNALS
@@ -195,7 +195,7 @@ def test_a_bag_that_ends_before_its_scene_is_no_success(tmp_path: Path, capsys: 
     half = simulate(case.changed({"time.duration_s": 0.1}), sampled=True)
     recorder.write(tmp_path / "bag", replace(half, scene=case))
     quiet = Namespace(max_age=None, min_factor=None, no_check=True, no_figure=True)
-    assert _report(Graph(case, tmp_path, ACCURACY), False, Spent(), quiet) == 1
+    assert _report(Graph(case, tmp_path, ACCURACY), False, [(0.0, "begin")], quiet) == 1
     assert capsys.readouterr().err == f"grasp: {tmp_path / 'bag'}: the run ended at 0.1 s, before its scene\n"
 
 

@@ -153,10 +153,6 @@ class Beats:
             found += [name] * max(1, number - len(dead))
         return found
 
-    def alive(self, names: Sequence[str], limit: float) -> list[str]:
-        """Those of some nodes that have given a sign since a wall time."""
-        return sorted({sign.node for sign in self.of(names) if not sign.ended and sign.heard >= limit})
-
     def vouched(self, name: str) -> Sign | None:
         """Who says a text, by its digest; None if nobody does."""
         return next((sign for sign in self._signs.values() if name in sign.texts and not sign.ended), None)

@@ -194,11 +194,16 @@ class PeerNode(GraspNode):
             if since is not None and not gone:
                 del self._silent[name]
                 self.get_logger().warning(f"{name}: is back after {now - since:.1f} s")
-            if need.gone is Gone.STAYS and not gone:
-                self._come_back()
+            if need.gone is Gone.STAYS and not gone:  # it is there, or another one in its place
+                if self._left is not None and self.phase is Phase.IDLE:
+                    self.phase, self.words = self._left
+                self._left = None
         elif gone and need.gone is Gone.STAYS:
             self._silent.clear()
-            self._leave(trouble.words)
+            if self._left is None:
+                self._left = self.phase, self.words
+                self.phase, self.words = Phase.IDLE, f"waiting for another one: {trouble.words}"
+                self.get_logger().info(self.words)
         elif (gone and need.gone is Gone.ENDS) or (need.gone is not Gone.NOTED and self._ends and trouble.certain):
             self.fail(trouble.words)
         elif since is None and not (trouble.announced and need.gone is Gone.NOTED):
@@ -209,19 +214,6 @@ class PeerNode(GraspNode):
             self._said = now
             self.get_logger().error(f"{trouble.words}; waits on")
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
-
-    def _leave(self, words: str) -> None:
-        """A peer without which this node stays has ended."""
-        if self._left is None:
-            self._left = self.phase, self.words
-            self.phase, self.words = Phase.IDLE, f"waiting for another one: {words}"
-            self.get_logger().info(self.words)
-
-    def _come_back(self) -> None:
-        """It is there, or another one in its place."""
-        if self._left is not None and self.phase is Phase.IDLE:
-            self.phase, self.words = self._left
-        self._left = None
 
     def living(self, topic: Topic) -> list[str]:
         """Sources of a topic without processes that are known to be dead."""

@@ -49,14 +49,14 @@ class Limits:
 
     def admit(self, topic: Topic, command: Command) -> bool:
         """The same, and what it cannot do is counted."""
-        if allowed := self.allow(topic, command):
-            return allowed
+        if self.allow(topic, command):
+            return True
         self._node.refuse("commands beyond a limit", topic)
         self._node.get_logger().warning(
             f"{topic.name}: {command[1]:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N",
             throttle_duration_sec=PATIENCE_SECONDS,
         )
-        return allowed
+        return False
 
 
 class Sources:

@@ -43,13 +43,6 @@ class Tick(NamedTuple):
     restored: int = 0  # commands that were made from the force that acted
 
 
-class _State(NamedTuple):
-    time_ns: int
-    restarted: bool
-    message: State
-    cdr: bytes
-
-
 class Ticks:
     """The messages of each topic by their stamps, and the states of the plant to go by.
 
@@ -71,7 +64,7 @@ class Ticks:
     ) -> None:
         self._reader, self._period_ns, self.end_ns, self._turn = StateReader(names), period_ns, end_ns, turn
         self._ahead_ns = PATIENCE_TICKS * period_ns
-        self._states: deque[_State] = deque()
+        self._states: deque[tuple[bool, State, bytes]] = deque()  # whether time went back; as read; as it came
         self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
         self._doubtful: dict[Topic, dict[int, list[bytes]]] = {topic: {} for topic in topics}
         self._wait = delay + 1  # ticks until the effort has a command
@@ -102,7 +95,7 @@ class Ticks:
         if restarted or self._newest < 0:
             self._newest_turn = self._turn()
         self._newest = stamp
-        self._states.append(_State(stamp, restarted, message, cdr))
+        self._states.append((restarted, message, cdr))
         return Arrival.TAKEN
 
     def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:
@@ -135,7 +128,8 @@ class Ticks:
         """The next tick that is complete, or after such a wait in s will not be any more; None if that is open."""
         if not self._states:
             return None
-        time_ns, restarted, message, cdr = self._states[0]
+        restarted, message, cdr = self._states[0]
+        time_ns = message.time_ns
         given_up = len(self._states) > PATIENCE_TICKS or (waited > GIVE_UP_SECONDS and len(self._states) > 1)
         found, restored = {JOINT_STATES: cdr}, 0
         for topic, queue in self._others.items():
@@ -168,9 +162,9 @@ class Ticks:
         """The force in N of the command that answers the first state, as a later one has it."""
         if len(self._states) <= self._wait:
             return None
-        later = self._states[self._wait]
-        known = later.time_ns == time_ns + self._wait * self._period_ns and side in later.message.name
-        return float(later.message.effort[later.message.name.index(side)]) if known else None
+        _, later, _ = self._states[self._wait]
+        known = later.time_ns == time_ns + self._wait * self._period_ns and side in later.name
+        return float(later.effort[later.name.index(side)]) if known else None
 
     def _forget(self, topic: Topic, time_ns: int) -> int:
         """Let go of what belongs to a tick; returns how many messages came before it and belong to none."""

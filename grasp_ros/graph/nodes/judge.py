@@ -42,8 +42,8 @@ class Judge:
     @property
     def unknown(self) -> list[str]:
         """Sides whose controllers have announced no law so far."""
-        return [name.removesuffix("_controller") for name in self._scene.controllers
-                if name.removesuffix("_controller") not in self._acting]
+        sides = (name.removesuffix("_controller") for name in self._scene.controllers)
+        return [side for side in sides if side not in self._acting]
 
     def announce(self, side: str, announcement: Announcement) -> None:
         """Take note of a law that will act."""

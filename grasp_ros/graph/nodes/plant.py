@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any
 
+from rclpy.duration import Duration
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
@@ -29,6 +30,8 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW
 from grasp_ros.simulation.sampled_plant import SampledPlant
+
+NO_TIME = Duration(seconds=0)
 
 
 class Plant(PeerNode):
@@ -146,7 +149,8 @@ class Plant(PeerNode):
     def _insist(self) -> list[str]:
         """Fail if there is another plant; before the start, names of those that give no sign: they may be dead."""
         names = self.sources(JOINT_STATES)
-        alive = self.beats.alive(names, time.monotonic() - self.patience)
+        limit = time.monotonic() - self.patience
+        alive = any(not sign.ended and sign.heard >= limit for sign in self.beats.of(names))
         strange = self.living(JOINT_STATES) if len(names) > 1 else []
         if alive or (self.begun and len(strange) > 1):
             topic = self._states.topic_name
@@ -162,8 +166,9 @@ class Plant(PeerNode):
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         self.words = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
         # Who has been here with another plant must have this scene before its first state.
+        told = (*self._descriptions, self.beats.publisher)
         known = all(publisher.get_subscription_count() >= len(self.readers(publisher))
-                    and self.delivered(publisher) for publisher in (*self._descriptions, self.beats.publisher))
+                    and publisher.wait_for_all_acked(NO_TIME) for publisher in told)
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
             self.linked(publisher, monitor) for publisher, _ in self._forces
         )

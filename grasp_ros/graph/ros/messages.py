@@ -155,11 +155,10 @@ class StateReader:
         RuntimeError, ValueError or struct.error, which is `UNREADABLE`
             If it cannot be decoded.
         """
-        lists: tuple[tuple[float, ...], ...]
         if (found := self._template.read(cdr)) is not None:
             n, numbers = len(self._name), found[2:]
-            lists = numbers[:n], numbers[n : 2 * n], numbers[2 * n :]
-            return State(raw_stamp_ns(cdr), self._name, *lists) if _finite(*lists) else None
+            position, velocity, effort = numbers[:n], numbers[n : 2 * n], numbers[2 * n :]
+            return State(raw_stamp_ns(cdr), self._name, position, velocity, effort) if _finite(numbers) else None
         message = deserialize_message(cdr, JointState)
         lists = tuple(message.position), tuple(message.velocity), tuple(message.effort)
         name = tuple(message.name)

@@ -153,10 +153,6 @@ class GraspNode(ParameterNode):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
 
-    def delivered(self, publisher: Publisher) -> bool:
-        """Whether every reader that is matched has what was published; what it received it will also see first."""
-        return bool(publisher.wait_for_all_acked(Duration(seconds=0)))
-
     def read_priority(self) -> int:
         """Parameter real_time_priority: that of this process once it runs, SCHED_RR; 0: that of every process.
 
