@@ -18,7 +18,7 @@ ABOUT = "Measure, and print what was measured. Those with --docs write a page; `
 COMMANDS = (
     proofs.add_paper, proofs.add_domain, accuracy.add_certificate, proofs.add_hard, proofs.add_fuzz,
     accuracy.add_accuracy, accuracy.add_speed, accuracy.add_derivatives, accuracy.add_effects, accuracy.add_maps,
-    graph.add_graph, graph.add_recorder, graph.add_steering, proofs.add_faults, proofs.add_doors,
+    graph.add_graph, graph.add_recorder, graph.add_steering, proofs.add_faults, proofs.add_readers,
 )
 
 

@@ -43,8 +43,8 @@ def _accuracy(options: argparse.Namespace) -> int:
     contenders, others = own_contenders(scene)
     prepare()
     truth = finest(scene)
-    with bar(options.seconds, "s", scene.name) as told:
-        records = compare(scene, contenders, truth, seconds=options.seconds, progress=told)
+    with bar(options.seconds, "s", scene.name) as progress:
+        records = compare(scene, contenders, truth, seconds=options.seconds, progress=progress)
     advice = advise(records, options.error, options.budget) if wished else None
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
     late = unfinished(records, contenders)

@@ -54,9 +54,10 @@ def _design(options: argparse.Namespace) -> int:
     if several and options.output is not None:
         raise Refused("-o: allowed: with one --minimise, which has one best choice; the table has the numbers of all")
     prepare()
-    with bar(None, "run", scene.name) as told:
+    with bar(None, "run", scene.name) as progress:
         found: Sequence[Design] = (
-            front(problem, options.seed, progress=told) if several else [search(problem, options.seed, progress=told)])
+            front(problem, options.seed, progress=progress) if several
+            else [search(problem, options.seed, progress=progress)])
     show(options, "\n".join(_table(problem, found)), {
         "scene": scene.name, "units": problem.units, "choices": [
             {"numbers": own.numbers, "outcomes": own.outcomes, "runs": own.runs} for own in found]})

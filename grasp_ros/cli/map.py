@@ -13,7 +13,7 @@ from grasp_ros.cli.checks import load_scene, prepare
 from grasp_ros.cli.commands import COMMANDS
 from grasp_ros.cli.output import bar, note, show
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
-from grasp_ros.observe.sight import Wanted
+from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import format_of, needing
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup
@@ -76,8 +76,8 @@ def _run(options: argparse.Namespace) -> int:
     plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
     check(plan)
     prepare()
-    with bar(plan.rows, "run", scene.name) as told:
-        run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=told)
+    with bar(plan.rows, "run", scene.name) as progress:
+        run(plan, options.output, workers=options.workers, scheduler=options.scheduler, progress=progress)
     data = store.read(options.output)
     found = data_of(data)
     show(options, report(found), found)

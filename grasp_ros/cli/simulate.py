@@ -72,11 +72,12 @@ def _simulate(options: argparse.Namespace) -> int:
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
-    with bar(scene.duration, "s", scene.name) as told:
+    with bar(scene.duration, "s", scene.name) as progress:
         trajectory = simulate(
             scene, grid=grid, sampled=sampled, controllers=controllers, method=options.method, setting=setting,
             max_events=options.max_events, max_work=options.max_work,
-            sensitivity=options.sensitivity or None, progress=None if METHODS[options.method].knob == STEP else told,
+            sensitivity=options.sensitivity or None,
+            progress=None if METHODS[options.method].knob == STEP else progress,
         )
     found = summary(trajectory)
     rows = describe_trajectory(trajectory, found)

@@ -57,7 +57,7 @@ def main(name: str, child: bool = False) -> int:
             sys.modules.setdefault(module, None)  # type: ignore[arg-type]
     names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
     makes = {each: _maker(each) for each in names}
-    status: int = import_module("grasp_ros.graph.ros.life").run(makes, received)
+    status: int = import_module("grasp_ros.graph.ros.executor").run(makes, received)
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
         signal.signal(number, signal.SIG_IGN)
     if received and name in TOOLS:

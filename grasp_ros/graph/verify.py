@@ -92,14 +92,14 @@ class Answers(NamedTuple):
     topic: str
 
     @property
-    def foreign(self) -> bool:
+    def differs(self) -> bool:
         """Whether some command is another one, or may be."""
         return self.own is not None and self.own < self.commands
 
     def __str__(self) -> str:
         if self.own is None:
             return "not compared: in a free run a command acts when it comes"
-        if not self.foreign:
+        if not self.differs:
             return "the scene's law"
         if self.lost:
             return f"not known: the bag lacks {self.lost} announcements of its numbers"
@@ -242,7 +242,7 @@ def compare_recording(recording: Recording) -> Comparison:
     times, scene, accuracy = recording.t, recording.scene, recording.running.accuracy
     verification, answers = verify(recording), answers_of(recording)
     one_run = recording.running.lockstep and len(recording.starts) <= 1
-    own = one_run and not any(found.foreign for found in answers.values())
+    own = one_run and not any(found.differs for found in answers.values())
     equal, offset = verification.holds, None
     if own:
         same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)

@@ -9,7 +9,7 @@ import numpy as np
 
 from grasp_ros.identification.measured import FEWEST, Source, measured
 from grasp_ros.identification.numbers import acts, numbers_of
-from grasp_ros.identification.result import Against, Fit, residual_table, seen_by
+from grasp_ros.identification.result import Against, Fit, identifiability_of, residual_table
 from grasp_ros.identification.search import Problem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
@@ -53,8 +53,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     numbers = numbers_of(found.scene, free, found)
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)
-    if found.inputs is None and found.foreign:
-        raise Refused(f"{found.name}: {found.foreign}; allowed: inputs at every tick, and no free number of controllers"
+    if found.inputs is None and found.no_law:
+        raise Refused(f"{found.name}: {found.no_law}; allowed: inputs at every tick, and no free number of controllers"
                       " or external forces")
     for key in against:
         if key not in free or key.startswith("offset."):
@@ -73,7 +73,7 @@ def _result(problem: Problem, y: Array, against: Mapping[str, float]) -> Fit:
     values, slopes = problem.residuals(y, rows)
     states, _, touches = problem.predict(y, rows)
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
-    covariance, reach, unseen = seen_by(slopes, values, len(y))
+    covariance, reach, unseen = identifiability_of(slopes, values, len(y))
     estimates = problem.values(y)
     scale = [number.slope(value) for number, value in zip(problem.numbers, estimates.values(), strict=True)]
     low, high = ([float(number.at(end)) for number, end in zip(problem.numbers, ends.tolist(), strict=True)]

@@ -110,7 +110,7 @@ class Fit(Frozen):
         return "\n".join(_lines(self))
 
 
-def seen_by(slopes: Array, residuals: Array, n: int) -> tuple[Array, Array, list[list[int]]]:
+def identifiability_of(slopes: Array, residuals: Array, n: int) -> tuple[Array, Array, list[list[int]]]:
     """What residuals (m,) in standard deviations, with derivatives (m, n), say of n numbers y.
 
     Their covariance (n, n), NaN for what is not identifiable; half of their confidence intervals (n,), inf for that;

@@ -32,9 +32,9 @@ from grasp_ros.exact.records import (
     new_run,
 )
 from grasp_ros.observe.observe import BEGIN, FINISH
-from grasp_ros.observe.observer import Watcher
+from grasp_ros.observe.observer import RunObserver
+from grasp_ros.observe.record import UNDECIDED, Memory, Seen, Switch, Wanted
 from grasp_ros.observe.settling import takes_energy
-from grasp_ros.observe.sight import UNDECIDED, Memory, Seen, Switch, Wanted
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
 
 
@@ -214,13 +214,13 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
         `stop`, to have the rows stop.
     """
     run = new_run()
-    watcher = Watcher(*run[3:], wanted)
+    run_observer = RunObserver(*run[3:], wanted)
     loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
-    watcher.memory.switches[Switch.CERTAIN] = 1
+    run_observer.memory.switches[Switch.CERTAIN] = 1
     limits = limits._replace(max_work=min(limits.max_work, BREATH))
     with workspace(limits.tolerance) as (block, order, tables, events):
-        observer = watcher.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
+        observer = run_observer.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
         room = Room(block, order, *run, np.zeros(0), np.zeros((0, 6)), events,
                     np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)
-        done = run_rows(door(), loop, rows, room, watcher.memory, limits)
+        done = run_rows(door(), loop, rows, room, run_observer.memory, limits)
     return int(done)

@@ -12,16 +12,16 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import bound, next_derivative, own_acceleration
 from grasp_ros.exact.records import Array, Flight, Regime
-from grasp_ros.observe.sight import POSITION, VELOCITY, Quantity, Sight
+from grasp_ros.observe.record import POSITION, VELOCITY, Quantity, SegmentRecord
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of, U, V, X
 
 
 @inlined
-def weights(sight: Sight, q: int) -> tuple[float, float, float]:
+def weights(segment: SegmentRecord, q: int) -> tuple[float, float, float]:
     """a, b, c of the quantity a x + b v + c."""
     if q == Quantity.INPUT_L or q == Quantity.INPUT_R:
         side = LEFT if q == Quantity.INPUT_L else RIGHT
-        gains, constant = sight.gains[side], sight.given[side, Of.FORCE] - sight.own[side, Of.FORCE]
+        gains, constant = segment.gains[side], segment.given[side, Of.FORCE] - segment.own[side, Of.FORCE]
         return -gains[POSITION], -gains[VELOCITY], constant
     return (1.0, 0.0, 0.0) if q in (X.L, X.O, X.R) else (0.0, 1.0, 0.0)
 
@@ -50,24 +50,24 @@ def first_zero(flight: Flight, r: float, r_rate: float) -> float:
 
 
 @inlined
-def in_flight(sight: Sight, q: int) -> tuple[float, float]:
+def in_flight(segment: SegmentRecord, q: int) -> tuple[float, float]:
     """Least and largest value of a quantity in a flight."""
-    (a, b, c), body = weights(sight, q), owner(q)
-    row, lane = sight.bodies[body], velocity_lane(body)
-    x, v = sight.before[lane - 1], sight.before[lane]
+    (a, b, c), body = weights(segment, q), owner(q)
+    row, lane = segment.bodies[body], velocity_lane(body)
+    x, v = segment.before[lane - 1], segment.before[lane]
     flight = launch(row, x, v)
     push = own_acceleration(row, x, v)
     jerk = next_derivative(row, v, push)
-    at_begin, at_end = a * x + b * v + c, a * sight.y[lane - 1] + b * sight.y[lane] + c
+    at_begin, at_end = a * x + b * v + c, a * segment.y[lane - 1] + b * segment.y[lane] + c
     low, high = min(at_begin, at_end), max(at_begin, at_end)
     first = first_zero(flight, a * v + b * push, a * push + b * jerk)
-    if not first < sight.t:
+    if not first < segment.t:
         return low, high
     apart = math.pi / flight.rate if flight.regime == Regime.UNDER else math.inf
     if flight.sigma < 0.0 and apart < math.inf:  # what a feedback drives is largest at the end
-        first += max(math.floor((sight.t - first) / apart) - 1.0, 0.0) * apart
+        first += max(math.floor((segment.t - first) / apart) - 1.0, 0.0) * apart
     for _ in range(2):
-        if first < sight.t:
+        if first < segment.t:
             x, v, _, _ = fly(flight, first)
             low, high = min(low, a * x + b * v + c), max(high, a * x + b * v + c)
         first += apart
@@ -75,20 +75,20 @@ def in_flight(sight: Sight, q: int) -> tuple[float, float]:
 
 
 @inlined
-def flight_ranges(sight: Sight, low: Array, high: Array) -> None:
+def flight_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     """Bounds on positions and velocities in a flight, by the energy of the swing."""
     for body in (LEFT, OBJECT, RIGHT):
-        row, lane = sight.bodies[body], velocity_lane(body)
-        x, v, at, rate = sight.before[lane - 1], sight.before[lane], sight.y[lane - 1], sight.y[lane]
+        row, lane = segment.bodies[body], velocity_lane(body)
+        x, v, at, rate = segment.before[lane - 1], segment.before[lane], segment.y[lane - 1], segment.y[lane]
         if row[Of.STIFFNESS] > 0.0 and row[Of.MASS] < math.inf:
             push = own_acceleration(row, x, v)
             x_e = x + (row[Of.MASS] * push + row[Of.DAMPING] * v) / row[Of.STIFFNESS]
-            swing, speed = bound(row, x - x_e, v, sight.t), bound(row, v, push, sight.t)
+            swing, speed = bound(row, x - x_e, v, segment.t), bound(row, v, push, segment.t)
             low[lane - 1], high[lane - 1], low[lane], high[lane] = x_e - swing, x_e + swing, -speed, speed
         else:
-            way = sight.t * max(abs(v), abs(rate)) if (v > 0.0) != (rate > 0.0) else 0.0
+            way = segment.t * max(abs(v), abs(rate)) if (v > 0.0) != (rate > 0.0) else 0.0
             low[lane - 1], high[lane - 1] = min(x, at) - way, max(x, at) + way
             low[lane], high[lane] = min(v, rate), max(v, rate)
     for lane in (U.L, U.R):
-        low[lane], high[lane] = min(sight.before[lane], sight.y[lane]), max(sight.before[lane], sight.y[lane])
+        low[lane], high[lane] = min(segment.before[lane], segment.y[lane]), max(segment.before[lane], segment.y[lane])
     low[Quantity.IMPACT_L] = high[Quantity.IMPACT_L] = low[Quantity.IMPACT_R] = high[Quantity.IMPACT_R] = 0.0

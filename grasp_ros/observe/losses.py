@@ -17,7 +17,7 @@ from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.records import Array
-from grasp_ros.observe.sight import Seen, Sight
+from grasp_ros.observe.record import Seen, SegmentRecord
 from grasp_ros.observe.step_extremes import WORK
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, U, V, X
 
@@ -25,14 +25,14 @@ NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(16)[0] + 1.0), 0.5 * np
 
 
 @inlined
-def add_damping(sight: Sight, seen: Array, body: Body, squares: float) -> None:
+def add_damping(segment: SegmentRecord, seen: Array, body: Body, squares: float) -> None:
     """What damper and feedback of a body take, from the integral of v^2; drag of the object is friction."""
-    taken = sight.own[body, Of.DAMPING] * squares
+    taken = segment.own[body, Of.DAMPING] * squares
     if body == OBJECT:
         seen[Seen.FRICTION] += taken
     else:
         seen[Seen.DAMPERS] += taken
-        seen[Seen.FEEDBACK] += (sight.bodies[body, Of.DAMPING] - sight.own[body, Of.DAMPING]) * squares
+        seen[Seen.FEEDBACK] += (segment.bodies[body, Of.DAMPING] - segment.own[body, Of.DAMPING]) * squares
 
 
 @kernel
@@ -49,85 +49,86 @@ def undamped_squares(row: Array, x: float, v: float, t: float) -> float:
 
 
 @kernel
-def flight_squares(sight: Sight, body: Body) -> float:
+def flight_squares(segment: SegmentRecord, body: Body) -> float:
     """Integral of v^2 over a flight, m^2/s."""
-    row, lane = sight.bodies[body], velocity_lane(body)
-    x, v, x_end, v_end = sight.before[lane - 1], sight.before[lane], sight.y[lane - 1], sight.y[lane]
+    row, lane = segment.bodies[body], velocity_lane(body)
+    x, v, x_end, v_end = segment.before[lane - 1], segment.before[lane], segment.y[lane - 1], segment.y[lane]
     if row[Of.MASS] == math.inf:  # an object that sticks
         return 0.0
     if row[Of.DAMPING] == 0.0:
-        return undamped_squares(row, x, v, sight.t)
+        return undamped_squares(row, x, v, segment.t)
     before = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x, v, 0.0)[0]
     after = own_energy(row[Of.MASS], row[Of.STIFFNESS], row[Of.FORCE], x_end, v_end, 0.0)[0]
     return 0.5 * (before - after) / row[Of.DAMPING]
 
 
 @inlined
-def clamped_loss(sight: Sight, side: Body) -> float:
+def clamped_loss(segment: SegmentRecord, side: Body) -> float:
     """What a pair that is closed without force takes: its stored energy goes."""
-    if sight.mode[side] not in (Pair.CLAMPED, Pair.LEAVING):
+    if segment.mode[side] not in (Pair.CLAMPED, Pair.LEAVING):
         return 0.0
-    hertzian = sight.pairs[side, Law.HERTZIAN]
-    before, after = max(sight.before[U.L + side], 0.0), max(sight.y[U.L + side], 0.0)
+    hertzian = segment.pairs[side, Law.HERTZIAN]
+    before, after = max(segment.before[U.L + side], 0.0), max(segment.y[U.L + side], 0.0)
     return stored_energy(hertzian, before) - stored_energy(hertzian, after)
 
 
 @kernel
-def flight_losses(sight: Sight, seen: Array) -> None:
+def flight_losses(segment: SegmentRecord, seen: Array) -> None:
     """Add what a flight takes."""
     for body in (LEFT, OBJECT, RIGHT):
-        if sight.own[body, Of.DAMPING] != 0.0 or sight.bodies[body, Of.DAMPING] != 0.0:
-            add_damping(sight, seen, body, flight_squares(sight, body))
-    seen[Seen.IMPACTS] += clamped_loss(sight, LEFT) + clamped_loss(sight, RIGHT)
+        if segment.own[body, Of.DAMPING] != 0.0 or segment.bodies[body, Of.DAMPING] != 0.0:
+            add_damping(segment, seen, body, flight_squares(segment, body))
+    seen[Seen.IMPACTS] += clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
 
 
 @inlined
-def pace(sight: Sight, s: float) -> float:
+def pace(segment: SegmentRecord, s: float) -> float:
     """dt/ds of the variable of the polynomials, s."""
     total = 0.0
-    for k in range(sight.degree, 0, -1):
-        total = total * s + k * sight.c[LANES * k + Lane.TIME]
+    for k in range(segment.degree, 0, -1):
+        total = total * s + k * segment.c[LANES * k + Lane.TIME]
     return total
 
 
 @inlined
-def impact_power(sight: Sight, at: Array, side: Body) -> float:
+def impact_power(segment: SegmentRecord, at: Array, side: Body) -> float:
     """p H u^(3/2) u'^2 of a pair in contact, W."""
-    if sight.mode[side] != Pair.CONTACT:
+    if segment.mode[side] != Pair.CONTACT:
         return 0.0
-    pair, d, z = sight.pairs[side], approach(at, side), max(at[U.L + side], 0.0)
+    pair, d, z = segment.pairs[side], approach(at, side), max(at[U.L + side], 0.0)
     return pair[Law.DISSIPATION] * elastic_force(pair[Law.HERTZIAN], z * z) * d * d
 
 
 @kernel
-def step_losses(sight: Sight, seen: Array) -> None:
+def step_losses(segment: SegmentRecord, seen: Array) -> None:
     """Add what a step with polynomials in regularised time takes."""
-    at = sight.rows[WORK]
+    at = segment.rows[WORK]
     left = right = middle = impacts = 0.0
     for j in range(NODES.shape[0]):
-        s = sight.s * NODES[j]
-        values(sight.c, sight.degree, s, at)
-        share = sight.s * WEIGHTS[j] * pace(sight, s)
+        s = segment.s * NODES[j]
+        values(segment.c, segment.degree, s, at)
+        share = segment.s * WEIGHTS[j] * pace(segment, s)
         left += share * at[velocity_lane(LEFT)] ** 2
         right += share * at[velocity_lane(RIGHT)] ** 2
         middle += share * at[V.O] ** 2
-        impacts += share * (impact_power(sight, at, LEFT) + impact_power(sight, at, RIGHT))
-    add_damping(sight, seen, LEFT, left)
-    add_damping(sight, seen, RIGHT, right)
-    add_damping(sight, seen, OBJECT, middle)
-    seen[Seen.IMPACTS] += impacts + clamped_loss(sight, LEFT) + clamped_loss(sight, RIGHT)
+        impacts += share * (impact_power(segment, at, LEFT) + impact_power(segment, at, RIGHT))
+    add_damping(segment, seen, LEFT, left)
+    add_damping(segment, seen, RIGHT, right)
+    add_damping(segment, seen, OBJECT, middle)
+    seen[Seen.IMPACTS] += impacts + clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
 
 
 @kernel
-def add_losses(sight: Sight, base: Array, seen: Array) -> None:
+def add_losses(segment: SegmentRecord, base: Array, seen: Array) -> None:
     """Add what a segment takes, and the work of the forces that are not in `base`: held commands, external forces."""
-    if sight.kind == Kind.FLIGHT:
-        flight_losses(sight, seen)
+    if segment.kind == Kind.FLIGHT:
+        flight_losses(segment, seen)
     else:
-        step_losses(sight, seen)
+        step_losses(segment, seen)
     for body in (LEFT, OBJECT, RIGHT):
         place = velocity_lane(body) - 1
-        seen[Seen.WORK] += (sight.given[body, Of.FORCE] - base[body, Of.FORCE]) * (sight.y[place] - sight.before[place])
-    if sight.bodies[OBJECT, Of.MASS] < math.inf:
-        against = sight.given[OBJECT, Of.FORCE] - sight.bodies[OBJECT, Of.FORCE]
-        seen[Seen.FRICTION] += against * (sight.y[X.O] - sight.before[X.O])
+        push = segment.given[body, Of.FORCE] - base[body, Of.FORCE]
+        seen[Seen.WORK] += push * (segment.y[place] - segment.before[place])
+    if segment.bodies[OBJECT, Of.MASS] < math.inf:
+        against = segment.given[OBJECT, Of.FORCE] - segment.bodies[OBJECT, Of.FORCE]
+        seen[Seen.FRICTION] += against * (segment.y[X.O] - segment.before[X.O])

@@ -12,8 +12,7 @@ from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.records import Array
 from grasp_ros.observe.flight_extremes import flight_ranges, owner, weights
 from grasp_ros.observe.losses import add_losses
-from grasp_ros.observe.settling import kept_sight, last_outside, settled_from, watch_bound
-from grasp_ros.observe.sight import (
+from grasp_ros.observe.record import (
     LOWER,
     NONE,
     QUANTITIES,
@@ -24,12 +23,13 @@ from grasp_ros.observe.sight import (
     Memory,
     Quantity,
     Seen,
-    Sight,
+    SegmentRecord,
     Switch,
     Wanted,
     memory_at,
-    sight_of,
+    segment_record,
 )
+from grasp_ros.observe.settling import kept_record, last_outside, settled_from, watch_bound
 from grasp_ros.observe.step_extremes import extremes_of, step_ranges
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Kind, Law, Of, Pair, U, X
 
@@ -56,15 +56,15 @@ def level(loop: Array, pairs: Array, y: Array) -> float:
 
 
 @kernel
-def write_ranges(sight: Sight) -> None:
+def write_ranges(segment: SegmentRecord) -> None:
     """Write bounds of all quantities to scratch."""
-    low, high = sight.rows[LOWER], sight.rows[UPPER]
-    if sight.kind == Kind.FLIGHT:
-        flight_ranges(sight, low, high)
+    low, high = segment.rows[LOWER], segment.rows[UPPER]
+    if segment.kind == Kind.FLIGHT:
+        flight_ranges(segment, low, high)
     else:
-        step_ranges(sight, low, high)
+        step_ranges(segment, low, high)
     for q in range(Quantity.INPUT_L, QUANTITIES):
-        a, b, c = weights(sight, q)
+        a, b, c = weights(segment, q)
         v = velocity_lane(owner(q))
         x = v - 1
         low[q] = c + min(a * low[x], a * high[x]) + min(b * low[v], b * high[v])
@@ -72,23 +72,23 @@ def write_ranges(sight: Sight) -> None:
 
 
 @inlined
-def is_wanted(sight: Sight, q: int, wanted: int) -> bool:
+def is_wanted(segment: SegmentRecord, q: int, wanted: int) -> bool:
     """Whether the extremes of a quantity are kept; those of an impact only while there is one."""
     if q < U.L:
         return wanted & Wanted.MOTION.value != 0
     if q >= Quantity.INPUT_L:
         return wanted & Wanted.INPUTS.value != 0
-    return wanted & Wanted.IMPACTS.value != 0 and sight.mode[q % 2] == Pair.CONTACT
+    return wanted & Wanted.IMPACTS.value != 0 and segment.mode[q % 2] == Pair.CONTACT
 
 
 @kernel
-def watch_quantities(sight: Sight, seen: Array, wanted: int) -> None:
+def watch_quantities(segment: SegmentRecord, seen: Array, wanted: int) -> None:
     """Keep the extremes of what is wanted, where its range may hold new ones."""
     for q in range(QUANTITIES):
-        if not is_wanted(sight, q, wanted):
+        if not is_wanted(segment, q, wanted):
             continue
-        if sight.rows[LOWER, q] < seen[Seen.LOW + q] or sight.rows[UPPER, q] > seen[Seen.HIGH + q]:
-            low, high = extremes_of(sight, q)
+        if segment.rows[LOWER, q] < seen[Seen.LOW + q] or segment.rows[UPPER, q] > seen[Seen.HIGH + q]:
+            low, high = extremes_of(segment, q)
             seen[Seen.LOW + q] = min(seen[Seen.LOW + q], low)
             seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
 
@@ -126,8 +126,8 @@ def finish(m: Memory) -> None:
     seen, kept = m.seen, m.kept
     for body in (LEFT, OBJECT, RIGHT):
         if kept[body, Kept.KIND] != NONE:
-            sight = kept_sight(sight_of(m, 0, 0.0, 0.0, 0), kept[body])
-            seen[Seen.OUTSIDE + body] = kept[body, Kept.BEGIN] + last_outside(sight, body, seen[Seen.BOUND])
+            segment = kept_record(segment_record(m, 0, 0.0, 0.0, 0), kept[body])
+            seen[Seen.OUTSIDE + body] = kept[body, Kept.BEGIN] + last_outside(segment, body, seen[Seen.BOUND])
             kept[body, Kept.KIND] = NONE
     seen[Seen.LAST_OUTSIDE] = max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
     if m.switches[Switch.CERTAIN] != 0:
@@ -149,22 +149,22 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
     if kind == FINISH:
         finish(m)
         return 0
-    sight, seen, wanted = sight_of(m, kind, t, s, degree), m.seen, m.switches[Switch.WANTED]
-    if not math.isfinite(sight.y.sum() + t):
+    segment, seen, wanted = segment_record(m, kind, t, s, degree), m.seen, m.switches[Switch.WANTED]
+    if not math.isfinite(segment.y.sum() + t):
         return 0
     seen[Seen.SEGMENTS] += 1.0
     bound = wanted & (Wanted.SETTLING.value | Wanted.BOUND.value)
     if bound or wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value):
-        write_ranges(sight)
-        watch_quantities(sight, seen, wanted)
+        write_ranges(segment)
+        watch_quantities(segment, seen, wanted)
     if bound:
-        watch_bound(sight, seen, m.kept, m.clock[2] + (m.clock[0] + m.clock[1]))
+        watch_bound(segment, seen, m.kept, m.clock[2] + (m.clock[0] + m.clock[1]))
     if m.switches[Switch.LOSSES] != 0:
         call(m.switches[Switch.LOSSES], address, kind, t, s, degree)
     if wanted & Wanted.RISE.value:
         watch_level(m)
     for place in range(STATES):
-        sight.before[place] = sight.y[place]
+        segment.before[place] = segment.y[place]
     return 0
 
 
@@ -172,5 +172,5 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
 def observe_losses(address: int, kind: int, t: float, s: float, degree: int) -> int:
     """Add the losses of a segment; a function of its own, so that only who asks for them waits for its compilation."""
     m = memory_at(address)
-    add_losses(sight_of(m, kind, t, s, degree), m.base, m.seen)
+    add_losses(segment_record(m, kind, t, s, degree), m.base, m.seen)
     return 0

@@ -12,13 +12,13 @@ from grasp_ros.exact.driver.callback import block_of
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
 from grasp_ros.observe.observe import BEGIN, FINISH, observe, observe_losses
+from grasp_ros.observe.record import UNDECIDED, Seen, Switch, Wanted, memory_of
 from grasp_ros.observe.settling import takes_energy
-from grasp_ros.observe.sight import UNDECIDED, Seen, Switch, Wanted, memory_of
 
 SIGNATURE = "int64(int64, int64, float64, float64, int64)"
 
 
-class Watcher:
+class RunObserver:
     """Watches the runs that use the arrays of one plant and one state, one run after the other.
 
     Parameters
@@ -31,7 +31,7 @@ class Watcher:
     ----------
     memory : Memory
         `loop`, `own`, `base`, `gains` and the switch CERTAIN are to be filled before a run.
-    seen : array, see `sight.Seen`
+    seen : array, see `record.Seen`
         What is remembered.
     """
 
@@ -57,7 +57,7 @@ class Watcher:
         observe(self._block.ctypes.data, FINISH, 0.0, 0.0, 0)
 
 
-def settle(integrator: Integrator, watcher: Watcher, stretch: float, horizons: int) -> Array:
+def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> Array:
     """Go on with a watched run, in stretches of s, until V_c decides whether it has settled.
 
     Returns
@@ -66,33 +66,33 @@ def settle(integrator: Integrator, watcher: Watcher, stretch: float, horizons: i
         Last times outside the bound of left arm, right arm and object in s, if nothing leaves it any more; infinite: it
         has not settled for good within so many horizons; nan: V_c proves nothing here.
     """
-    watcher.finish()
-    watcher.memory.switches[: Switch.CERTAIN] = Wanted.SETTLING, 0
-    system, seen = integrator.system, watcher.seen
-    losing, done = takes_energy(watcher.memory.loop, system.pairs, system.coulomb), 1
+    run_observer.finish()
+    run_observer.memory.switches[: Switch.CERTAIN] = Wanted.SETTLING, 0
+    system, seen = integrator.system, run_observer.seen
+    losing, done = takes_energy(run_observer.memory.loop, system.pairs, system.coulomb), 1
     while seen[Seen.SETTLED] == UNDECIDED and losing and done < horizons:
         integrator.advance(stretch, start=done * stretch)
         if integrator.status is not Status.DONE:
             break
-        watcher.finish()
+        run_observer.finish()
         done += 1
     if seen[Seen.SETTLED] == UNDECIDED:
         return np.full(3, np.inf)
     return np.where(np.isnan(seen[Seen.SETTLED]), np.nan, seen[Seen.OUTSIDE : Seen.OUTSIDE + 3])
 
 
-def watch(integrator: Integrator, wanted: Wanted, bound: float) -> Watcher:
+def watch(integrator: Integrator, wanted: Wanted, bound: float) -> RunObserver:
     """Watch a run from here on; `bound` is the part of the largest displacement that counts as settled."""
-    watcher, system = Watcher(integrator.plant, integrator.records, wanted), integrator.system
-    memory = watcher.memory
+    run_observer, system = RunObserver(integrator.plant, integrator.records, wanted), integrator.system
+    memory = run_observer.memory
     memory.loop[:], memory.own[:], memory.base[:] = system.closed_loop, system.bodies, system.bodies
     if integrator.continuous:
         memory.base[:], memory.switches[Switch.CERTAIN] = memory.loop, not system.caveats
         for side, law in system.laws.items():
             memory.gains[side] = law.position_gain, law.velocity_gain
-    watcher.begin(bound)
-    integrator.observer = watcher
-    return watcher
+    run_observer.begin(bound)
+    integrator.observer = run_observer
+    return run_observer
 
 
 @cache

@@ -15,7 +15,7 @@ from grasp_ros.exact.kinematics import own_acceleration
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.flight_extremes import first_zero
-from grasp_ros.observe.sight import COUNTS, LOWER, MODES, NONE, STATES, UNDECIDED, UPPER, Kept, Seen, Sight
+from grasp_ros.observe.record import COUNTS, LOWER, MODES, NONE, STATES, UNDECIDED, UPPER, Kept, Seen, SegmentRecord
 from grasp_ros.observe.step_extremes import FIRST, ROW, WORK, expand_quantity, extremes_of
 from grasp_ros.physics import reach as bounds
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of
@@ -51,71 +51,71 @@ def takes_energy(loop: Array, pairs: Array, coulomb: float) -> bool:
 
 
 @kernel
-def leaves(sight: Sight, x: int, bound: float) -> bool:
+def leaves(segment: SegmentRecord, x: int, bound: float) -> bool:
     """Whether a position leaves the bound within a segment; the ranges stand in scratch."""
-    if sight.rows[LOWER, x] >= -bound and sight.rows[UPPER, x] <= bound:
+    if segment.rows[LOWER, x] >= -bound and segment.rows[UPPER, x] <= bound:
         return False
-    low, high = extremes_of(sight, x)
+    low, high = extremes_of(segment, x)
     return bool(low < -bound or high > bound)
 
 
 @kernel
-def watch_bound(sight: Sight, seen: Array, kept: Array, now: float) -> None:
+def watch_bound(segment: SegmentRecord, seen: Array, kept: Array, now: float) -> None:
     """Remember when each body was outside, or the segment in which it was."""
     bound = seen[Seen.BOUND]
     for body in (LEFT, OBJECT, RIGHT):
         x = int(velocity_lane(body) - 1)
-        if abs(sight.y[x]) > bound:
+        if abs(segment.y[x]) > bound:
             seen[Seen.OUTSIDE + body], kept[body, Kept.KIND] = math.inf, NONE
-        elif abs(sight.before[x]) > bound or leaves(sight, x, bound):
+        elif abs(segment.before[x]) > bound or leaves(segment, x, bound):
             seen[Seen.OUTSIDE + body] = 0.0
-            keep(sight, kept[body], now)
+            keep(segment, kept[body], now)
 
 
 @kernel
-def keep(sight: Sight, kept: Array, now: float) -> None:
+def keep(segment: SegmentRecord, kept: Array, now: float) -> None:
     """Copy all that the search needs of a segment that has just ended."""
-    kept[Kept.KIND], kept[Kept.TIME], kept[Kept.BEGIN] = float(sight.kind), sight.t, now - sight.t
-    kept[Kept.STEP], kept[Kept.DEGREE] = sight.s, sight.degree
+    kept[Kept.KIND], kept[Kept.TIME], kept[Kept.BEGIN] = float(segment.kind), segment.t, now - segment.t
+    kept[Kept.STEP], kept[Kept.DEGREE] = segment.s, segment.degree
     for place in range(STATES):
-        kept[Kept.STATE + place] = sight.before[place]
+        kept[Kept.STATE + place] = segment.before[place]
     for body in range(3):
-        kept[Kept.MODES + body] = sight.mode[body]
+        kept[Kept.MODES + body] = segment.mode[body]
         for column in range(4):
-            kept[Kept.BODIES + 4 * body + column] = sight.bodies[body, column]
-    if sight.kind != Kind.FLIGHT:
-        for i in range(LANES * (sight.degree + 1)):
-            kept[Kept.TABLE + i] = sight.c[i]
+            kept[Kept.BODIES + 4 * body + column] = segment.bodies[body, column]
+    if segment.kind != Kind.FLIGHT:
+        for i in range(LANES * (segment.degree + 1)):
+            kept[Kept.TABLE + i] = segment.c[i]
 
 
 @inlined
-def kept_sight(sight: Sight, kept: Array) -> Sight:
+def kept_record(segment: SegmentRecord, kept: Array) -> SegmentRecord:
     """The segment that was kept, in place of the last one."""
     for body in range(3):
-        sight.counts[COUNTS + body] = int(kept[Kept.MODES + body])
-    return Sight(
-        int(kept[Kept.KIND]), kept[Kept.TIME], kept[Kept.STEP], int(kept[Kept.DEGREE]), kept[Kept.TABLE :], sight.size,
-        kept[Kept.STATE : Kept.BODIES], sight.y, sight.counts[COUNTS : COUNTS + MODES],
-        kept[Kept.BODIES : Kept.TABLE].reshape((3, 4)), sight.pairs, sight.given, sight.own, sight.gains, sight.rows,
-        sight.counts,
+        segment.counts[COUNTS + body] = int(kept[Kept.MODES + body])
+    return SegmentRecord(
+        int(kept[Kept.KIND]), kept[Kept.TIME], kept[Kept.STEP], int(kept[Kept.DEGREE]), kept[Kept.TABLE :],
+        segment.size, kept[Kept.STATE : Kept.BODIES], segment.y, segment.counts[COUNTS : COUNTS + MODES],
+        kept[Kept.BODIES : Kept.TABLE].reshape((3, 4)), segment.pairs, segment.given, segment.own, segment.gains,
+        segment.rows, segment.counts,
     )
 
 
 @kernel
-def last_outside(sight: Sight, body: Body, bound: float) -> float:
+def last_outside(segment: SegmentRecord, body: Body, bound: float) -> float:
     """Time since the begin of a segment, which ends inside, at which a body comes inside, s."""
-    if sight.kind == Kind.FLIGHT:
-        return last_in_flight(sight, body, bound)
-    return last_in_step(sight, int(velocity_lane(body) - 1), bound)
+    if segment.kind == Kind.FLIGHT:
+        return last_in_flight(segment, body, bound)
+    return last_in_step(segment, int(velocity_lane(body) - 1), bound)
 
 
 @kernel
-def last_in_flight(sight: Sight, body: Body, bound: float) -> float:
+def last_in_flight(segment: SegmentRecord, body: Body, bound: float) -> float:
     """The same for one body in flight; 0 if it never is outside."""
-    row, lane = sight.bodies[body], velocity_lane(body)
-    x, v = sight.before[lane - 1], sight.before[lane]
+    row, lane = segment.bodies[body], velocity_lane(body)
+    x, v = segment.before[lane - 1], segment.before[lane]
     flight = launch(row, x, v)
-    low, high = 0.0, sight.t
+    low, high = 0.0, segment.t
     turn = first_zero(flight, v, own_acceleration(row, x, v))
     if turn < high:
         apart = math.pi / flight.rate if flight.regime == Regime.UNDER else math.inf
@@ -138,17 +138,17 @@ def last_in_flight(sight: Sight, body: Body, bound: float) -> float:
 
 
 @kernel
-def last_in_step(sight: Sight, q: int, bound: float) -> float:
+def last_in_step(segment: SegmentRecord, q: int, bound: float) -> float:
     """The same for a position in a step: the first time outside, on the way back from the end."""
-    rows, n = sight.rows, sight.degree
-    expand_quantity(sight, q)
-    shift(rows[ROW], n, sight.s)
+    rows, n = segment.rows, segment.degree
+    expand_quantity(segment, q)
+    shift(rows[ROW], n, segment.s)
     first = math.inf
     for sign in (1.0, -1.0):
         for k in range(n + 1):
             rows[WORK, k] = sign * rows[ROW, k] * (1.0 if k % 2 == 0 else -1.0)
         rows[WORK, FIRST] -= bound
-        first = min(first, first_rise(rows[WORK], n, sight.s, 0.0, sight.counts))
+        first = min(first, first_rise(rows[WORK], n, segment.s, 0.0, segment.counts))
     if not first < math.inf:
         return 0.0
-    return value_and_rate(sight.c[Lane.TIME :: LANES], n, sight.s - first)[0]
+    return value_and_rate(segment.c[Lane.TIME :: LANES], n, segment.s - first)[0]

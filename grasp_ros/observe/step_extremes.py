@@ -17,7 +17,7 @@ from grasp_ros.exact.numerics.polynomial import product
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.observe.flight_extremes import in_flight, owner, weights
-from grasp_ros.observe.sight import Quantity, Sight
+from grasp_ros.observe.record import Quantity, SegmentRecord
 from grasp_ros.physics.layout import LANES, LEFT, RIGHT, Body, Kind, Law, Pair, U, V, X, Z
 
 MOST = 64  # turns of a polynomial in one step
@@ -26,76 +26,76 @@ FIRST = whole(0)  # coefficient
 
 
 @inlined
-def lane_bounds(sight: Sight, lane: int, at: float) -> tuple[float, float]:
+def lane_bounds(segment: SegmentRecord, lane: int, at: float) -> tuple[float, float]:
     """Bounds of a lane in a Taylor step that ends at the value `at`, see `polynomial.lane_range`."""
-    begin, size = sight.c[lane], sight.size[lane]
-    line = begin + sight.s * sight.c[LANES + lane]
+    begin, size = segment.c[lane], segment.size[lane]
+    line = begin + segment.s * segment.c[LANES + lane]
     middle, width = 0.5 * (line + at), 0.5 * size
     return min(begin, middle - width), max(begin, middle + width)
 
 
 @inlined
-def penetration_bounds(sight: Sight, side: Body) -> tuple[float, float]:
+def penetration_bounds(segment: SegmentRecord, side: Body) -> tuple[float, float]:
     """Bounds of u."""
-    u = sight.y[U.L + side]
-    if sight.mode[side] != Pair.CONTACT:
-        return lane_bounds(sight, Z.L + side, u)
-    low, high = lane_bounds(sight, Z.L + side, math.sqrt(max(u, 0.0)))
+    u = segment.y[U.L + side]
+    if segment.mode[side] != Pair.CONTACT:
+        return lane_bounds(segment, Z.L + side, u)
+    low, high = lane_bounds(segment, Z.L + side, math.sqrt(max(u, 0.0)))
     return max(low, 0.0) * max(low, 0.0), high * high
 
 
 @inlined
-def step_ranges(sight: Sight, low: Array, high: Array) -> None:
+def step_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     """Bounds on all quantities but the inputs in a Taylor step."""
-    low[X.O], high[X.O] = lane_bounds(sight, X.O, sight.y[X.O])
+    low[X.O], high[X.O] = lane_bounds(segment, X.O, segment.y[X.O])
     for lane in (V.L, V.O, V.R):
-        low[lane], high[lane] = lane_bounds(sight, lane, sight.y[lane])
-    low[U.L], high[U.L] = penetration_bounds(sight, LEFT)
-    low[U.R], high[U.R] = penetration_bounds(sight, RIGHT)
+        low[lane], high[lane] = lane_bounds(segment, lane, segment.y[lane])
+    low[U.L], high[U.L] = penetration_bounds(segment, LEFT)
+    low[U.R], high[U.R] = penetration_bounds(segment, RIGHT)
     low[X.L], high[X.L] = low[X.O] + low[U.L], high[X.O] + high[U.L]
     low[X.R], high[X.R] = low[X.O] - high[U.R], high[X.O] - low[U.R]
     for side in (LEFT, RIGHT):
         q, force = Quantity.IMPACT_L + side, 0.0
-        if sight.mode[side] == Pair.CONTACT:
+        if segment.mode[side] == Pair.CONTACT:
             front, back = rate_lanes(side)
-            factor = damping_factor(sight.pairs[side, Law.DISSIPATION], high[front] - low[back])
-            force = elastic_force(sight.pairs[side, Law.HERTZIAN], high[U.L + side]) * max(factor, 0.0)
+            factor = damping_factor(segment.pairs[side, Law.DISSIPATION], high[front] - low[back])
+            force = elastic_force(segment.pairs[side, Law.HERTZIAN], high[U.L + side]) * max(factor, 0.0)
         low[q], high[q] = 0.0, force
 
 
 @kernel
-def copy_lane(sight: Sight, lane: int, row: int) -> None:
+def copy_lane(segment: SegmentRecord, lane: int, row: int) -> None:
     """A lane as one polynomial."""
-    for k in range(sight.degree + 1):
-        sight.rows[row, k] = sight.c[LANES * k + lane]
+    for k in range(segment.degree + 1):
+        segment.rows[row, k] = segment.c[LANES * k + lane]
 
 
 @kernel
-def expand_penetration(sight: Sight, side: Body, row: int) -> None:
+def expand_penetration(segment: SegmentRecord, side: Body, row: int) -> None:
     """Series of u, the square of w in a Taylor step."""
-    copy_lane(sight, int(Z.L + side), row)
-    if sight.mode[side] == Pair.CONTACT:
-        copy_lane(sight, int(Z.L + side), WORK)
-        product(sight.rows[WORK], sight.rows[WORK], sight.rows[row], sight.degree)
+    copy_lane(segment, int(Z.L + side), row)
+    if segment.mode[side] == Pair.CONTACT:
+        copy_lane(segment, int(Z.L + side), WORK)
+        product(segment.rows[WORK], segment.rows[WORK], segment.rows[row], segment.degree)
 
 
 @kernel
-def expand_quantity(sight: Sight, q: int) -> None:
+def expand_quantity(segment: SegmentRecord, q: int) -> None:
     """Write the series of a quantity to the first row of scratch."""
-    rows, n = sight.rows, sight.degree
+    rows, n = segment.rows, segment.degree
     if q in (U.L, U.R):
-        expand_penetration(sight, LEFT if q == U.L else RIGHT, ROW)
+        expand_penetration(segment, LEFT if q == U.L else RIGHT, ROW)
     elif q == Quantity.IMPACT_L or q == Quantity.IMPACT_R:
-        expand_force(sight.c, sight.pairs, q - Quantity.IMPACT_L, n, rows.reshape(-1))
+        expand_force(segment.c, segment.pairs, q - Quantity.IMPACT_L, n, rows.reshape(-1))
     elif q == X.O or q == V.L or q == V.O or q == V.R:
-        copy_lane(sight, q, ROW)
+        copy_lane(segment, q, ROW)
     else:
-        (a, b, c), side = weights(sight, q), owner(q)
+        (a, b, c), side = weights(segment, q), owner(q)
         sign, lane = 1.0 if side == LEFT else -1.0, velocity_lane(side)
-        expand_penetration(sight, side, ROW)
+        expand_penetration(segment, side, ROW)
         for k in range(n + 1):
-            x = sight.c[LANES * k + X.O] + sign * rows[ROW, k]
-            rows[ROW, k] = a * x + b * sight.c[LANES * k + lane]
+            x = segment.c[LANES * k + X.O] + sign * rows[ROW, k]
+            rows[ROW, k] = a * x + b * segment.c[LANES * k + lane]
         rows[ROW, FIRST] += c
 
 
@@ -126,9 +126,9 @@ def polynomial_extremes(rows: Array, n: int, s: float, counts: Integers) -> tupl
 
 
 @kernel
-def extremes_of(sight: Sight, q: int) -> tuple[float, float]:
+def extremes_of(segment: SegmentRecord, q: int) -> tuple[float, float]:
     """Least and largest value of a quantity in a segment."""
-    if sight.kind == Kind.FLIGHT:
-        return in_flight(sight, q)
-    expand_quantity(sight, q)
-    return polynomial_extremes(sight.rows, sight.degree, sight.s, sight.counts)
+    if segment.kind == Kind.FLIGHT:
+        return in_flight(segment, q)
+    expand_quantity(segment, q)
+    return polynomial_extremes(segment.rows, segment.degree, segment.s, segment.counts)

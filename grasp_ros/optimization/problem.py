@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.maps.plan import Axis, Plan, check
-from grasp_ros.observe.sight import Wanted
+from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import read_number
 from grasp_ros.physics.model import Array

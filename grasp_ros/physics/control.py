@@ -20,7 +20,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import BLOCK
 from grasp_ros.physics.model import Array
 
-Law = Callable[..., float]  # tick, time in s, measured x in m and v in m/s, and what it asks for, see `sight`, to N
+Law = Callable[..., float]  # tick, time in s, measured x in m and v in m/s, what it asks for, see `observation`, to N
 NO_NOISE = np.zeros(2)
 WHOLE = 2.0**53  # from here on every number is a whole one
 

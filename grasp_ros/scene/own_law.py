@@ -11,7 +11,7 @@ from typing import Any
 
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused, described
-from grasp_ros.physics.sight import CALLABLE, asked
+from grasp_ros.physics.observation import CALLABLE, asked
 
 FAULTS = (Exception, SystemExit, GeneratorExit)  # of a user's code; a KeyboardInterrupt is somebody's Ctrl-C
 
@@ -50,7 +50,7 @@ def find_law(place: str, what: str) -> Law | type:
 def begin(law: Law | type, what: str) -> Law:
     """What answers in a run that begins: a new object of a class; any other object itself, after its `reset`, if any.
 
-    What cannot be called as `physics.sight.asked` says is refused; `what` begins the refusal.
+    What cannot be called as `physics.observation.asked` says is refused; `what` begins the refusal.
     """
     begun: Any = law
     if isinstance(law, type):

@@ -16,7 +16,7 @@ from grasp_ros.exact.compilation.jit import COMPILED
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Integrator, Status
 from grasp_ros.observe.ensemble import Limits, Rows, integrate_rows
 from grasp_ros.observe.observer import settle, watch
-from grasp_ros.observe.sight import SEEN, Seen, Wanted
+from grasp_ros.observe.record import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
@@ -150,17 +150,17 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: 
     run = Integrator(
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
     wanted = wanted_by(columns)
-    watcher = watch(run, wanted, setup.settled) if wanted else None
+    run_observer = watch(run, wanted, setup.settled) if wanted else None
     drive(scene, run, sampled, NO_GRID)
     touched = run.event_table[run.event_table[:, Entry.KIND] == Transition.TOUCH, Entry.BODY]
     runs.state[i], runs.touches[i] = run.state, [(touched == side).sum() for side in (LEFT, RIGHT)]
     done = run.status is Status.DONE
     if done and any(column.name == LYAPUNOV for column in columns):
         runs.growth[i] = exponent(system, scene.duration, setup.accuracy)
-    if watcher is not None:
-        watcher.finish()
-        seen[:] = watcher.seen
+    if run_observer is not None:
+        run_observer.finish()
+        seen[:] = run_observer.seen
         if done and wanted & Wanted.SETTLING:
-            seen[Seen.OUTSIDE : Seen.OUTSIDE + 3] = settle(run, watcher, scene.duration, setup.horizons)
+            seen[Seen.OUTSIDE : Seen.OUTSIDE + 3] = settle(run, run_observer, scene.duration, setup.horizons)
             seen[Seen.SETTLED] = seen[Seen.OUTSIDE : Seen.OUTSIDE + 3].max()
     return run

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.driver.user_controller import Foreign
+from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
 from grasp_ros.exact.records import new_place
@@ -22,7 +22,7 @@ from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.sight import check
+from grasp_ros.physics.observation import check
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin
@@ -34,12 +34,12 @@ PATIENCE = 0.1  # s that a block of ticks may take
 SHORTEST, LONGEST = 16, 8192  # ticks of the first block, and of any
 Changes = Mapping[int, Mapping[str, float]]
 NO_CHANGES: Changes = MappingProxyType({})
-NO_FOREIGN: Mapping[int, Foreign] = MappingProxyType({})
+NO_USER_CONTROLLERS: Mapping[int, UserController] = MappingProxyType({})
 
 
-def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> dict[int, Foreign]:
+def wrap_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> dict[int, UserController]:
     """Controllers from outside by side, as the kernels call them, at the beginning of a run."""
-    found: dict[int, Foreign] = {}
+    found: dict[int, UserController] = {}
     if not controllers:
         return found
     arms = [side for side, body in SIDES.items() if scene.system.bodies[body, Of.MASS] > 0.0]
@@ -47,18 +47,18 @@ def foreign_controllers(scene: Scene, controllers: Mapping[str, Law | type]) -> 
         if side not in arms:
             allowed = " or ".join(arms) or "none, without an arm"
             raise Refused(f"controllers: {side!r} is not allowed; allowed: {allowed}")
-        own = found[int(SIDES[side])] = Foreign(side, begin(law, f"controllers: {side}"))
+        own = found[int(SIDES[side])] = UserController(side, begin(law, f"controllers: {side}"))
         check(own.asks, scene.system, SIDES[side], f"controllers: {side}")
     return found
 
 
-def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[str] = ()) -> None:
+def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[str] = ()) -> None:
     """Refuse changes that a running graph would refuse."""
     if not changes:
         return
     if not held:
         raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
-    live, replaced = scene.live, tuple(f"{side}_feedback." for side in foreign)
+    live, replaced = scene.live, tuple(f"{side}_feedback." for side in by_user)
     for tick, numbers in changes.items():
         for name in numbers:
             if name.startswith(replaced):
@@ -68,7 +68,7 @@ def check_changes(scene: Scene, held: bool, changes: Changes, foreign: Iterable[
 
 
 def drive_sampled(
-    scene: Scene, grid: Array, loop: Loop, changes: Changes, foreign: Mapping[int, Foreign], progress: Progress,
+    scene: Scene, grid: Array, loop: Loop, changes: Changes, by_user: Mapping[int, UserController], progress: Progress,
     integrator: Integrator,
 ) -> Array:
     """States (n, 6) under controllers that answer at every tick; only the rows reached, if the integrator stops.
@@ -80,10 +80,10 @@ def drive_sampled(
     for ticks in _blocks(scene.ticks, changes):
         if plant.tick in changes:
             scene = scene.changed(changes[plant.tick])
-        # laws of foreign controllers measure and limit as the scene says
-        laws = {**{side: ControlLaw(0.0, 0.0) for side in foreign}, **scene.system.laws}
+        # laws of the user measure and limit as the scene says
+        laws = {**{side: ControlLaw(0.0, 0.0) for side in by_user}, **scene.system.laws}
         outputs, interval = outputs_within(grid, ticks, scene.period_ns)
-        record = plant.run(laws, outputs, foreign, states[done : done + len(interval)])
+        record = plant.run(laws, outputs, by_user, states[done : done + len(interval)])
         at_end = len(ticks) == 1  # the output times of the last tick and later: nothing acts there
         if at_end:
             states[done:], interval = plant.state, np.zeros(len(grid) - done, dtype=np.int64)
@@ -154,11 +154,12 @@ def outputs_within(grid: Array, ticks: NDArray[np.int64], period_ns: int) -> tup
 
 def drive(
     scene: Scene, integrator: Integrator, sampled: bool, grid: Array, loop: Loop | None = None,
-    changes: Changes = NO_CHANGES, foreign: Mapping[int, Foreign] = NO_FOREIGN, progress: Progress = None,
+    changes: Changes = NO_CHANGES, by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
+    progress: Progress = None,
 ) -> Array:
     """States (n, 6) at the output times of a run to its end; fewer rows if it stops."""
     if sampled:
-        return drive_sampled(scene, grid, loop or new_loop(len(grid)), changes, foreign, progress, integrator)
+        return drive_sampled(scene, grid, loop or new_loop(len(grid)), changes, by_user, progress, integrator)
     if scene.system.external:
         return drive_external(scene, grid, integrator)
     return integrator.advance(scene.duration, grid)
@@ -166,7 +167,8 @@ def drive(
 
 def solve(
     scene: Scene, grid: Array, method: str, setting: float, sampled: bool, max_events: int, max_work: int,
-    changes: Changes = NO_CHANGES, foreign: Mapping[int, Foreign] = NO_FOREIGN, progress: Progress = None,
+    changes: Changes = NO_CHANGES, by_user: Mapping[int, UserController] = NO_USER_CONTROLLERS,
+    progress: Progress = None,
 ) -> tuple[Solution, Loop | None]:
     """States at ascending output times (n,), events and counters, and what went through a sampled loop.
 
@@ -175,7 +177,7 @@ def solve(
     loop = new_loop(len(grid)) if sampled else None
     found = METHODS[method].solve(Problem(
         scene.system, scene.duration, grid, setting, max_events, max_work, sampled,
-        lambda integrator: drive(scene, integrator, sampled, grid, loop, changes, foreign, progress),
+        lambda integrator: drive(scene, integrator, sampled, grid, loop, changes, by_user, progress),
         None if sampled else progress,
     ))
     found.state[:, scene.system.absent_columns] = np.nan

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.observe.sight import Quantity, Seen, Wanted
+from grasp_ros.observe.record import Quantity, Seen, Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import U
 from grasp_ros.physics.model import Array
@@ -25,7 +25,7 @@ NOTHING = Wanted(0)
 class Runs(NamedTuple):
     """What is left of n runs when they are over."""
 
-    seen: Array  # (n, k), see `observe.sight.Seen`
+    seen: Array  # (n, k), see `observe.record.Seen`
     state: Array  # (n, 6)
     touches: Array  # (n, 2)
     growth: Array  # (n,) largest Lyapunov exponent, 1/s

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from grasp_ros.exact.driver.user_controller import Foreign
+from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place
 from grasp_ros.physics import given
@@ -17,7 +17,7 @@ from grasp_ros.physics.control import ControlLaw, normals_over
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.sight import Sight
+from grasp_ros.physics.observation import Observation
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene.effects.base import NANOSECONDS
 
@@ -159,7 +159,7 @@ class SampledPlant:
         return self._go(outputs, np.array(answers, dtype=float, order="C")).states
 
     def run(
-        self, laws: Mapping[int, ControlLaw], outputs: Outputs, foreign: Mapping[int, Foreign] | None = None,
+        self, laws: Mapping[int, ControlLaw], outputs: Outputs, by_user: Mapping[int, UserController] | None = None,
         rows: Array | None = None,
     ) -> Record:
         """Advance by one control period for each interval of the outputs.
@@ -171,7 +171,7 @@ class SampledPlant:
         laws : mapping of int to ControlLaw
             What answers at every tick, by side; also the sensor and the actuator of a side with another controller.
         outputs : Outputs
-        foreign : mapping of int to Foreign, optional
+        by_user : mapping of int to UserController, optional
             Controllers from outside that answer in place of the feedback of a law.
         rows : array (m, 6), optional
             Where to write the states. Default: a new array.
@@ -189,19 +189,19 @@ class SampledPlant:
                 if law.normals is BARE.normals:
                     law = law._replace(normals=np.zeros((2, count, 2)))
                 law.normals[side] = normals_over(own.seed, self.tick, count)
-        for side, other in (foreign or {}).items():
+        for side, other in (by_user or {}).items():
             law.callee[side] = other.address
-            other.sight = partial(self._sight, laws, side)
+            other.observe = partial(self._observation, laws, side)
         record = self._go(outputs, np.zeros((count, 3)), law, rows)
-        if foreign and record.failed is not None:
+        if by_user and record.failed is not None:
             x, v = self.state[COLUMN[record.failed] :][:2].tolist()
             x, v = laws[record.failed].measured(self.tick, x, v)
-            raise foreign[record.failed].failure(self.tick, self.time, x, v)
+            raise by_user[record.failed].failure(self.tick, self.time, x, v)
         return record
 
-    def _sight(self, laws: Mapping[int, ControlLaw], side: int, tick: int) -> Sight:
+    def _observation(self, laws: Mapping[int, ControlLaw], side: int, tick: int) -> Observation:
         """What the controller of an arm can see; the kernels have the state of the tick in place when they ask it."""
-        return Sight(self._system, laws, side, tick, self.state.tolist())
+        return Observation(self._system, laws, side, tick, self.state.tolist())
 
     def _go(self, outputs: Outputs, answers: Array, law: Loop = BARE, rows: Array | None = None) -> Record:
         """Advance under answers that are given, or those of a law."""

@@ -22,7 +22,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import check_keys
-from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, foreign_controllers, solve
+from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, solve, wrap_controllers
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
@@ -73,10 +73,10 @@ def simulate(
     controllers : mapping of str to callable
         Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
         sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
-        as the scene says. Further parameters are given what their names ask for, see `physics.sight.Sight`. The loop
-        is sampled. Each is called once for every tick, the last one included. A function that numba has compiled and
-        that asks for nothing more runs at full speed. A class is made anew for the run; of any other object `reset()`
-        is called before it, if it has one.
+        as the scene says. Further parameters are given what their names ask for, see
+        `physics.observation.Observation`. The loop is sampled. Each is called once for every tick, the last one
+        included. A function that numba has compiled and that asks for nothing more runs at full speed. A class is made
+        anew for the run; of any other object `reset()` is called before it, if it has one.
     sensitivity : sequence of str, optional
         Numbers of the scene, "section.key", by which the motion is differentiated through its impacts, see
         `Trajectory.sensitivity`. The run is made twice, because the times of events are outputs of the second one.
@@ -107,14 +107,14 @@ def simulate(
     grid = times("grid", grid)  # new: kernels are compiled anew for arrays that nobody may write to
     check_grid(scene, grid)
     _check_ticks(scene, sampled, max_work)
-    foreign = foreign_controllers(scene, controllers)
-    with showing(progress, scene.duration, "s", scene.name) as told:
-        found, loop = solve(scene, grid, method, setting, sampled, max_events, max_work, changes, foreign, told)
-        if told is not None and found.status is Status.DONE:
-            told(scene.duration)
+    by_user = wrap_controllers(scene, controllers)
+    with showing(progress, scene.duration, "s", scene.name) as progress:
+        found, loop = solve(scene, grid, method, setting, sampled, max_events, max_work, changes, by_user, progress)
+        if progress is not None and found.status is Status.DONE:
+            progress(scene.duration)
     run = Trajectory(
         scene, grid[: len(found.state)], found.state, loop, found.event_table, found.work, found.status, method,
-        setting, found.stop, {NAMES[side]: controller.name for side, controller in foreign.items()}, found.at_rest,
+        setting, found.stop, {NAMES[side]: controller.name for side, controller in by_user.items()}, found.at_rest,
     )
     if sensitivity is None:
         return run

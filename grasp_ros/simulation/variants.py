@@ -77,25 +77,25 @@ class Variants:
 
     def faults(self) -> dict[int, str]:
         """Sentences for the rows that the scene's rules refuse."""
-        doubtful = self._doubtful() if self.is_plain else np.arange(self.rows)
+        uncertain = self._uncertain() if self.is_plain else np.arange(self.rows)
         found = {}
-        for i in doubtful.tolist():
+        for i in uncertain.tolist():
             try:
                 self.row(i)
             except SceneError as error:
                 found[i] = str(error)
         return found
 
-    def _doubtful(self) -> NDArray[np.int64]:
+    def _uncertain(self) -> NDArray[np.int64]:
         """Rows with a number outside its range, with a negative sum of an arm's own and its feedback's, or outside."""
-        doubt = np.zeros(self.rows, dtype=bool)
+        uncertain = np.zeros(self.rows, dtype=bool)
         for name, column in self.changes.items():
-            doubt |= ~self._parameters[name].holds(column)
+            uncertain |= ~self._parameters[name].holds(column)
         block = self.block()
-        doubt |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
-        with np.errstate(all="ignore"):  # a row in doubt may hold any number
-            doubt |= outside_rows(Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
-        return np.flatnonzero(doubt)
+        uncertain |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
+        with np.errstate(all="ignore"):  # a row uncertain may hold any number
+            uncertain |= outside_rows(Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
+        return np.flatnonzero(uncertain)
 
     def block(self) -> Block:
         """The rows as arrays; to be called only if `is_plain`."""

@@ -1,6 +1,6 @@
 """Scenes with the degenerate habits of users and of unit tests: zeros, equal numbers, states on a switch, limits.
 
-The title of a scene names the habits that it was drawn with.
+The title of a scene names the degeneracies that it was drawn with.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def _tilt(sketch: Sketch) -> None:
     sketch.extra["tilt"] = {"angle_rad": draw.between(-1.5, 1.5), "gravity_m_per_s2": gravity}
 
 
-HABITS: tuple[tuple[str, float, Callable[[Sketch], None]], ...] = (
+DEGENERACIES: tuple[tuple[str, float, Callable[[Sketch], None]], ...] = (
     ("same speed", 0.1, _same_speed), ("one wall", 0.06, _wall), ("no springs", 0.15, _no_springs),
     ("no damping", 0.15, _no_damping), ("elastic", 0.1, _elastic), ("set-point", 0.25, _set_point),
     ("feed-forward", 0.2, _feed_forward), ("tilt", 0.2, _tilt), ("friction", 0.25, _friction),
@@ -88,22 +88,22 @@ def draw_scene(draw: Draw) -> Scene:
 
 
 def draw_degenerate(draw: Draw) -> Scene:
-    """A scene with one way to start and any number of habits."""
+    """A scene with one way to start and any number of degeneracies."""
     sketch = Sketch(draw)
     name, start = STARTS[int(draw.between(0.0, len(STARTS)))]
     start(sketch)
     sketch.note(name)
-    for habit, part, add in HABITS:
+    for degeneracy, part, add in DEGENERACIES:
         if draw.chance(part):
             add(sketch)
-            sketch.note(habit)
+            sketch.note(degeneracy)
     sections = _sections(sketch)
     period, ticks = _time(sketch)
     sections["time"] = {"duration_s": period * ticks / 1e9, "control_period_s": period / 1e9}
     _add_loop(sketch, sections)
     _add_forces(sketch, sections, period, ticks)
     _leave_out(sketch, sections)
-    return scenes.compose("drawn", sections, title=", ".join(sketch.habits))
+    return scenes.compose("drawn", sections, title=", ".join(sketch.degeneracies))
 
 
 def _sections(sketch: Sketch) -> Sections:

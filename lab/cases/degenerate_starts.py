@@ -17,11 +17,11 @@ Sections = dict[str, dict[str, Any]]
 
 
 class Sketch:
-    """A scene while it is drawn: bodies at x = (left, object, right) with v, and what the habits so far are."""
+    """A scene while it is drawn: bodies at x = (left, object, right) with v, and what the degeneracies so far are."""
 
     def __init__(self, draw: Draw) -> None:
         self.draw = draw
-        self.habits: list[str] = []
+        self.degeneracies: list[str] = []
         self.size, self.speed = draw.decades(-5.0, 1.0), draw.decades(-4.0, 3.0)
         self.x, self.v = [-self.size, 0.0, self.size], [0.0, 0.0, 0.0]
         self.mass = [draw.decades(-6.0, 9.0) if draw.chance(0.15) else draw.decades(-3.0, 3.0) for _ in range(3)]
@@ -40,9 +40,9 @@ class Sketch:
         """A speed of the scene's size, or none."""
         return 0.0 if self.draw.chance(0.3) else self.speed * self.draw.between(-1.0, 1.0)
 
-    def note(self, habit: str) -> None:
-        """Name a habit."""
-        self.habits.append(habit)
+    def note(self, degeneracy: str) -> None:
+        """Name a degeneracy."""
+        self.degeneracies.append(degeneracy)
 
 
 def ulps(draw: Draw, value: float) -> float:

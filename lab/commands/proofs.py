@@ -1,4 +1,4 @@
-"""The studies of what is promised: `domain`, `paper`, `hard`, `fuzz`, `doors` and `faults`."""
+"""The studies of what is promised: `domain`, `paper`, `hard`, `fuzz`, `readers` and `faults`."""
 
 from __future__ import annotations
 
@@ -116,19 +116,19 @@ def _seconds(seconds: float | None, count: int | None) -> float | None:
     return seconds
 
 
-def add_doors(commands: Any) -> Parser:
-    """`python -m lab doors`."""
-    sub = add_command(commands, "doors", _doors, "damaged files of all kinds against their readers")
+def add_readers(commands: Any) -> Parser:
+    """`python -m lab readers`."""
+    sub = add_command(commands, "readers", _readers, "damaged files of all kinds against their readers")
     sub.add_argument("--seconds", type=float, help="how long (default 60, or until --count files are tried)")
     sub.add_argument("--count", type=whole(1), help="how many files")
     sub.add_argument("--first", type=whole(0), default=0, help="number of the first file (default 0)")
     sub.add_argument("--seed", type=whole(0), default=0, help="another seed makes other files (default 0)")
-    text = "where files that break a reader are written (default runs/doors)"
-    add_output(sub, "DIRECTORY", text, Path("runs") / "doors")
+    text = "where files that break a reader are written (default runs/readers)"
+    add_output(sub, "DIRECTORY", text, Path("runs") / "readers")
     return sub
 
 
-def _doors(options: argparse.Namespace) -> int:
+def _readers(options: argparse.Namespace) -> int:
     from lab.drills import parser_fuzzing
 
     seconds = _seconds(options.seconds, options.count)

@@ -35,7 +35,7 @@ class Drawn(NamedTuple):
     """What became of one draw."""
 
     number: int
-    habits: str
+    degeneracies: str
     found: Examination
     yaml: str  # empty if all properties hold
 
@@ -69,8 +69,8 @@ class Book:
 
     ends: Counter[str] = field(default_factory=Counter)
     tallies: dict[str, Tally] = field(default_factory=dict)
-    habits: Counter[str] = field(default_factory=Counter)
-    broken_habits: Counter[str] = field(default_factory=Counter)
+    degeneracies: Counter[str] = field(default_factory=Counter)
+    broken_degeneracies: Counter[str] = field(default_factory=Counter)
     scenes: dict[int, str] = field(default_factory=dict)  # those that fail, YAML by number
 
     @property
@@ -81,19 +81,19 @@ class Book:
     def add(self, drawn: Drawn) -> None:
         """Count a draw."""
         self.ends[drawn.found.end] += 1
-        names = drawn.habits.split(", ")
-        self.habits.update(names)
+        names = drawn.degeneracies.split(", ")
+        self.degeneracies.update(names)
         for check in drawn.found.checks:
             self.tallies.setdefault(check.name, Tally()).add(check, drawn.number)
         if drawn.found.broken:
             self.scenes[drawn.number] = drawn.yaml
-            self.broken_habits.update(names)
+            self.broken_degeneracies.update(names)
 
     def merge(self, other: Book) -> None:
         """Count later draws, too."""
         self.ends.update(other.ends)
-        self.habits.update(other.habits)
-        self.broken_habits.update(other.broken_habits)
+        self.degeneracies.update(other.degeneracies)
+        self.broken_degeneracies.update(other.broken_degeneracies)
         self.scenes.update(other.scenes)
         for name, tally in other.tallies.items():
             self.tallies.setdefault(name, Tally()).merge(tally)
@@ -110,9 +110,9 @@ class Book:
         for name, tally in self.by_failures():
             counts = f"{tally.checked:8}  {tally.skipped:8}  {tally.failures:8}"
             print(f"  {counts}  {tally.worst:8.2g}  {tally.where:8}  {name}")
-        print(f"  {'drawn':>8}  {'failures':>8}  habit")
-        for name, number in self.habits.most_common():
-            print(f"  {number:8}  {self.broken_habits[name]:8}  {name}")
+        print(f"  {'drawn':>8}  {'failures':>8}  degeneracy")
+        for name, number in self.degeneracies.most_common():
+            print(f"  {number:8}  {self.broken_degeneracies[name]:8}  {name}")
         print(f"failures: {self.broken}")
 
 

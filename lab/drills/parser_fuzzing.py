@@ -1,4 +1,4 @@
-"""Damaged files against every door: refused in a sentence, or read as what they are; never a traceback or a hang."""
+"""Damaged files against every reader: refused in a sentence, or read as what they are; never a traceback or a hang."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from lab.drills import mutations, recorder
 from lab.reference.deadline import Deadline, deadline
 from lab.studies.records import Journal, digest
 
-SECONDS = 10.0  # no door takes longer
-MEMORY = 4 * 2**30  # bytes that a door may ask for beyond what is there
+SECONDS = 10.0  # no reader takes longer
+MEMORY = 4 * 2**30  # bytes that a reader may ask for beyond what is there
 FEW_EVENTS, FEW_WORK = 100, 10_000  # budgets of what is done with an accepted scene
 SQUEEZED = [f"{side}_contact.dissipation_s_per_m=1e5" for side in ("left", "right")]
 Random = np.random.Generator
@@ -40,7 +40,7 @@ class Broken(Exception):  # noqa: N818 - what the study looks for
     """A file was accepted that says something else."""
 
 
-class Door(NamedTuple):
+class Reader(NamedTuple):
     """One kind of file."""
 
     name: str
@@ -49,7 +49,7 @@ class Door(NamedTuple):
 
 
 def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: float | None) -> int:
-    """Try damaged files until the count or the time is reached; returns how many broke a door.
+    """Try damaged files until the count or the time is reached; returns how many broke a reader.
 
     Parameters
     ----------
@@ -63,29 +63,29 @@ def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: f
     answers: Counter[tuple[str, str]] = Counter()
     slowest, end = dict.fromkeys(["scene", "result", "bag", "journal"], 0.0), time.monotonic() + (seconds or np.inf)
     with tempfile.TemporaryDirectory() as place, _limited(MEMORY):
-        doors = all_doors(Path(place))
+        readers = all_readers(Path(place))
         for number in tqdm(range(first, first + (count or 10**9)), unit="file", total=count):
             if time.monotonic() > end:
                 break
-            door, answer, took = attempt(doors, Path(place), seed, number, directory)
-            answers[door, answer] += 1
-            slowest[door] = max(slowest[door], took)
+            reader, answer, took = attempt(readers, Path(place), seed, number, directory)
+            answers[reader, answer] += 1
+            slowest[reader] = max(slowest[reader], took)
     for name, longest in slowest.items():
-        kinds = {answer: answers[name, answer] for door, answer in sorted(answers) if door == name}
+        kinds = {answer: answers[name, answer] for reader, answer in sorted(answers) if reader == name}
         words = ", ".join(f"{answer} {times}" for answer, times in kinds.items())
         print(f"{name:<8} {sum(kinds.values()):>7} files: {words}; slowest {longest:.2f} s")
     return sum(times for (_, answer), times in answers.items() if answer not in ("refused", "accepted"))
 
 
-def attempt(doors: list[Door], place: Path, seed: int, number: int, directory: Path) -> tuple[str, str, float]:
-    """One file: its door, what came of it, and the seconds it took."""
+def attempt(readers: list[Reader], place: Path, seed: int, number: int, directory: Path) -> tuple[str, str, float]:
+    """One file: its reader, what came of it, and the seconds it took."""
     rng = np.random.default_rng([seed, number])
-    door = doors[number % len(doors)]
-    content = door.make(rng)
+    reader = readers[number % len(readers)]
+    content = reader.make(rng)
     begin = time.monotonic()
     try:
         with deadline(SECONDS):
-            door.read(place, content)
+            reader.read(place, content)
         answer = "accepted"
     except Refused as error:
         good = "\n" not in str(error) and 0 < len(str(error)) < LONGEST + 100
@@ -98,12 +98,12 @@ def attempt(doors: list[Door], place: Path, seed: int, number: int, directory: P
         answer = type(error).__name__
     if answer not in ("accepted", "refused"):
         directory.mkdir(parents=True, exist_ok=True)
-        (directory / f"{door.name}_{seed}_{number}").write_bytes(content)
-    return door.name, answer, time.monotonic() - begin
+        (directory / f"{reader.name}_{seed}_{number}").write_bytes(content)
+    return reader.name, answer, time.monotonic() - begin
 
 
-def all_doors(place: Path) -> list[Door]:
-    """The doors, with valid files to damage."""
+def all_readers(place: Path) -> list[Reader]:
+    """The readers, with valid files to damage."""
     library = [scenes.load(name).to_yaml() for name in scenes.names()]
     simulate(scenes.load("preload", SQUEEZED), max_work=FEW_WORK)  # compiles what is compiled at first use
     case = scenes.load("case_01", ["time.duration_s=0.004"])
@@ -114,11 +114,11 @@ def all_doors(place: Path) -> list[Door]:
     with np.load(place / "valid.npz") as data:
         content = dict(data)
     return [
-        Door("scene", partial(_make_scene, library), _read_scene),
-        Door("result", partial(_make_result, packed, content), partial(_read_result, result)),
-        Door("bag", partial(_make_bag, whole, (place / "valid" / "metadata.yaml").read_bytes()),
+        Reader("scene", partial(_make_scene, library), _read_scene),
+        Reader("result", partial(_make_result, packed, content), partial(_read_result, result)),
+        Reader("bag", partial(_make_bag, whole, (place / "valid" / "metadata.yaml").read_bytes()),
              partial(_read_bag, recorded, whole)),
-        Door("journal", _make_line, _read_journal),
+        Reader("journal", _make_line, _read_journal),
     ]
 
 

@@ -22,8 +22,8 @@ class Line(NamedTuple):
 
     ends: str  # JSON, as all of them
     tallies: str
-    habits: str
-    broken_habits: str
+    degeneracies: str
+    broken_degeneracies: str
     scenes: str
 
 
@@ -49,14 +49,14 @@ class Kept:
         line = self._journal.get(self._key(numbers), Line)
         if line is None:
             return None
-        ends, tallies, habits, broken, scenes = map(json.loads, line)
-        return Book(Counter(ends), {name: Tally(*tally) for name, tally in tallies.items()}, Counter(habits),
+        ends, tallies, degeneracies, broken, scenes = map(json.loads, line)
+        return Book(Counter(ends), {name: Tally(*tally) for name, tally in tallies.items()}, Counter(degeneracies),
                     Counter(broken), {int(number): yaml for number, yaml in scenes.items()})
 
     def put(self, numbers: range, book: Book) -> None:
         """Keep what became of these draws."""
         tallies = {name: list(vars(tally).values()) for name, tally in book.tallies.items()}
-        parts = (book.ends, tallies, book.habits, book.broken_habits, book.scenes)
+        parts = (book.ends, tallies, book.degeneracies, book.broken_degeneracies, book.scenes)
         self._journal.put(self._key(numbers), Line(*map(json.dumps, parts)))
 
 
@@ -72,10 +72,11 @@ def write_page(docs: Path, seed: int, first: int, book: Book) -> None:
                 for number, yaml in sorted(book.scenes.items())]
     properties = [[name, *map(str, (tally.checked, tally.skipped, tally.failures)), f"{tally.worst:.2g}",
                    str(tally.where)] for name, tally in book.by_failures()]
-    habits = [[name, str(number), str(book.broken_habits[name])] for name, number in _ordered(book.habits)]
+    degeneracies = [[name, str(number), str(book.broken_degeneracies[name])]
+                    for name, number in _ordered(book.degeneracies)]
     ends = [[str(number), text] for text, number in _ordered(book.ends)]
     pages.write(docs, "fuzz", seed=seed, first=first, draws=book.ends.total(), failures=failures, ends=ends,
-                properties=properties, habits=habits)
+                properties=properties, degeneracies=degeneracies)
 
 
 def _ordered(counts: Counter[str]) -> list[tuple[str, int]]:

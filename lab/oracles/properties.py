@@ -18,8 +18,8 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from lab.cases.case import Product, Unfinished
-from lab.oracles.companions import FALLS, mirror, short_periods, units
 from lab.oracles.motion import ledgers
+from lab.oracles.related_runs import FALLS, mirror, short_periods, units
 from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.rounding_bounds import DIED_OUT
@@ -120,10 +120,10 @@ def _checks(first: Trajectory, product: Product, every: bool, compare: bool) -> 
         yield Check(finding.name, finding.error, LIMIT)
     spent = int(run.work[Work.FLIGHTS] + run.work[Work.CONTACT_STEPS] + run.work[Work.ROOT_ITERATIONS])
     if spent <= CHEAP:
-        yield from _companions(close, first, product, every, compare)
+        yield from _related_runs(close, first, product, every, compare)
 
 
-def _companions(close: Detail, first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
+def _related_runs(close: Detail, first: Trajectory, product: Product, every: bool, compare: bool) -> Iterator[Check]:
     """What takes more runs; one that ends as no run may is a failure, too."""
     part = zlib.crc32(close.run.state[-1].tobytes()) / 2**32
     relations: list[tuple[int, Callable[[], Iterator[tuple[str, float]]], float]] = [

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
 from grasp_ros.observe.observer import watch
-from grasp_ros.observe.sight import Seen, Wanted
+from grasp_ros.observe.record import Seen, Wanted
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
@@ -155,11 +155,11 @@ def running_losses(run: Trajectory) -> tuple[Array, Losses]:
     """
     times = np.unique(np.concatenate([run.t, run.event_table[:, 0], [0.0, run.scene.duration]]))
     integrator = integrator_of(run)
-    watcher = watch(integrator, Wanted.LOSSES, SETTLED)
+    run_observer = watch(integrator, Wanted.LOSSES, SETTLED)
     lost = np.zeros((len(TAKEN), len(times)))
     for k, length in enumerate(np.diff(times).tolist(), 1):
         integrator.advance(length)
-        lost[:, k] = watcher.seen[TAKEN]
+        lost[:, k] = run_observer.seen[TAKEN]
     return times, Losses(*lost)
 
 

@@ -20,7 +20,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.observe.observer import watch
-from grasp_ros.observe.sight import Wanted
+from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.layout import Work
 from grasp_ros.physics.system import System
 from grasp_ros.simulation import ensemble, simulate

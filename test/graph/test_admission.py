@@ -18,7 +18,7 @@ from std_msgs.msg import String
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.lockstep.ticks import PATIENCE_TICKS, Arrival, Ticks
+from grasp_ros.graph.lockstep.synchronizer import PATIENCE_TICKS, Arrival, Synchronizer
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
@@ -38,8 +38,8 @@ def command(tick: int, force: float = 1.0) -> bytes:
     return serialize_message(plain_messages.wrench(tick * PERIOD, force))
 
 
-def ticks(turn: list[int]) -> Ticks:
-    return Ticks([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
+def ticks(turn: list[int]) -> Synchronizer:
+    return Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
 
 
 def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:

@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.health.beats import Beats
+from grasp_ros.graph.health.heartbeat import Heartbeats
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
@@ -297,11 +297,11 @@ def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tm
 def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[Any, SingleThreadedExecutor]) -> None:
     peer, _ = node
     waiting = GraspNode("waiting", context=peer.context)
-    beats = Beats(waiting, lambda: None, lambda: None)
+    heartbeats = Heartbeats(waiting, lambda: None, lambda: None)
     sign = ["/plant", "first", 0, [], "", "", True]
-    beats._on_beat(String(data=json.dumps(sign)))
-    assert beats.quiet(["/plant"], time.monotonic()) == ["/plant"]
-    beats._on_beat(String(data=json.dumps([*sign[:4], "ended", *sign[5:]])))
-    assert beats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
-    beats.end("")
+    heartbeats._on_beat(String(data=json.dumps(sign)))
+    assert heartbeats.quiet(["/plant"], time.monotonic()) == ["/plant"]
+    heartbeats._on_beat(String(data=json.dumps([*sign[:4], "ended", *sign[5:]])))
+    assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
+    heartbeats.end("")
     waiting.end()

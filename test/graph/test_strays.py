@@ -19,7 +19,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from grasp_ros.graph import bag
-from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, GIVE_UP_SECONDS, Arrival, Ticks
+from grasp_ros.graph.lockstep.synchronizer import GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.rosbag2 import force_message
 from grasp_ros.graph.verify import verify
@@ -43,7 +43,7 @@ def command(tick: int, force: float) -> bytes:
 
 @pytest.mark.parametrize("delay", [0, 2])
 def test_where_two_may_have_sent_the_effort_of_a_later_state_decides(delay: int) -> None:
-    ticks = Ticks([LEFT_COMMAND], ["left"], PERIOD, END, lambda: 0, delay)
+    ticks = Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END, lambda: 0, delay)
     ticks.put(JOINT_STATES, state(0))
     assert ticks.put(LEFT_COMMAND, command(0, 1e6), sure=False) is Arrival.TAKEN
     assert ticks.put(LEFT_COMMAND, command(0, 2.0), sure=False) is Arrival.CONTRADICTS
@@ -59,11 +59,11 @@ def test_where_two_may_have_sent_the_effort_of_a_later_state_decides(delay: int)
 
 def test_a_command_that_did_not_come_is_what_acted() -> None:
     turn = [0]
-    ticks = Ticks([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
+    ticks = Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
     ticks.put(JOINT_STATES, state(0))
     ticks.put(JOINT_STATES, state(1, effort=-0.0))
-    assert ticks.take(DOUBT_SECONDS) is None
-    found = ticks.take(DOUBT_SECONDS + 0.1)
+    assert ticks.take(UNCERTAIN_SECONDS) is None
+    found = ticks.take(UNCERTAIN_SECONDS + 0.1)
     assert found is not None
     assert found.found[LEFT_COMMAND] == command(0, -0.0)
     assert (found.lost, found.restored) == (0, 1)
@@ -73,13 +73,13 @@ def test_a_command_that_did_not_come_is_what_acted() -> None:
     assert ticks.take(2 * GIVE_UP_SECONDS) is None
     turn[0] = 1
     ticks.put(JOINT_STATES, state(0, effort=7.0))  # the plant was reset: neither of them acts
-    last = ticks.take(DOUBT_SECONDS + 0.1)
+    last = ticks.take(UNCERTAIN_SECONDS + 0.1)
     assert last is not None
     assert messages.raw_force(last.found[LEFT_COMMAND]) == 6.0
 
 
 def test_what_nothing_stands_for_is_given_up_later() -> None:
-    ticks = Ticks([LEFT_CONTACT], ["left"], PERIOD, END, lambda: 0)
+    ticks = Synchronizer([LEFT_CONTACT], ["left"], PERIOD, END, lambda: 0)
     ticks.put(JOINT_STATES, state(0))
     ticks.put(JOINT_STATES, state(1))
     assert ticks.take(GIVE_UP_SECONDS) is None

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from grasp_ros.graph.health import watchdog
-from grasp_ros.graph.health.beats import BEAT_SECONDS
+from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
 from grasp_ros.graph.health.watchdog import EVERY_SECONDS, Watchdog
 
 PATIENCE, LAW_PATIENCE = 2.1, 60.0
@@ -23,7 +23,7 @@ class Clock:
         self.most: float | None = LAW_PATIENCE
         self.dog = Watchdog("monitor", PATIENCE, lambda: self.most, ends, lambda: self.frozen)
 
-    def beat(self, times: int, seconds: float = BEAT_SECONDS) -> None:
+    def beat(self, times: int, seconds: float = HEARTBEAT_SECONDS) -> None:
         for _ in range(times):
             self.now += seconds
             self.dog.beat()
@@ -42,7 +42,7 @@ def test_one_that_waits_on_says_it_at_once_and_now_and_then(monkeypatch: Any, ca
     clock = Clock(monkeypatch, ends=False)
     clock.beat(6)
     assert capsys.readouterr().err.count("stands for") == 1
-    clock.beat(int(2 * EVERY_SECONDS / BEAT_SECONDS) + 2)
+    clock.beat(int(2 * EVERY_SECONDS / HEARTBEAT_SECONDS) + 2)
     assert capsys.readouterr().err.count("stands for") == 2
     assert not clock.ended
 
@@ -59,7 +59,7 @@ def test_its_own_sleep_is_no_standing(monkeypatch: Any, capsys: Any) -> None:
 def test_a_law_that_does_not_return_has_longer(monkeypatch: Any, capsys: Any) -> None:
     clock = Clock(monkeypatch, ends=True)
     clock.frozen = []
-    clock.beat(int(LAW_PATIENCE / BEAT_SECONDS) - 1)
+    clock.beat(int(LAW_PATIENCE / HEARTBEAT_SECONDS) - 1)
     assert not clock.ended
     clock.beat(2)
     assert clock.ended

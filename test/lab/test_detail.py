@@ -17,9 +17,9 @@ from lab.cases import regression
 from lab.cases.case import Product
 from lab.drills import fuzz
 from lab.oracles import restart_check as restarts
-from lab.oracles.companions import FALLS, mirror, short_periods, units
 from lab.oracles.motion import ledgers
 from lab.oracles.properties import LIMIT, examine, look
+from lab.oracles.related_runs import FALLS, mirror, short_periods, units
 from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.segments import FIRST, INNER, LAST, WHOLE, Detail, pieces_of, rule

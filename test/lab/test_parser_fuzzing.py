@@ -1,4 +1,4 @@
-"""Damaged files against every door; `python -m lab doors` tries as many as one wants."""
+"""Damaged files against every reader; `python -m lab readers` tries as many as one wants."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.parameter import Parameter
-from lab.drills import parser_fuzzing as doors
+from lab.drills import parser_fuzzing as readers
 
 
 @pytest.fixture(scope="module")
@@ -21,33 +21,35 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def all_doors(place: Path) -> list[doors.Door]:
-    return doors.all_doors(place)
+def all_readers(place: Path) -> list[readers.Reader]:
+    return readers.all_readers(place)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", range(4))
-def test_damaged_files_break_no_door(all_doors: list[doors.Door], place: Path, tmp_path: Path, number: int) -> None:
-    answers = [doors.attempt(all_doors, place, 1, k, tmp_path)[:2] for k in range(number, 400, 4)]
-    assert {door for door, _ in answers} == {all_doors[number].name}
+def test_damaged_files_break_no_reader(
+    all_readers: list[readers.Reader], place: Path, tmp_path: Path, number: int
+) -> None:
+    answers = [readers.attempt(all_readers, place, 1, k, tmp_path)[:2] for k in range(number, 400, 4)]
+    assert {reader for reader, _ in answers} == {all_readers[number].name}
     assert {answer for _, answer in answers} == {"accepted", "refused"}
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("number", [6398, 37822, 87690, 95138])
 def test_a_bag_whose_last_list_is_none_is_not_recovered_as_one(
-    all_doors: list[doors.Door], place: Path, tmp_path: Path, number: int
+    all_readers: list[readers.Reader], place: Path, tmp_path: Path, number: int
 ) -> None:
-    assert doors.attempt(all_doors, place, 77, number, tmp_path)[:2] == ("bag", "refused")
+    assert readers.attempt(all_readers, place, 77, number, tmp_path)[:2] == ("bag", "refused")
 
 
-def test_a_door_that_breaks_is_seen(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_reader_that_breaks_is_seen(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def hang(*_: Any) -> None:
         while True:
             time.sleep(0.01)
 
     def differ(*_: Any) -> None:
-        raise doors.Broken("x is 1, not 2")
+        raise readers.Broken("x is 1, not 2")
 
     def fault(*_: Any) -> None:
         raise KeyError("x")
@@ -55,9 +57,9 @@ def test_a_door_that_breaks_is_seen(place: Path, tmp_path: Path, monkeypatch: py
     def words(*_: Any) -> None:
         raise Refused("a\nb")
 
-    monkeypatch.setattr(doors, "SECONDS", 0.05)
+    monkeypatch.setattr(readers, "SECONDS", 0.05)
     seen = {
-        doors.attempt([doors.Door("a", lambda _: b"content", read)], place, 0, 0, tmp_path)[1]
+        readers.attempt([readers.Reader("a", lambda _: b"content", read)], place, 0, 0, tmp_path)[1]
         for read in (hang, differ, fault, words)
     }
     assert seen == {"hangs", "accepted although x is 1, not 2", "KeyError", "refused in no sentence"}
@@ -65,27 +67,27 @@ def test_a_door_that_breaks_is_seen(place: Path, tmp_path: Path, monkeypatch: py
 
 
 def test_a_silent_acceptance_is_seen(
-    all_doors: list[doors.Door], place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    all_readers: list[readers.Reader], place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Readers that leave out a check are found by the doors' own comparisons."""
+    """Readers that leave out a check are found by the readers' own comparisons."""
     right = Parameter.read
 
     def doubled(parameter: Parameter, value: Any) -> Any:
         return 2.0 * right(parameter, value) if parameter.key == "mass_kg" else right(parameter, value)
 
     monkeypatch.setattr(Parameter, "read", doubled)
-    answers = {doors.attempt(all_doors, place, 0, number, tmp_path)[1] for number in range(0, 160, 4)}
+    answers = {readers.attempt(all_readers, place, 0, number, tmp_path)[1] for number in range(0, 160, 4)}
     assert any("mass_kg is" in answer for answer in answers), answers
 
 
-def test_the_same_number_is_the_same_file(all_doors: list[doors.Door]) -> None:
-    for door in all_doors[:2] + all_doors[3:]:
-        assert door.make(np.random.default_rng(5)) == door.make(np.random.default_rng(5))
+def test_the_same_number_is_the_same_file(all_readers: list[readers.Reader]) -> None:
+    for reader in all_readers[:2] + all_readers[3:]:
+        assert reader.make(np.random.default_rng(5)) == reader.make(np.random.default_rng(5))
 
 
 def test_the_command_prints_what_came_of_it(lab_command: Any) -> None:
     before = resource.getrlimit(resource.RLIMIT_AS)
-    result = lab_command("doors", "--count", "8")
+    result = lab_command("readers", "--count", "8")
     assert result.returncode == 0, result.stderr
     assert resource.getrlimit(resource.RLIMIT_AS) == before  # other tests of this process start programs
     lines = result.stdout.splitlines()

@@ -22,7 +22,7 @@ from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene, SceneError
 from lab.cases import regression
 from lab.cases.case import Product, Unfinished
-from lab.cases.degenerate import HABITS, draw_degenerate
+from lab.cases.degenerate import DEGENERACIES, draw_degenerate
 from lab.cases.degenerate_starts import STARTS
 from lab.cases.draw import NUMBERS, Draw, draw_ordinary, inside
 from lab.cases.impacts import impact_error
@@ -105,13 +105,13 @@ def test_few_draws_lie_outside_the_domain(draw_scene: Callable[[Draw], Scene], m
     assert 0 < refused < most
 
 
-def test_degenerate_scenes_cover_all_habits() -> None:
+def test_degenerate_scenes_cover_all_degeneracies() -> None:
     rng = np.random.default_rng(0)
     drawn = [inside(draw_degenerate, rng) for _ in range(1000)]
-    habits = Counter(habit for scene in drawn for habit in scene.title.split(", "))
-    assert min(habits[name] for name, _ in STARTS) > 50
-    assert min(habits[name] for name, _, _ in HABITS) > 20
-    assert {"loop", "pulse", "table", "sine", "absent", "no contact", "any horizon"} <= habits.keys()
+    degeneracies = Counter(degeneracy for scene in drawn for degeneracy in scene.title.split(", "))
+    assert min(degeneracies[name] for name, _ in STARTS) > 50
+    assert min(degeneracies[name] for name, _, _ in DEGENERACIES) > 20
+    assert {"loop", "pulse", "table", "sine", "absent", "no contact", "any horizon"} <= degeneracies.keys()
     assert max(len(scene.title.split(", ")) for scene in drawn) > 5
 
 

@@ -120,9 +120,9 @@ def length(tables: Tables, pulled: tuple[float, float, float], step: Step, setti
     c = tables.c
     t, v_l, x_o, v_o, _, v_r, z_l, z_r = motion_sizes(c, reach)
     rounding = EPS / settings.tolerance
-    still, doubt = STILL * rounding * max(abs(c[V.L]), abs(c[V.O]), abs(c[V.R])), rounding * t
+    still, least = STILL * rounding * max(abs(c[V.L]), abs(c[V.O]), abs(c[V.R])), rounding * t
     pull_l, pull_o, pull_r = pulled
-    v_l, v_o, v_r = max(v_l, doubt * pull_l, still), max(v_o, doubt * pull_o, still), max(v_r, doubt * pull_r, still)
+    v_l, v_o, v_r = max(v_l, least * pull_l, still), max(v_o, least * pull_o, still), max(v_r, least * pull_r, still)
     x_o = max(x_o, t * v_o)
     z_l = depth_size(c[Z.L], step.left, z_l, t * (v_l + v_o))
     z_r = depth_size(c[Z.R], step.right, z_r, t * (v_o + v_r))

@@ -3,7 +3,7 @@
     double command(int64 tick, double time, double x, double v)     s, m, m/s to N
 
 A function that numba has compiled runs at full speed. Any other callable is called through ctypes, which takes the
-interpreter's lock for as long as it runs; so is a compiled one that asks for more than these, see `physics.sight`.
+interpreter's lock for as long as it runs; so is a compiled one that asks for more, see `physics.observation`.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from numba.extending import intrinsic, is_jitted
 
 from grasp_ros.physics.control import Law, command_of
 from grasp_ros.physics.errors import Refused, described
-from grasp_ros.physics.sight import Sight, asked
+from grasp_ros.physics.observation import Observation, asked
 
 SIGNATURE = float64(int64, float64, float64, float64)
 PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double)
@@ -61,7 +61,7 @@ if numba.config.DISABLE_JIT:
         return float(PROTOTYPE(int(address))(tick, time, x, v))
 
 
-class Foreign:
+class UserController:
     """A controller from outside, as the kernels call it.
 
     Parameters
@@ -75,8 +75,8 @@ class Foreign:
     Attributes
     ----------
     asks : tuple of str
-        For what, see `physics.sight.SEEN`.
-    sight : callable
+        For what, see `physics.observation.OBSERVABLES`.
+    observe : callable
         From the tick that is answered to what there is to see; to be set before the kernels run.
     name : str
         Module and name of the law, or of its class.
@@ -91,7 +91,7 @@ class Foreign:
 
     def __init__(self, side: str, law: Law) -> None:
         self.asks = asked(law)
-        self.sight: Callable[[int], Sight]
+        self.observe: Callable[[int], Observation]
         numba_law = is_jitted(law) or isinstance(law, CFunc)
         named, compiled = getattr(law, "__wrapped__", law) if numba_law else law, numba_law and not self.asks
         named = named if hasattr(named, "__qualname__") else type(named)
@@ -110,7 +110,7 @@ class Foreign:
     def _answer(self, tick: int, time: float, x: float, v: float) -> float:
         """What a callable of Python answers; NaN for what is kept for `failure`."""
         try:
-            seen = self.sight(tick).seen(self.asks) if self.asks else {}
+            seen = self.observe(tick).values(self.asks) if self.asks else {}
             return command_of(self._law(tick, time, x, v, **seen), self._who, tick, time)
         except BaseException as error:  # ctypes would print it and go on
             self._error = error

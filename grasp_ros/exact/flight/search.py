@@ -46,7 +46,7 @@ class EventSeries(NamedTuple):
     third: float
     fourth: float
     noise: float  # rounding of g
-    doubt: float  # rounding of its second derivative
+    second_noise: float  # rounding of its second derivative
 
 
 @kernel
@@ -77,10 +77,10 @@ def event_series(kind: Transition, pair: PairFlight, at: Motion, own: Derivative
     second, third = sign * (own.second - body.second), sign * (own.third - body.third)
     fourth, fifth = sign * (own.fourth - body.fourth), sign * (own.fifth - body.fifth)
     if kind == Transition.REENTRY:
-        noise, doubt = EPS * pair.inverse_p, 4.0 * EPS * (abs(own.third) + abs(body.third))
-        return EventSeries(at.d + pair.inverse_p, second, third, fourth, fifth, noise, doubt)
-    doubt = 4.0 * EPS * (abs(own.second) + abs(body.second))
-    return EventSeries(turn * at.u, turn * at.d, second, third, fourth, EPS * at.size, doubt)
+        noise, second_noise = EPS * pair.inverse_p, 4.0 * EPS * (abs(own.third) + abs(body.third))
+        return EventSeries(at.d + pair.inverse_p, second, third, fourth, fifth, noise, second_noise)
+    second_noise = 4.0 * EPS * (abs(own.second) + abs(body.second))
+    return EventSeries(turn * at.u, turn * at.d, second, third, fourth, EPS * at.size, second_noise)
 
 
 @inlined
@@ -107,7 +107,7 @@ def certain_step(g: EventSeries, curvature: float, growth: float, last: float) -
     below = min(g.value, -g.noise)
     step = safe_step(below, g.rate, curvature)
     reach = min(4.0 * max(step, last), 1.0 / SMALLEST)  # finite: `growth` may be 0
-    bend = max(g.second + g.doubt + growth * reach, 0.0)
+    bend = max(g.second + g.second_noise + growth * reach, 0.0)
     if bend < 0.5 * curvature:
         step = max(step, min(reach, safe_step(below, g.rate, bend)))
     return step
@@ -119,7 +119,7 @@ def reach_of_root(g: EventSeries, growth: float, left: float) -> float:
     if not (g.value < 0.0 and g.rate > SMALLEST):
         return 0.0
     reach = -2.0 * g.value / g.rate
-    lost = reach * (max(g.doubt - g.second, 0.0) + growth * reach)
+    lost = reach * (max(g.second_noise - g.second, 0.0) + growth * reach)
     return reach if reach <= left and lost <= 0.5 * g.rate else 0.0
 
 

@@ -10,7 +10,7 @@ from enum import Enum
 from functools import partial
 from typing import Any, NamedTuple
 
-from grasp_ros.graph.health.beats import ENDED, Beats, digest
+from grasp_ros.graph.health.heartbeat import ENDED, Heartbeats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts
 from grasp_ros.graph.ros.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
@@ -77,9 +77,9 @@ class PeerNode(GraspNode):
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
         self.counters.update({"silent peers": 0, "refused texts": 0, "second sources": 0})
         self._watchdog = Watchdog(
-            self.get_name(), self.patience, self.standing, self._ends, lambda: self.beats.frozen()
+            self.get_name(), self.patience, self.standing, self._ends, lambda: self.heartbeats.frozen()
         )
-        self.beats = Beats(self, self.heard, self._watchdog.beat)
+        self.heartbeats = Heartbeats(self, self.heard, self._watchdog.beat)
         self._looked = self._excused = time.monotonic()
         self._first_look = 0.0  # wall time of the first look: all that may take long is done
         self._before: object = None
@@ -103,9 +103,9 @@ class PeerNode(GraspNode):
         several = [topic for topic in self.inputs
                    if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1]
         found = {topic.name: self.living(topic) for topic in several}
-        self.strangers = "; ".join(f"{name} has the sources {' and '.join(names)}" for name, names in found.items()
+        self.other_sources = "; ".join(f"{name} has the sources {' and '.join(names)}" for name, names in found.items()
                                    if len(names) > 1)
-        if self.strangers:
+        if self.other_sources:
             self.count("second sources")
         super().report()
 
@@ -120,7 +120,7 @@ class PeerNode(GraspNode):
                 self.get_logger().warning(f"this process was stopped for {self._watchdog.stood:.1f} s")
         if not self._first_look:
             self._first_look = now
-            self.beats.own.ready = True
+            self.heartbeats.own.ready = True
         elif now - self._looked > STILL_SECONDS:  # this thread was busy: what others did meanwhile waits here
             self.sweep()
         self._looked = now
@@ -142,7 +142,7 @@ class PeerNode(GraspNode):
                 return
 
     def _wait_for_start(self, now: float) -> None:
-        waited = now - max(self._first_look, self.beats.prepared)
+        waited = now - max(self._first_look, self.heartbeats.prepared)
         self.concern = f"for {waited:.0f} s" if waited > self.patience else ""
         if waited > self.start_patience and self._ends:
             self.fail(f"{self.words}: nobody has come for {self.start_patience:g} s")
@@ -156,22 +156,22 @@ class PeerNode(GraspNode):
             if now - self._gone.setdefault(need.topic, now) < GONE_SECONDS:
                 return None
             last = self._last[need.topic]
-            said = [sign.ended for sign in self.beats.of(last) if sign.ended]
+            said = [beat.ended for beat in self.heartbeats.of(last) if beat.ended]
             words = f"{need.topic.name}: {' and '.join(last)} has ended"
             return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True, bool(said))
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
         patience = self.patience
-        if self._excused < now - patience and (quiet := self.beats.quiet(names, now - patience)):
-            if any(sign.runs for sign in self.beats.of(quiet)):  # on this machine, and busy or without its turn
+        if self._excused < now - patience and (quiet := self.heartbeats.quiet(names, now - patience)):
+            if any(beat.runs for beat in self.heartbeats.of(quiet)):  # on this machine, and busy or without its turn
                 patience *= SLOW
-                quiet = self.beats.quiet(names, now - patience) if self._excused < now - patience else []
+                quiet = self.heartbeats.quiet(names, now - patience) if self._excused < now - patience else []
             if quiet:
                 words = f"{need.topic.name}: no sign of life of {' and '.join(quiet)} for {patience:g} s"
                 return Trouble(words, True)
         late = now - max(need.due, self._excused)
         if late > self.patience:
-            living = bool(self.beats.of(names))  # it may be slow, or compile for its first answer
+            living = bool(self.heartbeats.of(names))  # it may be slow, or compile for its first answer
             limit = (self.start_patience if need.first else SLOW * self.patience) if living else self.patience
             words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
             return Trouble(f"{words}, although it lives" if living else words, late > limit)
@@ -217,12 +217,12 @@ class PeerNode(GraspNode):
 
     def living(self, topic: Topic) -> list[str]:
         """Sources of a topic without processes that are known to be dead."""
-        return self.beats.living(self.sources(topic), time.monotonic() - self.patience)
+        return self.heartbeats.living(self.sources(topic), time.monotonic() - self.patience)
 
     def turn(self, topic: Topic) -> int:
         """How often the source of a topic has put its time back, as far as it says so."""
-        signs = self.beats.of(self._last.get(topic) or self.sources(topic))
-        return signs[-1].turn if signs else 0
+        beats = self.heartbeats.of(self._last.get(topic) or self.sources(topic))
+        return beats[-1].turn if beats else 0
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; it counts when a living node vouches for it, or when nobody here says such texts."""
@@ -247,14 +247,14 @@ class PeerNode(GraspNode):
             for entry in tuple(texts):
                 when, text = entry
                 name = digest(text)
-                sign = self.beats.vouched(name)
-                if sign is None and now - when < self.patience:
+                beat = self.heartbeats.vouched(name)
+                if beat is None and now - when < self.patience:
                     continue
                 texts.remove(entry)
-                if sign is None and (self.beats.speakers() or not self._is_plant(self.sources(topic))):
+                if beat is None and (self.heartbeats.speakers() or not self._is_plant(self.sources(topic))):
                     self.refuse("refused texts", topic)
-                elif (told := (name, sign.identity if sign else "")) != self._taken.get(topic) or sign is None:
-                    self._taken[topic] = told
+                elif (source := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
+                    self._taken[topic] = source
                     self._takers[topic](text)
 
     def _is_plant(self, names: list[str]) -> bool:
@@ -263,5 +263,5 @@ class PeerNode(GraspNode):
 
     def destroy_node(self) -> None:
         """Say last words before."""
-        self.beats.end(self.words if self.exit_code else "")
+        self.heartbeats.end(self.words if self.exit_code else "")
         super().destroy_node()

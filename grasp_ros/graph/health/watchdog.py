@@ -10,11 +10,11 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 
-from grasp_ros.graph.health.beats import BEAT_SECONDS
+from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
 from grasp_ros.graph.stopping import tell_parent
 
 EVERY_SECONDS = 5.0  # from one sentence to the next
-PAUSE_SECONDS = 2.0 * BEAT_SECONDS  # between two beats, if the process was stopped itself
+PAUSE_SECONDS = 2.0 * HEARTBEAT_SECONDS  # between two beats, if the process was stopped itself
 
 
 class Watchdog:
@@ -46,7 +46,7 @@ class Watchdog:
         return time.monotonic() - self._beaten > PAUSE_SECONDS
 
     def beat(self) -> None:
-        """Look; called every BEAT_SECONDS."""
+        """Look; called every HEARTBEAT_SECONDS."""
         before, self._beaten = self._beaten, time.monotonic()
         if self._beaten - before > PAUSE_SECONDS:  # nobody stood meanwhile
             self._since = self.resumed = self._beaten

@@ -20,7 +20,7 @@ from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.rosbag2 import force_template, numbers_message
 from grasp_ros.physics.control import command_of, limited
 from grasp_ros.physics.errors import Refused, described
-from grasp_ros.physics.sight import Sight, asked, check
+from grasp_ros.physics.observation import Observation, asked, check
 from grasp_ros.physics.system import COLUMN, NAMES, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
@@ -255,7 +255,7 @@ class OwnLaw:
 
     def command(self, system: System, side: int, tick: int, time: float, state: Sequence[float]) -> float:
         """Command in N that answers the state (6,) of a tick, through the stages of the scene."""
-        stages, seen = system.laws[side], Sight(system, system.laws, side, tick, state).seen(self.asks)
+        stages, seen = system.laws[side], Observation(system, system.laws, side, tick, state).values(self.asks)
         x, v = stages.measured(tick, *state[COLUMN[side] :][:2])
         try:
             answer = self._law(tick, time, x, v, **seen)

@@ -16,11 +16,11 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
-from grasp_ros.graph.health.beats import digest
+from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
-from grasp_ros.graph.lockstep.ticks import DOUBT_SECONDS, Arrival, Tick, Ticks
-from grasp_ros.graph.nodes.judge import Announcement, Judge
+from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
+from grasp_ros.graph.nodes.lyapunov_monitor import Announcement, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
@@ -50,7 +50,7 @@ from grasp_ros.scene.topics import (
 )
 from grasp_ros.scene.versions import versions
 
-MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are judged at once, and of wall time that a tick waits for others
+MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are evaluated at once, and of wall time that a tick waits for others
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
@@ -119,13 +119,13 @@ class Monitor(PeerNode):
     def heard(self) -> None:
         """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end."""
         super().heard()
-        if self._plant and not self.finished and (other := self.beats.successor(self._plant)):
+        if self._plant and not self.finished and (other := self.heartbeats.successor(self._plant)):
             self.fail(f"{JOINT_STATES.name}: another {other} has taken the place of the one that is recorded")
 
     def fail(self, reason: str) -> None:
         """End with a sentence that says how far the bag reaches."""
-        told = self._recorder is None or str(self._path) in reason  # by the recorder itself
-        ticks = "" if told else f"; the bag has {self.counters['ticks']} ticks"
+        known = self._recorder is None or str(self._path) in reason  # by the recorder itself
+        ticks = "" if known else f"; the bag has {self.counters['ticks']} ticks"
         super().fail(f"{reason}{ticks}")
 
     def _on_run(self, text: str) -> None:
@@ -135,8 +135,8 @@ class Monitor(PeerNode):
 
     def _on_scene(self, text: str) -> None:
         if self._scene is None:  # one run, one scene
-            sign = self.beats.vouched(digest(text))
-            self._plant = sign.identity if sign else ""
+            beat = self.heartbeats.vouched(digest(text))
+            self._plant = beat.identity if beat else ""
             self._scene = scenes.parse(text, SCENE.name, f"topic {SCENE.name}")
             self._begin()
 
@@ -147,8 +147,8 @@ class Monitor(PeerNode):
         scene, running = self._scene, self._running
         beside = [TIMING] if running.lockstep else [TIMING, *scene.controllers.values()]
         per_tick = [topic for topic in scene.topics if topic != LYAPUNOV and topic not in beside]
-        self._judge, self._picture = Judge(scene), Picture(self, scene)
-        self._ticks = Ticks(
+        self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
+        self._synchronizer = Synchronizer(
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
             scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
         )
@@ -168,7 +168,7 @@ class Monitor(PeerNode):
         for topic in per_tick:
             subscription = self.subscribe(topic, partial(self._on_message, topic), raw=True)
             if topic in COMMANDS.values():
-                self._sources[topic] = Sources(subscription, DOUBT_SECONDS)
+                self._sources[topic] = Sources(subscription, UNCERTAIN_SECONDS)
         for topic in (*beside, DIAGNOSTICS):
             self.subscribe(topic, partial(self._record, topic), raw=True)
 
@@ -191,7 +191,7 @@ class Monitor(PeerNode):
             message = deserialize_message(cdr, JointState)
             numbers = dict(zip(message.name, message.position, strict=True))
             self.count("lost announcements", self._numbers[side].take(message))
-            self._judge.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
+            self._lyapunov.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
             self.refuse("refused announcements", CHANGES[side])
             self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
@@ -199,7 +199,7 @@ class Monitor(PeerNode):
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
         sure = sources is None or (sources.alone() and self._limits.allow(topic, messages.raw_command(cdr)))
-        arrival = self._ticks.put(topic, cdr, sure)
+        arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
         elif arrival is Arrival.AGAIN:  # what was published has been lost
@@ -212,7 +212,7 @@ class Monitor(PeerNode):
             self.refuse(arrival.value, topic)
 
     def _drain(self, waited: float = 0.0) -> None:
-        while (tick := self._ticks.take(waited)) is not None:
+        while (tick := self._synchronizer.take(waited)) is not None:
             self._take(tick)
 
     def report(self) -> None:
@@ -221,40 +221,41 @@ class Monitor(PeerNode):
         self._beside.clear()
 
     def _take(self, tick: Tick) -> None:
-        """Put a tick in its place in the bag's time; judge what waits once there is enough, or something changes."""
+        """Put a tick in its place in the bag's time; evaluate what waits once there is enough, or something changes."""
         assert self._scene is not None
-        if tick.restarted or self._judge.changes(tick.time_ns):
+        if tick.restarted or self._lyapunov.changes(tick.time_ns):
             self._complete()
         if tick.restarted:
             self._offset_ns = self._bag_ns + self._scene.period_ns - tick.time_ns
-            self._judge.restart()
+            self._lyapunov.restart()
             self.count("resets")
         self._bag_ns, self._advanced = tick.time_ns + self._offset_ns, time.monotonic()
         self.count("restored commands", tick.restored)
         self.count("lost messages", tick.lost)
         self.count("messages without a state", tick.dropped)
-        beside = [(CHANGES[side], cdr) for side, cdr in self._judge.begin(tick.time_ns)]
+        beside = [(CHANGES[side], cdr) for side, cdr in self._lyapunov.begin(tick.time_ns)]
         self._due.append((self._bag_ns, tick, beside))
-        if len(self._due) >= MOST_TICKS or tick.time_ns == self._ticks.end_ns:
+        if len(self._due) >= MOST_TICKS or tick.time_ns == self._synchronizer.end_ns:
             self._complete()
         elif len(self._due) == 1:
             self._soon.reset()
 
     def _complete(self) -> None:
-        """Judge, record and publish the ticks that wait; none after an alarm."""
+        """Evaluate, record and publish the ticks that wait; none after an alarm."""
         due, self._due = self._due, []
         if not due:
             return
         assert self._recorder is not None
         self._soon.cancel()
-        for (bag_ns, tick, beside), values in zip(due, self._judge.judge([tick for _, tick, _ in due]), strict=True):
+        rows = self._lyapunov.evaluate([tick for _, tick, _ in due])
+        for (bag_ns, tick, beside), values in zip(due, rows, strict=True):
             self.count("ticks")
             self._picture.show(tick.state)
             own = self._published = self._template.fill(tick.time_ns, values)
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
             self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
-            self.finished = bool(self.exit_code) or tick.time_ns == self._ticks.end_ns
+            self.finished = bool(self.exit_code) or tick.time_ns == self._synchronizer.end_ns
             if self.finished:
                 return
 
@@ -262,7 +263,7 @@ class Monitor(PeerNode):
         """Say why V is not there; end where energy comes from nowhere."""
         if not values["closed"]:
             self.count("ticks without V")
-            unknown = self._judge.unknown
+            unknown = self._lyapunov.unknown
             self.concern = (f"no law announced by {' and '.join(unknown)}: energy of the plant alone" if unknown else
                             "commands are not those of the announced law: energy of the plant alone")
         if values["alarm"]:

@@ -16,7 +16,7 @@ from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status, compile_kernels
-from grasp_ros.graph.health.beats import digest
+from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import SLOW, Need, PeerNode
 from grasp_ros.graph.lockstep.free_running import FreeRunning
 from grasp_ros.graph.lockstep.lockstep import Lockstep
@@ -70,7 +70,7 @@ class Plant(PeerNode):
         self._simulated = self.publisher(CLOCK)
         self._descriptions = [self.publisher(RUN), self.publisher(SCENE)]
         texts = [running.to_yaml(), self.scene.to_yaml()]
-        self.beats.own.texts = [digest(text) for text in texts]
+        self.heartbeats.own.texts = [digest(text) for text in texts]
         for publisher, text in zip(self._descriptions, texts, strict=True):
             publisher.publish(messages.text(text))
         compile_kernels()  # while others get ready for this scene
@@ -147,10 +147,10 @@ class Plant(PeerNode):
             self.loop.ask_again(time.monotonic())
 
     def _insist(self) -> list[str]:
-        """Fail if there is another plant; before the start, names of those that give no sign: they may be dead."""
+        """Fail if there is another plant; before the start, names of those that give no beat: they may be dead."""
         names = self.sources(JOINT_STATES)
         limit = time.monotonic() - self.patience
-        alive = any(not sign.ended and sign.heard >= limit for sign in self.beats.of(names))
+        alive = any(not beat.ended and beat.heard >= limit for beat in self.heartbeats.of(names))
         strange = self.living(JOINT_STATES) if len(names) > 1 else []
         if alive or (self.begun and len(strange) > 1):
             topic = self._states.topic_name
@@ -166,7 +166,7 @@ class Plant(PeerNode):
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
         self.words = f"waiting for {', '.join(missing)}" if missing else "waiting until all are connected"
         # Who has been here with another plant must have this scene before its first state.
-        told = (*self._descriptions, self.beats.publisher)
+        told = (*self._descriptions, self.heartbeats.publisher)
         known = all(publisher.get_subscription_count() >= len(self.readers(publisher))
                     and publisher.wait_for_all_acked(NO_TIME) for publisher in told)
         return not missing and known and self.linked(self._states, [*self.loop.topics, *monitor]) and all(
@@ -176,7 +176,7 @@ class Plant(PeerNode):
     def _start(self) -> None:
         self.phase, self.words = Phase.RUNNING, "running"
         self.begun, self.concern = True, ""
-        self.beats.tell()  # this plant vouches for its scene
+        self.heartbeats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
         self.take_priority(self._priority)
         self.publish_state()
@@ -220,8 +220,8 @@ class Plant(PeerNode):
         self._begin = time.monotonic()
         with suppress(OSError):
             self._bar.reset()
-        self.beats.own.turn = self.resets
-        self.beats.tell()  # with the stamp of the first state this one is otherwise a repetition
+        self.heartbeats.own.turn = self.resets
+        self.heartbeats.tell()  # with the stamp of the first state this one is otherwise a repetition
         self.publish_state()
 
     def finish(self) -> None:

@@ -63,7 +63,7 @@ class GraspNode(ParameterNode):
         self._ended = False
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
-        self.strangers = ""  # who publishes what somebody else does
+        self.other_sources = ""  # who publishes what somebody else does
         self.phase = Phase.WAITING
         # What it does or waits for: the message of its /diagnostics.
         self.words = f"waiting for peers {place(os.environ, self.get_namespace())}"
@@ -144,7 +144,7 @@ class GraspNode(ParameterNode):
         """Whether a node that publishes it listens to this publisher, for each source topic.
 
         Matching is asynchronous and messages sent before it are lost. Names come from discovery, which is earlier
-        than matching; so every discovered subscription must also have been matched. A stranger may publish unheard.
+        than matching; so every discovered subscription must also have been matched. Others may publish unheard.
         """
         readers = self.readers(publisher)
         listening = {(reader.node_namespace, reader.node_name) for reader in readers if reader.node_name != UNKNOWN}
@@ -196,10 +196,10 @@ class GraspNode(ParameterNode):
     def report(self) -> None:
         """Publish the counters."""
         lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
-        failed, doubtful = self.exit_code or self.trouble, lost or self.concern or self.strangers
+        failed, uncertain = self.exit_code or self.trouble, lost or self.concern or self.other_sources
         status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="grasp_ros")
-        status.level = status.ERROR if failed else status.WARN if doubtful else status.OK
-        status.message = "; ".join(words for words in (self.words, self.trouble, self.concern, self.strangers) if words)
+        status.level = status.ERROR if failed else status.WARN if uncertain else status.OK
+        status.message = "; ".join(filter(None, (self.words, self.trouble, self.concern, self.other_sources)))
         values = {"phase": self.phase.value, **self.counters}
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])

@@ -90,7 +90,7 @@ class Watch(GraspNode):
         services = ("pause", "resume", "step", "status")
         self._asks = {name: self.create_client(Trigger, f"plant/{name}") for name in services}
         self._asks["steps"] = self.create_client(SetParameters, "plant/set_parameters")
-        self._told: tuple[str, int] | None = None  # state and tick, as the plant says
+        self._reported: tuple[str, int] | None = None  # state and tick, as the plant says
         self._asked = -math.inf  # since when an answer is waited for
         self.wall_timer(STATUS_SECONDS, self._ask_status)
         self.wall_timer(FRAME_SECONDS, self._look)
@@ -134,16 +134,16 @@ class Watch(GraspNode):
             self._ask("status", self._on_status)
 
     def _on_status(self, answer: Any) -> None:
-        self._asked, self._told = -math.inf, None
+        self._asked, self._reported = -math.inf, None
         with suppress(*messages.UNREADABLE, TypeError, KeyError, OverflowError):  # of a plant that is none of ours
             found = json.loads(answer.message)
-            self._told = printable(str(found["state"])), int(found["tick"])
+            self._reported = printable(str(found["state"])), int(found["tick"])
 
     def _words_of_status(self) -> str:
         """Why nothing is seen yet: a paused plant publishes nothing."""
-        if self._told is None:
+        if self._reported is None:
             return self._waiting
-        state, tick = self._told
+        state, tick = self._reported
         hint = "; → steps it, Space lets it go on" if state == PAUSED and self._keys.there else ""
         return f"the plant is {state} at tick {tick}{hint}"
 
@@ -161,7 +161,7 @@ class Watch(GraspNode):
         else:
             self._live.update(Text(self._words_of_status()), refresh=True)
         if alone:
-            self._told = None
+            self._reported = None
         else:
             self._there = time.monotonic()
 
@@ -181,7 +181,7 @@ class Watch(GraspNode):
             laws = self._view.scene.system.laws
             commands = {side: inputs[body] for side, body in SIDES.items() if body in laws}
         level = named(_read(LYAPUNOV, found).position) if LYAPUNOV in found else {}
-        phase = self._told[0] if self._told else Phase.RUNNING.value
+        phase = self._reported[0] if self._reported else Phase.RUNNING.value
         pace = f"{self._rate:.0f} ticks/s" if phase == Phase.RUNNING.value else phase
         words = "the plant has ended" if alone else pace
         return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)

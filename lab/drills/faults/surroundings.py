@@ -44,8 +44,8 @@ def drills() -> list[Drill]:
         _own("remapped-input", NAMES, "a plant whose command topic has another name than its controller's", _remapped),
         Drill("remapped", NAMES, "all topics and /clock remapped, in all nodes alike", _all_remapped, _nothing),
         _own("power-cut", FILES, f"a power cut: the bag cut off at {CUTS} places", _power_cut),
-        _own("damaged-files", FILES, f"{FILE_COUNT} damaged scenes, results, bags and journals (`python -m lab doors`)",
-             _damaged),
+        _own("damaged-files", FILES,
+             f"{FILE_COUNT} damaged scenes, results, bags and journals (`python -m lab readers`)", _damaged),
     ]
 
 
@@ -195,8 +195,8 @@ def _power_cut(stage: Stage) -> Evidence:
 
 
 def _damaged(stage: Stage) -> Evidence:
-    words = [sys.executable, "-m", "lab", "doors", "--count", str(FILE_COUNT), "-o", str(stage.place / "doors")]
+    words = [sys.executable, "-m", "lab", "readers", "--count", str(FILE_COUNT), "-o", str(stage.place / "readers")]
     found = subprocess.run(words, capture_output=True, text=True, check=False, cwd=CHECKOUT)
     good = found.returncode == 0
     return Evidence(said="refused in a sentence, or read as what they are", went_on=good, nothing_to_keep=True,
-                    exits={"python -m lab doors": found.returncode}, wrong="" if good else found.stdout[-200:])
+                    exits={"python -m lab readers": found.returncode}, wrong="" if good else found.stdout[-200:])

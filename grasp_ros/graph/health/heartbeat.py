@@ -1,6 +1,8 @@
-"""Signs of life: every node of a graph tells the others every 0.4 s that its process runs, and when it ends.
+"""Heartbeats: every node of a graph tells the others every 0.4 s that its process runs, and when it ends.
 
 They come from a thread of their own: a node that computes for long is not silent, one that was stopped or killed is.
+Liveliness of DDS does not do: it says neither who is silent nor why somebody has ended, and a subscription that asks
+for a lease hears nobody who publishes with ROS's default quality of service, as nodes of a user do.
 """
 
 from __future__ import annotations
@@ -24,11 +26,11 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.scene.topics import ALIVE
 
-BEAT_SECONDS = 0.4
-GREET_SECONDS = 0.05  # between signs to newcomers, which would otherwise wait for the next one
+HEARTBEAT_SECONDS = 0.4
+GREET_SECONDS = 0.05  # between beats to newcomers, which would otherwise wait for the next one
 ACKNOWLEDGE_SECONDS = 0.2
-MISSED = 2.5  # signs, until somebody else may have taken the place
-MOST_SIGNS, MOST_BYTES = 64, 4096  # a stranger may send more; the oldest signs are forgotten
+MISSED = 2.5  # beats, until somebody else may have taken the place
+MOST_BEATS, MOST_BYTES = 64, 4096  # others may send more; the oldest beats are forgotten
 ENDED = "ended"  # last words of a node that has nothing to say
 FROZEN = {"T", "t"}  # states of processes in /proc that may go on
 IDLE = {*FROZEN, "Z", "X", ""}  # that do nothing, or are not there
@@ -41,7 +43,7 @@ def digest(text: str) -> str:
 
 
 @dataclass
-class Sign:
+class Heartbeat:
     """What is known of one process of a node."""
 
     node: str  # full name
@@ -51,7 +53,7 @@ class Sign:
     ended: str  # its last words; empty while it lives
     process: str  # its number and beginning, as the kernel has them
     ready: bool  # whether it has begun to look for others: before it may compile
-    heard: float = 0.0  # wall time of the last sign, s
+    heard: float = 0.0  # wall time of the last beat, s
 
     @property
     def state(self) -> str:
@@ -75,16 +77,16 @@ def _process(number: str) -> tuple[str, str]:
         return "", ""
 
 
-class Beats:
-    """The signs of a node, and those that it hears."""
+class Heartbeats:
+    """The beats of a node, and those that it hears."""
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
-        self._heard = heard  # called after each sign of another node
+        self._heard = heard  # called after each beat of another node
         process = _process(str(os.getpid()))[1]
-        self.own = Sign(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
-        self._signs: dict[str, Sign] = {}
-        self._told = 0.0  # wall time of the last own sign
-        self.prepared = 0.0  # that of the last sign of a node that is not ready
+        self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
+        self._beats: dict[str, Heartbeat] = {}
+        self._last = 0.0  # wall time of the last own beat
+        self.prepared = 0.0  # that of the last beat of a node that is not ready
         self.publisher = node.publisher(ALIVE)
         node.subscribe(ALIVE, self._on_beat)
         self._stop = threading.Event()
@@ -95,12 +97,12 @@ class Beats:
             thread.start()
 
     def _go_on(self, action: Callable[[], None]) -> None:
-        while not self._stop.wait(BEAT_SECONDS):
+        while not self._stop.wait(HEARTBEAT_SECONDS):
             with suppress(Exception):  # of a context that has just become invalid
                 action()
 
     def _beat(self) -> None:
-        own, self._told = self.own, time.monotonic()
+        own, self._last = self.own, time.monotonic()
         content = [own.node, own.identity, own.turn, own.texts, own.ended, own.process, own.ready]
         self.publisher.publish(messages.text(json.dumps(content)))
 
@@ -110,7 +112,7 @@ class Beats:
         self.publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
 
     def end(self, words: str) -> None:
-        """The last sign."""
+        """The last beat."""
         self._stop.set()
         for thread in self._threads:
             thread.join()
@@ -119,65 +121,65 @@ class Beats:
             self.tell()
 
     def _on_beat(self, message: Any) -> None:
-        sign = _parsed(message.data)
-        if sign is None or sign.identity == self.own.identity:
+        beat = _parsed(message.data)
+        if beat is None or beat.identity == self.own.identity:
             return
-        sign.heard = time.monotonic()
-        if not sign.ready:
-            self.prepared = sign.heard
-        if self._signs.pop(sign.identity, None) is None and sign.heard > self._told + GREET_SECONDS:
+        beat.heard = time.monotonic()
+        if not beat.ready:
+            self.prepared = beat.heard
+        if self._beats.pop(beat.identity, None) is None and beat.heard > self._last + GREET_SECONDS:
             self._beat()
-        self._signs[sign.identity] = sign
-        oldest = next(iter(self._signs.values()))
-        if len(self._signs) > MOST_SIGNS or oldest.heard < sign.heard - LEASE_SECONDS:
-            del self._signs[oldest.identity]
+        self._beats[beat.identity] = beat
+        oldest = next(iter(self._beats.values()))
+        if len(self._beats) > MOST_BEATS or oldest.heard < beat.heard - LEASE_SECONDS:
+            del self._beats[oldest.identity]
         self._heard()
 
-    def of(self, names: Sequence[str]) -> list[Sign]:
+    def of(self, names: Sequence[str]) -> list[Heartbeat]:
         """Signs of nodes, the last one last."""
-        return [sign for sign in self._signs.values() if sign.node in names]
+        return [beat for beat in self._beats.values() if beat.node in names]
 
     def quiet(self, names: Sequence[str], limit: float) -> list[str]:
-        """Those of some nodes that gave a sign once, but none since a wall time; not one after its last words."""
-        heard = {sign.node: sign.heard for sign in self.of(names) if not sign.ended}
+        """Those of some nodes that gave a beat once, but none since a wall time; not one after its last words."""
+        heard = {beat.node: beat.heard for beat in self.of(names) if not beat.ended}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
 
     def living(self, names: Sequence[str], limit: float) -> list[str]:
-        """Names of the sources of a topic without processes that gave a sign once, but none since a wall time.
+        """Names of the sources of a topic without processes that gave a beat once, but none since a wall time.
 
         DDS lists them for up to LEASE_SECONDS.
         """
         found = []
         for name, number in Counter(names).items():
-            dead = [sign for sign in self.of([name]) if sign.ended or sign.heard < limit]
+            dead = [beat for beat in self.of([name]) if beat.ended or beat.heard < limit]
             found += [name] * max(1, number - len(dead))
         return found
 
-    def vouched(self, name: str) -> Sign | None:
+    def vouched(self, name: str) -> Heartbeat | None:
         """Who says a text, by its digest; None if nobody does."""
-        return next((sign for sign in self._signs.values() if name in sign.texts and not sign.ended), None)
+        return next((beat for beat in self._beats.values() if name in beat.texts and not beat.ended), None)
 
     def frozen(self) -> list[str]:
         """Nodes of this machine that were stopped and may go on; asked from any thread."""
-        signs = list(self._signs.values())
-        return sorted({sign.node for sign in signs if not sign.ended and sign.state in FROZEN})
+        beats = list(self._beats.values())
+        return sorted({beat.node for beat in beats if not beat.ended and beat.state in FROZEN})
 
     def successor(self, identity: str) -> str:
-        """Name of the node in another process that has begun to say texts, while this one gives no sign; or nothing."""
-        limit = time.monotonic() - MISSED * BEAT_SECONDS
-        own = self._signs.get(identity)
+        """Name of the node in another process that has begun to say texts, while this one gives no beat; or nothing."""
+        limit = time.monotonic() - MISSED * HEARTBEAT_SECONDS
+        own = self._beats.get(identity)
         if own is not None and not own.ended and own.heard >= limit:
             return ""
-        others = (sign for sign in self._signs.values() if sign.identity != identity)
-        return next((sign.node for sign in others if sign.texts and not sign.ended and sign.heard >= limit), "")
+        others = (beat for beat in self._beats.values() if beat.identity != identity)
+        return next((beat.node for beat in others if beat.texts and not beat.ended and beat.heard >= limit), "")
 
     def speakers(self) -> bool:
         """Whether anybody is there who says texts."""
-        return any(sign.texts and not sign.ended for sign in self._signs.values())
+        return any(beat.texts and not beat.ended for beat in self._beats.values())
 
 
-def _parsed(text: str) -> Sign | None:
-    """A sign; None for anything else."""
+def _parsed(text: str) -> Heartbeat | None:
+    """A beat; None for anything else."""
     if len(text) > MOST_BYTES:
         return None
     try:
@@ -187,4 +189,4 @@ def _parsed(text: str) -> Sign | None:
     kinds = isinstance(texts, list) and isinstance(turn, int)
     if not kinds or not all(isinstance(word, str) for word in (node, identity, ended, process, *texts)):
         return None
-    return Sign(node, identity, turn, texts, ended, process, ready is True)
+    return Heartbeat(node, identity, turn, texts, ended, process, ready is True)

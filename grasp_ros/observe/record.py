@@ -131,7 +131,7 @@ def memory_of(plant: Plant, state: State) -> Memory:
 memory_at = reader(typeof(memory_of(*new_run()[3:])))
 
 
-class Sight(NamedTuple):
+class SegmentRecord(NamedTuple):
     """A segment, with the state at its begin and at its end."""
 
     kind: int  # `layout.Kind`
@@ -153,7 +153,7 @@ class Sight(NamedTuple):
 
 
 @inlined
-def sight_of(m: Memory, kind: int, t: float, s: float, degree: int) -> Sight:
+def segment_record(m: Memory, kind: int, t: float, s: float, degree: int) -> SegmentRecord:
     """The segment that has just ended."""
-    return Sight(kind, t, s, degree, m.c, m.size, m.seen[Seen.STATE :], m.y, m.mode, m.bodies, m.pairs, m.given, m.own,
-                 m.gains, m.rows, m.counts)
+    return SegmentRecord(kind, t, s, degree, m.c, m.size, m.seen[Seen.STATE :], m.y, m.mode, m.bodies, m.pairs, m.given,
+                         m.own, m.gains, m.rows, m.counts)

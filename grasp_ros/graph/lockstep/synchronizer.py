@@ -14,9 +14,9 @@ from grasp_ros.graph.rosbag2 import force_message
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
-DOUBT_SECONDS = 1.0  # without a new tick, after which a command is made from what a later state says
+UNCERTAIN_SECONDS = 1.0  # without a new tick, after which a command is made from what a later state says
 GIVE_UP_SECONDS = 4.0  # the same for a message that nothing stands for; DDS repeats what it lost after 3 s at most
-MOST_DOUBTFUL = 8  # different commands for one state
+MOST_UNCERTAIN = 8  # different commands for one state
 SIDES = {topic: side for side, topic in COMMANDS.items()}
 
 
@@ -43,7 +43,7 @@ class Tick(NamedTuple):
     restored: int = 0  # commands that were made from the force that acted
 
 
-class Ticks:
+class Synchronizer:
     """The messages of each topic by their stamps, and the states of the plant to go by.
 
     A topic has one source that sends in the order of the ticks, so the first message with the stamp of a state belongs
@@ -66,7 +66,7 @@ class Ticks:
         self._ahead_ns = PATIENCE_TICKS * period_ns
         self._states: deque[tuple[bool, State, bytes]] = deque()  # whether time went back; as read; as it came
         self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
-        self._doubtful: dict[Topic, dict[int, list[bytes]]] = {topic: {} for topic in topics}
+        self._uncertain: dict[Topic, dict[int, list[bytes]]] = {topic: {} for topic in topics}
         self._wait = delay + 1  # ticks until the effort has a command
         self._newest, self._newest_turn = -1, 0
         self._before = -1  # last state taken
@@ -109,17 +109,17 @@ class Ticks:
             same = topic.type != FORCE or messages.raw_force(known) == messages.raw_force(cdr)
             return Arrival.REPEATED if same else Arrival.CONTRADICTS
         if not sure:
-            return self._put_doubtful(topic, stamp, cdr)
+            return self._put_uncertain(topic, stamp, cdr)
         queue.pop(stamp, None)
         queue[stamp] = cdr
         if len(queue) > 2 * PATIENCE_TICKS:
             del queue[next(iter(queue))]
         return Arrival.TAKEN
 
-    def _put_doubtful(self, topic: Topic, stamp: int, cdr: bytes) -> Arrival:
-        queue = self._doubtful[topic]
+    def _put_uncertain(self, topic: Topic, stamp: int, cdr: bytes) -> Arrival:
+        queue = self._uncertain[topic]
         others = [known for known in queue.get(stamp, ()) if messages.raw_force(known) != messages.raw_force(cdr)]
-        queue[stamp] = [*others, cdr][-MOST_DOUBTFUL:]
+        queue[stamp] = [*others, cdr][-MOST_UNCERTAIN:]
         if len(queue) > 2 * PATIENCE_TICKS:
             del queue[next(iter(queue))]
         return Arrival.CONTRADICTS if others else Arrival.TAKEN
@@ -135,7 +135,7 @@ class Ticks:
         for topic, queue in self._others.items():
             other = queue.get(time_ns)
             if other is None and topic in SIDES:
-                other, made = self._decide(topic, time_ns, given_up or waited > DOUBT_SECONDS)
+                other, made = self._decide(topic, time_ns, given_up or waited > UNCERTAIN_SECONDS)
                 restored += made
             if other is not None:
                 found[topic] = other
@@ -148,7 +148,7 @@ class Ticks:
 
     def _decide(self, topic: Topic, time_ns: int, late: bool) -> tuple[bytes | None, bool]:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
-        there = self._doubtful[topic].get(time_ns, [])
+        there = self._uncertain[topic].get(time_ns, [])
         force = self._acted(SIDES[topic], time_ns)
         if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
             to_come = len(self._states) <= self._wait < WINDOW
@@ -174,7 +174,7 @@ class Ticks:
                 del queue[first]
                 dropped += 1
             del queue[time_ns]
-        if doubtful := self._doubtful[topic]:
-            for stamp in [stamp for stamp in doubtful if stamp <= time_ns]:
-                del doubtful[stamp]
+        if uncertain := self._uncertain[topic]:
+            for stamp in [stamp for stamp in uncertain if stamp <= time_ns]:
+                del uncertain[stamp]
         return dropped

@@ -17,7 +17,7 @@ from grasp_ros.physics.system import COLUMN, NAMES, System
 OWN = 4  # parameters of every law: tick, time, x and v
 
 
-class Sight(NamedTuple):
+class Observation(NamedTuple):
     """What can be seen of a state by the controller of one arm; its properties are what a law may ask for."""
 
     system: System
@@ -61,7 +61,7 @@ class Sight(NamedTuple):
         """Set-point of the feedback of the scene that the law replaces, m."""
         return self.laws[self.side].set_point
 
-    def seen(self, names: Sequence[str]) -> dict[str, float]:
+    def values(self, names: Sequence[str]) -> dict[str, float]:
         """What some names ask for."""
         return {name: getattr(self, name) for name in names}
 
@@ -73,8 +73,9 @@ class Sight(NamedTuple):
         return law.measured(self.tick, x, v) if law else (x, v)
 
 
-SEEN = tuple(name for name, value in vars(Sight).items() if isinstance(value, property) and not name.startswith("_"))
-CALLABLE = f"a callable of tick, time, x and v, and by name of any of {', '.join(SEEN)}"
+OBSERVABLES = tuple(name for name, value in vars(Observation).items()
+                    if isinstance(value, property) and not name.startswith("_"))
+CALLABLE = f"a callable of tick, time, x and v, and by name of any of {', '.join(OBSERVABLES)}"
 _OF_OBJECT, _OF_OTHER = ("x_object", "v_object", "impact", "impact_other"), ("x_other", "v_other", "impact_other")
 
 
@@ -84,7 +85,7 @@ def opposite(side: int) -> int:
 
 
 def asked(law: Callable[..., float]) -> tuple[str, ...]:
-    """What a law asks for beside its arm: names of `SEEN` among its parameters after the first four.
+    """What a law asks for beside its arm: names of `OBSERVABLES` among its parameters after the first four.
 
     Raises
     ------
@@ -95,7 +96,7 @@ def asked(law: Callable[..., float]) -> tuple[str, ...]:
         signature = inspect.signature(law)
     except ValueError:  # some built-in callables do not tell what they take
         return ()
-    names = tuple(name for name in [*signature.parameters][OWN:] if name in SEEN)
+    names = tuple(name for name in [*signature.parameters][OWN:] if name in OBSERVABLES)
     signature.bind(0, 0.0, 0.0, 0.0, **dict.fromkeys(names, 0.0))
     return names
 

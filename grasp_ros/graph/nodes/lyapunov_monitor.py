@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.graph.lockstep.ticks import Tick
+from grasp_ros.graph.lockstep.synchronizer import Tick
 from grasp_ros.graph.ros import messages
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
@@ -30,8 +30,8 @@ class Announcement(NamedTuple):
     cdr: bytes  # as it came
 
 
-class Judge:
-    """Knows the laws that were announced, and judges states and commands by them."""
+class LyapunovMonitor:
+    """V, the energy balance and the mode of each tick, by the laws that were announced."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -87,7 +87,7 @@ class Judge:
                 begun.append((side, announcement.cdr))
         return begun
 
-    def judge(self, ticks: Sequence[Tick]) -> list[list[float]]:
+    def evaluate(self, ticks: Sequence[Tick]) -> list[list[float]]:
         """What `lyapunov` publishes at some ticks in a row, see `topics.LYAPUNOV_NAMES`.
 
         The laws are the same for all of them. Many at once cost little more than one.

@@ -20,7 +20,7 @@ from grasp_ros.graph.verify import verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.sight import SEEN
+from grasp_ros.physics.observation import OBSERVABLES
 from grasp_ros.simulation import simulate
 
 pytestmark = pytest.mark.slow  # real processes
@@ -51,7 +51,7 @@ SETTINGS = [
 
 def test_the_page_lists_what_a_law_may_ask_for() -> None:
     text = PAGE.read_text(encoding="utf-8")
-    assert tuple(re.findall(r"^\| `(\w+)` \|", text, re.M)) == SEEN
+    assert tuple(re.findall(r"^\| `(\w+)` \|", text, re.M)) == OBSERVABLES
 
 
 def from_the_bag(recording: Recording, side: int, law: Any) -> list[float]:
@@ -66,7 +66,7 @@ def from_the_bag(recording: Recording, side: int, law: Any) -> list[float]:
             "v_other": measured[other + 1], "impact": impacts[side][row], "impact_other": impacts[far][row],
             "set_point": recording.scene.system.laws[side].set_point,
         }
-        assert given.keys() == set(SEEN)
+        assert given.keys() == set(OBSERVABLES)
         asked = type(law).__call__.__code__.co_varnames
         known = {name: float(value) for name, value in given.items() if name in asked}
         force = law(int(recording.tick[row]), float(recording.t[row]), *measured[column : column + 2], **known)
