@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -27,8 +28,9 @@ def test_derivatives_of_random_scenes_are_right_or_refused() -> None:
 def test_a_wrong_derivative_is_noticed(monkeypatch: pytest.MonkeyPatch, off: float) -> None:
     def wrong(*given: Any, **settings: Any) -> Any:
         found = sensitivities(*given, **settings)
-        found.state_rates[:, 2] *= 1.0 + off
-        return found
+        rates = found.state_rates.copy()
+        rates[:, 2] *= 1.0 + off
+        return replace(found, state_rates=rates)
 
     scene, key = scenes.load("case_01", ["time.duration_s=2.0"]), "left_contact.dissipation_s_per_m"
     assert judge(scene, key, 0.1).word == AGREES
