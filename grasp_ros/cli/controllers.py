@@ -47,13 +47,15 @@ def check_controllers(words: Sequence[str], seconds: float) -> None:
     reader, writer = os.pipe()
     if (child := os.fork()) == 0:
         try:
+            os.setpgid(0, 0)  # with what the module starts
             nothing = os.open(os.devnull, os.O_RDWR)
             for stream in range(3):
                 os.dup2(nothing, stream)
             os.write(writer, _refusal(words).encode())
         finally:
             os._exit(0)
-    os.setpgid(child, child)  # with what the module starts
+    with suppress(OSError):  # it has done so already
+        os.setpgid(child, child)
     os.close(writer)
     try:
         refusal = os.read(reader, MOST_BYTES).decode() if select.select([reader], [], [], seconds)[0] else ""

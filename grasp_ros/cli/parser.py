@@ -6,6 +6,7 @@ import argparse
 import re
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import Any, NoReturn
 
 Command = Callable[[argparse.Namespace], int]
@@ -42,7 +43,8 @@ class Parser(argparse.ArgumentParser):
         if file is sys.stdout:
             file.write(message)  # argparse keeps to itself that this failed
         else:
-            super()._print_message(message, file)
+            with suppress(OSError):  # Python does so from 3.11.5 on
+                super()._print_message(message, file)
 
     def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Arguments; what nobody knows is an error of the command, and not of `grasp`."""

@@ -21,7 +21,8 @@ from grasp_ros.graph.shared_memory import remove_left
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
 
-INTERRUPTED = 130  # as everywhere in `grasp`; the other nodes are ended by a signal as a rule
+INTERRUPTED = 130  # of a tool that a signal ends before it is through; nodes of a graph are meant to end by one
+
 
 def main(name: str, child: bool = False) -> int:
     """Run the node of that name; returns the exit status of the process.

@@ -243,8 +243,8 @@ class Recording(Tabular, Frozen):
         ticks = int(self.tick.max(initial=-1)) + 1
         held = () if self.running.lockstep else self.scene.controllers.values()
         every_tick = [topic.name for topic in self.scene.topics if topic not in held]
-        known = {NOT_RECORDED: number} if (number := int(self.lost.get(NOT_RECORDED, 0))) else {}
-        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard, **known}
+        left_out = {NOT_RECORDED: number} if (number := int(self.lost.get(NOT_RECORDED, 0))) else {}
+        return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard, **left_out}
 
 
 def acted_from(ticks: np.ndarray, effort: Array) -> Array:

@@ -8,11 +8,11 @@ from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from grasp_ros.graph.opening import Opened
+from grasp_ros.graph.opening import Opened, decoding_bag
 from grasp_ros.graph.recorder import Recorder
-from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
+from grasp_ros.graph.rosbag2 import BagError, decode
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
+from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, LYAPUNOV_NAMES, RUN, SCENE, Topic
 
 
 class Recovery(NamedTuple):
@@ -37,13 +37,10 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     if begin is None:
         raise BagError(f"{path}: nothing can be recovered: it holds no complete tick")
     recorder, written = Recorder(Path(new), scene, opened.versions, opened.names, opened.running), 0
-    form = lyapunov_template()
     try:
         for time_ns, tick, beside in chain([begin], ticks):
             tick[LYAPUNOV] = own = tick.pop(LYAPUNOV)  # the last one
-            if (found := form.read(own)) is None:
-                raise BagError(f"{path}: {LYAPUNOV.name}: not what a monitor writes")
-            if (stamp_ns := found[0] * NANOSECONDS + found[1]) > scene.ticks * scene.period_ns:
+            if (stamp_ns := _stamp_ns(path, own)) > scene.ticks * scene.period_ns:
                 continue
             recorder.write_tick(time_ns, tick.items(), stamp_ns)
             for topic, cdr in beside:
@@ -53,6 +50,15 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         places = "; ".join(f"{size} at {offset}: {why}" for offset, size, why in left_out)
         recorder.close({"recovered from": str(path), "bytes that were left out": places or "none"})
     return Recovery(written, left_out)
+
+
+def _stamp_ns(path: Path, cdr: bytes) -> int:
+    """Time in ns of what the monitor had computed, if it is that."""
+    with decoding_bag(path):
+        own = decode(LYAPUNOV, cdr)
+    if len(own.position) != len(LYAPUNOV_NAMES):
+        raise BagError(f"{path}: {LYAPUNOV.name}: {len(own.position)} numbers; allowed: {len(LYAPUNOV_NAMES)}")
+    return int(own.header.stamp.sec) * NANOSECONDS + int(own.header.stamp.nanosec)
 
 
 def _ticks(opened: Opened) -> Iterator[tuple[int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:

@@ -43,9 +43,8 @@ def end_late_by_force(name: str) -> None:
     writer.setblocking(False)
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)  # written to at once, whatever the process does
 
-    def watch() -> None:
-        with reader, writer:
-            reader.recv(1)
+    def watch() -> None:  # without end: what is closed would give its number to the next file, which Python writes to
+        while reader.recv(1) and writer:
             end_by_force(name)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()
@@ -56,7 +55,7 @@ def end_by_force(name: str, status: int = 1) -> None:
     def end() -> None:
         time.sleep(GRACE_SECONDS)
         with suppress(OSError):  # nobody may read it
-            print(f"{name}: has not ended {GRACE_SECONDS:g} s after it was to: ended by force", file=sys.stderr,
+            print(f"{name}: has not ended within {GRACE_SECONDS:g} s: ended by force", file=sys.stderr,
                   flush=True)
         os._exit(status)
 

@@ -53,9 +53,9 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     numbers = numbers_of(found.scene, free, found)
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)
-    if found.inputs is None and found.no_law:
-        raise Refused(f"{found.name}: {found.no_law}; allowed: inputs at every tick, and no free number of controllers"
-                      " or external forces")
+    if found.inputs is None and found.why_unknown:
+        raise Refused(f"{found.name}: {found.why_unknown}; allowed: inputs at every tick, and no free number of"
+                      " controllers or external forces")
     for key in against:
         if key not in free or key.startswith("offset."):
             raise Refused(f"--against {key}: allowed: a number of the scene that is free")

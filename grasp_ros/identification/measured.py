@@ -43,7 +43,7 @@ class Measured(NamedTuple):
     state: Array  # (n, 6) m and m/s; NaN: a channel that is not measured
     inputs: Array | None  # (n - 1, 3) N by body, from each sample to the next
     sampled: bool  # whether commands are held over control periods
-    no_law: str = ""  # why the controllers of the scene do not tell what acted; empty if they do
+    why_unknown: str = ""  # why the controllers of the scene do not tell what acted; empty if they do
 
     @property
     def acting(self) -> str:
@@ -94,19 +94,19 @@ def _of_recording(recording: Recording, by_sensors: bool) -> Measured:
     if not recording.whole:
         raise Refused(f"{name}: allowed: a bag of one run from its begin, with all of its ticks")
     others = [side for side, answers in answers_of(recording).items() if answers.differs]
-    no_law = "numbers were set while it ran" if recording.changes else (
+    why_unknown = "numbers were set while it ran" if recording.changes else (
         "commands came by the wall clock" if not recording.running.lockstep else (
             f"another law acted on the {' and the '.join(others)} arm" if others else ""))
     state = recording.measured if by_sensors else recording.state
-    return Measured(name, recording.scene, recording.t, state, recording.inputs[:-1], True, no_law)
+    return Measured(name, recording.scene, recording.t, state, recording.inputs[:-1], True, why_unknown)
 
 
 def _of_trajectory(run: Trajectory, name: str) -> Measured:
     ticks = tick_times(run.scene)[: len(run.t)]
     held = run.sampled and np.array_equal(run.t, ticks)
-    no_law = "other controllers acted" if run.controllers else ""
+    why_unknown = "other controllers acted" if run.controllers else ""
     inputs = run.inputs[: len(run.t) - 1] if held else None
-    return Measured(name, run.scene, run.t, run.state, inputs, run.sampled, no_law)
+    return Measured(name, run.scene, run.t, run.state, inputs, run.sampled, why_unknown)
 
 
 def _of_table(path: Path, scene: Scene) -> Measured:
@@ -138,7 +138,7 @@ def _columns(path: Path) -> Mapping[str, Array]:
         raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
     rows = []
     for number, line in enumerate(lines, 2):
-        if not line:  # at the end of a file, say
+        if not line:  # an empty one
             continue
         if len(line) != len(names):
             raise Refused(f"{path}: line {number}: {len(line)} entries; allowed: {len(names)}")

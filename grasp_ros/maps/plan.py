@@ -173,7 +173,7 @@ def check(plan: Plan) -> None:
         raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
     for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
         ascends = -math.inf < axis.low < axis.high < math.inf
-        if not ascends or axis.points > MOST or (axis.log and axis.low <= 0.0):
+        if not ascends or not 2 <= axis.points <= MOST or (axis.log and axis.low <= 0.0):
             raise Refused(f"{key}: {axis.low!r} to {axis.high!r}, {axis.points} values is not allowed; allowed: low <"
                           f" high, 2 to {MOST:,} values, and > 0 where logarithmic")
         parameter = parameter_of(plan.scene, key)

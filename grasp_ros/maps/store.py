@@ -53,7 +53,7 @@ class Store:
             try:
                 _create(path, plan, wanted, max(1, rows // self._lines))
             except Refused:
-                if not path.exists():  # otherwise somebody has begun the same, or another one, in these milliseconds
+                if not path.exists():  # otherwise another process has made it meanwhile
                     raise
         self._group = open_group(path, "r+")
         self._check(wanted)

@@ -34,20 +34,21 @@ def _values(record: Any) -> tuple[Any, ...]:
 
 
 def _same(one: Any, other: Any) -> bool:
-    """Whether two values are equal all through; NaN equals NaN in arrays."""
-    if isinstance(one, np.ndarray):
-        return one.dtype == getattr(other, "dtype", None) and np.array_equal(one, other, one.dtype.kind == "f")
+    """Whether two values are equal all through; NaN equals NaN."""
+    if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
+        alike = type(one) is type(other) and one.dtype == other.dtype
+        return alike and np.array_equal(one, other, one.dtype.kind == "f")
     if isinstance(one, Mapping):
         return isinstance(other, Mapping) and one.keys() == other.keys() and all(_same(one[k], other[k]) for k in one)
     if isinstance(one, tuple):
         return isinstance(other, tuple) and len(one) == len(other) and all(map(_same, one, other))
-    return bool(one == other)
+    return bool(one == other or (one != one and other != other))
 
 
 class Frozen:
     """Base of dataclasses with `frozen=True, eq=False` whose content is frozen as well.
 
-    They can be copied, pickled and hashed; equal are those whose fields are.
+    They can be copied, pickled and hashed; two are equal if all their fields are.
     """
 
     def __eq__(self, other: object) -> bool:
@@ -55,7 +56,7 @@ class Frozen:
         return type(other) is type(self) and all(map(_same, _values(self), _values(other)))
 
     def __hash__(self) -> int:
-        """By the texts among the fields."""
+        """By the texts among the fields: variants of a scene have one hash, and are told apart by their numbers."""
         return hash(tuple(text for text in _values(self) if isinstance(text, str)))
 
     def __post_init__(self) -> None:

@@ -30,6 +30,8 @@ def needing(what: str, extra: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
+        if str(error.name).startswith(__package__.partition(".")[0]):
+            raise
         raise Refused(f"{what} needs {error.name}; pip install '.[{extra}]' in the checkout") from None
 
 

@@ -160,9 +160,9 @@ class Scene(Frozen):
         """Time of a tick in s: an integer number of ns, rounded once."""
         return tick * self.period_ns / NANOSECONDS
 
-    def feedback_in_words(self, sampled: bool, others: bool = False) -> str:
-        """What acts on the arms: the paper's continuous feedback, or held commands; `others`: also of a user."""
-        if not (self.system.laws or others):
+    def feedback_in_words(self, sampled: bool, by_user: bool = False) -> str:
+        """What acts on the arms: the paper's continuous feedback, or held commands; `by_user`: also of a user."""
+        if not (self.system.laws or by_user):
             return "no controller"
         return f"each command held for {self.period_ns / 1e6:g} ms" if sampled else "continuous feedback"
 

@@ -63,7 +63,7 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
         for name in numbers:
             if name.startswith(replaced):
                 raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
-            if name not in live or tick not in range(scene.ticks + 1):
+            if name not in live or not (0 <= tick <= scene.ticks and tick == int(tick)):
                 raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
@@ -80,7 +80,7 @@ def drive_sampled(
     for ticks in _blocks(scene.ticks, changes):
         if plant.tick in changes:
             scene = scene.changed(changes[plant.tick])
-        # laws of the user measure and limit as the scene says
+        # a user's controller has the sensor and the actuator of the scene
         laws = {**{side: ControlLaw(0.0, 0.0) for side in by_user}, **scene.system.laws}
         outputs, interval = outputs_within(grid, ticks, scene.period_ns)
         record = plant.run(laws, outputs, by_user, states[done : done + len(interval)])

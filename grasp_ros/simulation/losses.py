@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import as_row
@@ -36,7 +36,8 @@ class Losses(NamedTuple):
 
 def power_lost(system: System, state: Array) -> Losses:
     """Rates of the losses in W at states (n, 6), under continuous feedback; half of (18), and what effects add."""
-    speed = np.nan_to_num(state[:, [COLUMN[body] + 1 for body in Body]])
+    speed = np.zeros((len(state), 3))
+    speed[:, system.present] = state[:, [COLUMN[body] + 1 for body in system.present]]
     damping, loop = system.bodies[:, Of.DAMPING], system.closed_loop[:, Of.DAMPING]
     arms, impacts = speed[:, :OBJECT] ** 2, np.zeros(len(state))
     for side, u, d in pairs_of(system, state):

@@ -31,9 +31,8 @@ UNLIMITED = 2**62  # budgets of a run that has been there before
 
 def reached(run: Trajectory) -> float:
     """Time in s up to which a run is known."""
-    if run.status is Status.DONE:
-        return run.scene.duration
-    return float(max([0.0, *run.t[-1:], *run.event_table[-1:, 0]]))
+    end = run.scene.duration if run.status is Status.DONE else 0.0
+    return float(max([end, *run.t[-1:], *run.event_table[-1:, 0]]))  # an event there may be a rounding behind the end
 
 
 def integrator_of(run: Trajectory) -> Integrator:

@@ -93,7 +93,7 @@ class Variants:
             uncertain |= ~self._parameters[name].holds(column)
         block = self.block()
         uncertain |= (block.closed_loop[:, : OBJECT, Of.STIFFNESS : Of.FORCE] < 0.0).any(axis=(1, 2))
-        with np.errstate(all="ignore"):  # a row uncertain may hold any number
+        with np.errstate(all="ignore"):  # an uncertain row may hold any number
             uncertain |= outside_rows(Systems(block.closed_loop, block.pairs, block.state[..., 0], self.scene.duration))
         return np.flatnonzero(uncertain)
 

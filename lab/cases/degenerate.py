@@ -1,4 +1,4 @@
-"""Scenes with the degenerate habits of users and of unit tests: zeros, equal numbers, states on a switch, limits.
+"""Degenerate scenes, as users and unit tests have them: zeros, equal numbers, states on a switch, limits.
 
 The title of a scene names the degeneracies that it was drawn with.
 """

@@ -67,11 +67,11 @@ def run(directory: Path, *, seed: int, first: int, count: int | None, seconds: f
         for number in tqdm(range(first, first + (count or 10**9)), unit="file", total=count):
             if time.monotonic() > end:
                 break
-            reader, answer, took = attempt(readers, Path(place), seed, number, directory)
-            answers[reader, answer] += 1
-            slowest[reader] = max(slowest[reader], took)
+            name, answer, took = attempt(readers, Path(place), seed, number, directory)
+            answers[name, answer] += 1
+            slowest[name] = max(slowest[name], took)
     for name, longest in slowest.items():
-        kinds = {answer: answers[name, answer] for reader, answer in sorted(answers) if reader == name}
+        kinds = {answer: answers[name, answer] for own, answer in sorted(answers) if own == name}
         words = ", ".join(f"{answer} {times}" for answer, times in kinds.items())
         print(f"{name:<8} {sum(kinds.values()):>7} files: {words}; slowest {longest:.2f} s")
     return sum(times for (_, answer), times in answers.items() if answer not in ("refused", "accepted"))

@@ -7,13 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.tolerances import REST
+from grasp_ros.exact.tolerances import REST, STILL
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Of, Work
 from grasp_ros.physics.model import Array, Contact, impact_force
 from grasp_ros.simulation import Trajectory
 from lab.oracles.segments import FIRST, INNER, Detail
 
+NEGLECT = STILL / 32.0  # of the fastest velocity: what a step may neglect of each, as 32 roundings of this
 STEP = 5.0  # time constants of what damps within a step in contact
 MANY = 100.0  # roundings that u' may be from -1/p while the force is that of a pair that glides there
 TINY = 1e-280  # against 0 / 0, and for what underflows
@@ -95,7 +96,8 @@ def sizes(detail: Detail) -> Sizes:
     gained = acting / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
     v = _before_decay(detail, np.abs(detail.v).max(axis=1), np.where(touching[:, None], taken, 0.0))[:, None]
     way = _with_way(detail, v + np.minimum(swing, gained))
-    v = way + EPS * largest_in_segment(detail, v.max(axis=2, keepdims=True))
+    beside = np.where(touching[:, None, None], NEGLECT, EPS)
+    v = way + beside * largest_in_segment(detail, v.max(axis=2, keepdims=True))
     x_rest, v_rest = _at_rest(detail)
     return Sizes(own + x_rest / EPS, v + v_rest / EPS)
 

@@ -177,7 +177,7 @@ def _enclosure(samples: list[Sample]) -> list[Equation]:
         bound = np.minimum(bound, allowed / epsilon)
         x_l, x_o, x_r = run.state[:, 0], run.state[:, 2], run.state[:, 4]
         margin = min(margin, float((x_o - x_l + allowed[LEFT]).min()), float((x_r + allowed[RIGHT] - x_o).min()))
-    function = "physics.lyapunov.largest_deformation"
+    function = "physics.lyapunov.largest_deformation, lab.paper.quadratic_form.deformation_bound"
     text = "smallest of (5 V_c(0) / 4H)^(2/5) over the largest deformation, less 1"
     return [
         Equation(

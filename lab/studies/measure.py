@@ -35,7 +35,7 @@ class Effort(NamedTuple):
     stride: int  # every how many settings of a ladder
 
 
-FULL = Effort(patience=0.7, deadline=10.0, budget=0.25, most=30, stride=1)
+FULL = Effort(patience=0.7, deadline=20.0, budget=0.25, most=30, stride=1)
 QUICK = Effort(patience=0.2, deadline=60.0, budget=0.02, most=3, stride=4)
 
 

@@ -20,8 +20,10 @@ from grasp_ros.accuracy.measure import Record, seconds
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.methods.registry import EXACT, check
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.simulation import simulate
 from lab.studies import measure, peer_heyoka
 from lab.studies.contenders import all_contenders, own_contenders
 from lab.studies.records import Journal
@@ -45,11 +47,12 @@ def run(scene: Scene, error: float, directory: Path) -> None:
     Raises
     ------
     Refused
-        If the error is not positive, or `paper`, and with it the outside peers, does not know the scene.
+        If the error is not positive, or the scene is one that `paper` or the outside peers do not know.
     """
     if not error > 0.0:
         raise Refused(f"--error {error!r} is not allowed; allowed: a number > 0")
     check("paper", scene, None)
+    _check_for_peers(scene)
     target = measure.truth(scene, Journal(directory))
     others = [contender for contender in all_contenders() if contender.name != EXACT]
     for words, grid in ((f"{len(target.grid)} output times", target.grid), ("the last state alone", target.grid[-1:])):
@@ -59,6 +62,14 @@ def run(scene: Scene, error: float, directory: Path) -> None:
         for record, median in timings:
             print(f"  {record.method:30}{record.knob + f' {record.setting:.0e}':17}{record.error:8.1e}"
                   f"{1e3 * median:11.3f} ms{median / own:8.2f}")
+
+
+def _check_for_peers(scene: Scene) -> None:
+    x_l, _, x_o, _, x_r, _ = scene.initial_state
+    if not x_l < x_o < x_r:
+        raise Refused(f"{scene.name}: starts in contact; allowed here: scenes that start with gaps on both sides")
+    if any(event.kind == Transition.CLAMP for event in simulate(scene).events):
+        raise Refused(f"{scene.name}: a pair separates faster than 1/p; allowed here: scenes where none does")
 
 
 def final_state(scene: Scene, target: Truth, error: float) -> list[Timing]:

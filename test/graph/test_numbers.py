@@ -50,11 +50,11 @@ def test_messages_of_another_make_have_the_same_numbers(tmp_path: Path, little: 
 @pytest.mark.parametrize("topic", [JOINT_STATES, LEFT_COMMAND, LYAPUNOV])
 def test_what_is_no_message_is_refused_wherever_it_stands(tmp_path: Path, topic: Topic) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    for number in range(4):
+    for number in range(5):
         recorder = Recorder(tmp_path / str(number), run.scene, {})
         for time_ns, messages in study.ticks_of(run):
             cdr = dict(messages)[topic]
-            wrong = [cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:]][number]
+            wrong = [cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:], cdr[:12] + b"\xff" + cdr[13:]][number]
             at = [(other, wrong if (other, time_ns) == (topic, 5_000_000) else found) for other, found in messages]
             recorder.write_tick(time_ns, at)
         recorder.close()

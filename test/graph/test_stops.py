@@ -139,8 +139,29 @@ def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signa
     assert process.stdout.readline() == "there\n"
     process.send_signal(number)
     _, err = process.communicate(timeout=DEADLINE)
-    assert err == "left_controller: has not ended 0.5 s after it was to: ended by force\n"
+    assert err == "left_controller: has not ended within 0.5 s: ended by force\n"
     assert process.returncode == 1
+
+
+def test_a_second_signal_writes_to_no_file(tmp_path: Path) -> None:
+    """Python writes the numbers of signals to a descriptor, which must stay ours after the first one."""
+    script = """
+import os, signal, sys, threading, time
+from grasp_ros.graph.stopping import end_late_by_force, note_signals
+received = []
+note_signals(received)
+end_late_by_force("node")
+signal.raise_signal(signal.SIGINT)
+last = time.monotonic() + 8.0
+while not any(thread.name == "end" for thread in threading.enumerate()) and time.monotonic() < last:
+    pass
+files = [open(f"{sys.argv[1]}/{number}", "wb") for number in range(8)]
+signal.raise_signal(signal.SIGINT)
+os._exit(len(received))
+"""
+    found = subprocess.run([sys.executable, "-c", script, tmp_path], timeout=DEADLINE, check=False, stderr=-1)
+    assert (found.returncode, found.stderr) == (2, b"")
+    assert [path.stat().st_size for path in tmp_path.iterdir()] == [0] * 8
 
 
 def test_a_thread_that_a_law_has_left_keeps_no_node() -> None:
@@ -149,7 +170,7 @@ def test_a_thread_that_a_law_has_left_keeps_no_node() -> None:
     command = [sys.executable, "-c", words, "plant", "--ros-args", "-p", "scene:=nowhere"]
     found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
     assert found.returncode == 2
-    assert found.stderr.endswith("plant: has not ended 0.5 s after it was to: ended by force\n")
+    assert found.stderr.endswith("plant: has not ended within 0.5 s: ended by force\n")
 
 
 def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> None:

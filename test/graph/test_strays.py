@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
 from processes import DEADLINE, START, wait_for
+from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
@@ -186,7 +187,10 @@ def test_whom_dds_does_not_connect_holds_nobody_up(launch: Any, tmp_path: Path, 
     for kind, topic, qos in ((String, LEFT_COMMAND, 1), (WrenchStamped, LEFT_CONTACT, hasty), (JointState, ALIVE, 1)):
         peer.create_publisher(kind, topic.name, qos)
     peer.create_publisher(JointState, JOINT_STATES.name, hasty)
-    peer.create_subscription(JointState, JOINT_STATES.name, print, latched)
+    often, lively = (QoSProfile(depth=1, **{name: Duration(seconds=9)})
+                     for name in ("deadline", "liveliness_lease_duration"))
+    for qos in (latched, often, lively):
+        peer.create_subscription(JointState, JOINT_STATES.name, print, qos)
     peer.create_subscription(JointState, SCENE.name, print, 1)
     words = ["arm_alone", "--set", "time.duration_s=1", "-o", "run", "--no-figure"]
     run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import struct
-
 import numpy as np
 import pytest
 from rclpy.serialization import deserialize_message
@@ -47,7 +45,7 @@ def test_forces_and_clocks_have_their_time_and_number() -> None:
 def test_a_wrong_number_of_numbers_is_refused() -> None:
     refused = {rosbag2.force_template(): 2, rosbag2.lyapunov_template(): 8, rosbag2.clock_template(): 1}
     for template, count in refused.items():
-        with pytest.raises(struct.error, match=r"expected . items for packing"):
+        with pytest.raises(ValueError, match="sequence of size"):
             template.fill(0, [1.0] * count)
     with pytest.raises(ValueError, match="subsection"):
         rosbag2.Template(lambda _: b"nothing of it", 1)

@@ -69,7 +69,7 @@ def test_a_reader_that_breaks_is_seen(place: Path, tmp_path: Path, monkeypatch: 
 def test_a_silent_acceptance_is_seen(
     all_readers: list[readers.Reader], place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Readers that leave out a check are found by the readers' own comparisons."""
+    """Readers that leave out a check are found by the study's comparisons."""
     right = Parameter.read
 
     def doubled(parameter: Parameter, value: Any) -> Any:

@@ -154,7 +154,7 @@ def test_what_says_that_it_is_frozen_is() -> None:
             mapping["mass_kg"] = 1.0  # type: ignore[index]
     for record in (CASE, run, table):
         for other in (pickle.loads(pickle.dumps(record)), copy.deepcopy(record), copy.copy(record)):
-            assert type(other) is type(record)
+            assert (other, hash(other)) == (record, hash(record))
     assert pickle.loads(pickle.dumps(run)).state.tobytes() == run.state.tobytes()
     assert copy.deepcopy(CASE) == CASE
 

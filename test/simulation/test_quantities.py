@@ -93,6 +93,7 @@ def test_forces_of_a_run_with_changes_are_its_own() -> None:
     assert summary(run)["largest_N"]["f_l"] == np.abs(run.command[:, 0]).max() > 50.0
     early = simulate(scene, sampled=True, changes={3000: stiff[100]}, grid=[0.0, 1.0, 2.0])
     until = simulate(scene.changed({"time.duration_s": 2.0}), sampled=True)
+    # The first by the trapezoidal rule, the second exactly.
     assert float(losses(early).dampers) == pytest.approx(float(losses(until).dampers), rel=1e-5)
 
 
@@ -127,6 +128,8 @@ def test_they_are_those_of_an_observed_run(name: str) -> None:
         np.testing.assert_array_equal(settled[COLUMN[body] // 2], observed[f"settling_time_{name}"][0])
     for cause in ("dampers", "friction", "impacts", *(() if run.sampled else ("feedback",))):
         assert float(getattr(lost, cause)) == pytest.approx(observed[f"lost_{cause}"][0], rel=1e-9, abs=1e-9)
+    if not run.sampled:  # from output to output, and from event to event
+        assert [sums[-1] for sums in running_losses(run)[1]] == pytest.approx([*map(float, lost)], rel=1e-9, abs=1e-9)
 
 
 def test_contacts_of_case_1() -> None:

@@ -27,10 +27,10 @@ from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.scene.topics import ALIVE
 
 HEARTBEAT_SECONDS = 0.4
-GREET_SECONDS = 0.05  # between beats to newcomers, which would otherwise wait for the next one
+GREET_SECONDS = 0.05  # from a heartbeat to one for a newcomer, which would otherwise wait for the next one
 ACKNOWLEDGE_SECONDS = 0.2
-MISSED = 2.5  # beats, until somebody else may have taken the place
-MOST_BEATS, MOST_BYTES = 64, 4096  # others may send more; the oldest beats are forgotten
+MISSED = 2.5  # heartbeats, until somebody else may have taken the place
+MOST_BEATS, MOST_BYTES = 64, 4096  # others may send more; the oldest are forgotten
 ENDED = "ended"  # last words of a node that has nothing to say
 FROZEN = {"T", "t"}  # states of processes in /proc that may go on
 IDLE = {*FROZEN, "Z", "X", ""}  # that do nothing, or are not there
@@ -53,7 +53,7 @@ class Heartbeat:
     ended: str  # its last words; empty while it lives
     process: str  # its number and beginning, as the kernel has them
     ready: bool  # whether it has begun to look for others: before it may compile
-    heard: float = 0.0  # wall time of the last beat, s
+    heard: float = 0.0  # wall time of the last one, s
 
     @property
     def state(self) -> str:
@@ -78,15 +78,15 @@ def _process(number: str) -> tuple[str, str]:
 
 
 class Heartbeats:
-    """The beats of a node, and those that it hears."""
+    """Those of a node, and those that it hears."""
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
-        self._heard = heard  # called after each beat of another node
+        self._heard = heard  # called after each one of another node
         process = _process(str(os.getpid()))[1]
         self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
         self._beats: dict[str, Heartbeat] = {}
-        self._last = 0.0  # wall time of the last own beat
-        self.prepared = 0.0  # that of the last beat of a node that is not ready
+        self._last = 0.0  # wall time of the last own one
+        self.prepared = 0.0  # that of the last one of a node that is not ready
         self.publisher = node.publisher(ALIVE)
         node.subscribe(ALIVE, self._on_beat)
         self._stop = threading.Event()
@@ -112,7 +112,7 @@ class Heartbeats:
         self.publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
 
     def end(self, words: str) -> None:
-        """The last beat."""
+        """The last one."""
         self._stop.set()
         for thread in self._threads:
             thread.join()
@@ -136,16 +136,16 @@ class Heartbeats:
         self._heard()
 
     def of(self, names: Sequence[str]) -> list[Heartbeat]:
-        """Signs of nodes, the last one last."""
+        """Those of some nodes, the last one last."""
         return [beat for beat in self._beats.values() if beat.node in names]
 
     def quiet(self, names: Sequence[str], limit: float) -> list[str]:
-        """Those of some nodes that gave a beat once, but none since a wall time; not one after its last words."""
+        """Those of some nodes that were heard once, but not since a wall time, without last words."""
         heard = {beat.node: beat.heard for beat in self.of(names) if not beat.ended}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
 
     def living(self, names: Sequence[str], limit: float) -> list[str]:
-        """Names of the sources of a topic without processes that gave a beat once, but none since a wall time.
+        """Names of the sources of a topic without processes that were heard once, but not since a wall time.
 
         DDS lists them for up to LEASE_SECONDS.
         """
@@ -165,7 +165,7 @@ class Heartbeats:
         return sorted({beat.node for beat in beats if not beat.ended and beat.state in FROZEN})
 
     def successor(self, identity: str) -> str:
-        """Name of the node in another process that has begun to say texts, while this one gives no beat; or nothing."""
+        """Name of the node in another process that has begun to say texts, while this one is silent; or nothing."""
         limit = time.monotonic() - MISSED * HEARTBEAT_SECONDS
         own = self._beats.get(identity)
         if own is not None and not own.ended and own.heard >= limit:
@@ -179,7 +179,7 @@ class Heartbeats:
 
 
 def _parsed(text: str) -> Heartbeat | None:
-    """A beat; None for anything else."""
+    """A heartbeat; None for anything else."""
     if len(text) > MOST_BYTES:
         return None
     try:

@@ -103,8 +103,8 @@ class PeerNode(GraspNode):
         several = [topic for topic in self.inputs
                    if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1]
         found = {topic.name: self.living(topic) for topic in several}
-        self.other_sources = "; ".join(f"{name} has the sources {' and '.join(names)}" for name, names in found.items()
-                                   if len(names) > 1)
+        self.other_sources = "; ".join(
+            f"{name} has the sources {' and '.join(names)}" for name, names in found.items() if len(names) > 1)
         if self.other_sources:
             self.count("second sources")
         super().report()
@@ -253,8 +253,8 @@ class PeerNode(GraspNode):
                 texts.remove(entry)
                 if beat is None and (self.heartbeats.speakers() or not self._is_plant(self.sources(topic))):
                     self.refuse("refused texts", topic)
-                elif (source := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
-                    self._taken[topic] = source
+                elif (known := (name, beat.identity if beat else "")) != self._taken.get(topic) or beat is None:
+                    self._taken[topic] = known
                     self._takers[topic](text)
 
     def _is_plant(self, names: list[str]) -> bool:

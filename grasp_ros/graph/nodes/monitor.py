@@ -124,8 +124,8 @@ class Monitor(PeerNode):
 
     def fail(self, reason: str) -> None:
         """End with a sentence that says how far the bag reaches."""
-        known = self._recorder is None or str(self._path) in reason  # by the recorder itself
-        ticks = "" if known else f"; the bag has {self.counters['ticks']} ticks"
+        said = self._recorder is None or str(self._path) in reason  # by the recorder itself
+        ticks = "" if said else f"; the bag has {self.counters['ticks']} ticks"
         super().fail(f"{reason}{ticks}")
 
     def _on_run(self, text: str) -> None:

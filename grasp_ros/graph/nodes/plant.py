@@ -147,7 +147,7 @@ class Plant(PeerNode):
             self.loop.ask_again(time.monotonic())
 
     def _insist(self) -> list[str]:
-        """Fail if there is another plant; before the start, names of those that give no beat: they may be dead."""
+        """Fail if there is another plant; before the start, names of those that are silent: they may be dead."""
         names = self.sources(JOINT_STATES)
         limit = time.monotonic() - self.patience
         alive = any(not beat.ended and beat.heard >= limit for beat in self.heartbeats.of(names))

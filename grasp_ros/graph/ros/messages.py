@@ -15,14 +15,15 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import WrenchStamped
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.duration import Duration, Infinite
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, LivelinessPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from grasp_ros.graph.rosbag2 import state_template
+from grasp_ros.graph.rosbag2 import Template, state_template
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import SCENE, Topic
@@ -40,6 +41,8 @@ _LENGTH, _NUMBER = struct.Struct("<I"), struct.Struct("<d")
 _HEAD = 4  # bytes of CDR before the content
 SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
+FOREVER = Infinite.nanoseconds
+AUTOMATIC = LivelinessPolicy.SYSTEM_DEFAULT, LivelinessPolicy.AUTOMATIC
 Command = tuple[int, float]  # time in ns of the state that it answers, force in N
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
 
@@ -74,8 +77,16 @@ def glance_qos(topic: Topic) -> QoSProfile:
 
 def connects(writer: QoSProfile, reader: QoSProfile) -> bool:
     """Whether DDS connects them; `rclpy.qos.qos_check_compatible` takes an infinite deadline for a finite one."""
-    # Of these enums the smaller ones promise more.
-    return writer.reliability <= reader.reliability and writer.durability <= reader.durability
+    # Of the first two enums the smaller ones promise more.
+    return (writer.reliability <= reader.reliability and writer.durability <= reader.durability
+            and reader.liveliness in (*AUTOMATIC, writer.liveliness)
+            and _within(writer.deadline, reader.deadline)
+            and _within(writer.liveliness_lease_duration, reader.liveliness_lease_duration))
+
+
+def _within(offered: Duration, asked: Duration) -> bool:
+    """Whether a time that a writer offers is no longer than the one that a reader asks for; 0 is for ever, too."""
+    return bool((offered.nanoseconds or FOREVER) <= (asked.nanoseconds or FOREVER))
 
 
 def to_time(time_ns: int) -> Time:
@@ -140,12 +151,12 @@ class State(NamedTuple):
 
 
 class StateReader:
-    """Reads serialized states; of those that differ from the last in time and numbers alone at a tenth of the cost."""
+    """Reads serialized states; those laid out as this package does it at a tenth of the cost."""
 
     def __init__(self, names: Collection[str]) -> None:
         self._needed = names  # of bodies that every state has
         self._name: tuple[str, ...] = ()
-        self._template = state_template(())
+        self._template: Template | None = None
 
     def read(self, cdr: bytes) -> State | None:
         """A state; None if a message is none: lists that differ in length, names that are missing or there twice, NaN.
@@ -155,7 +166,7 @@ class StateReader:
         RuntimeError, ValueError or struct.error, which is `UNREADABLE`
             If it cannot be decoded.
         """
-        if (found := self._template.read(cdr)) is not None:
+        if self._template is not None and (found := self._template.read(cdr)) is not None:
             n, numbers = len(self._name), found[2:]
             position, velocity, effort = numbers[:n], numbers[n : 2 * n], numbers[2 * n :]
             return State(raw_stamp_ns(cdr), self._name, position, velocity, effort) if _finite(numbers) else None
