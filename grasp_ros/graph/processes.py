@@ -224,7 +224,7 @@ class Graph:
         for process in self.processes.values():
             with suppress(subprocess.TimeoutExpired):
                 process.wait(max(0.0, deadline - time.monotonic()))
-            with suppress(ProcessLookupError):  # its session: what a law has started, too, with itself as the first
+            with suppress(ProcessLookupError):  # its whole session: what a law has started ends, too
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
         for held in filter(None, (self._lifeline, self._place)):
