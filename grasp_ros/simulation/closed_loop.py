@@ -20,6 +20,7 @@ from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import plain
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import check
@@ -60,10 +61,12 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
         raise Refused("changes: not allowed under continuous feedback; allowed: sampled=True")
     live, replaced = scene.live, tuple(f"{side}_feedback." for side in by_user)
     for tick, numbers in changes.items():
+        at = plain(tick)
+        is_tick = at is not None and 0 <= at <= scene.ticks and at == int(at)
         for name in numbers:
             if name.startswith(replaced):
                 raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
-            if name not in live or not (0 <= tick <= scene.ticks and tick == int(tick)):
+            if name not in live or not is_tick:
                 raise Refused(f"changes: {name} at tick {tick}; allowed: {', '.join(live)} at 0 to {scene.ticks}")
 
 
