@@ -14,7 +14,9 @@ import socket
 import sys
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 GRACE_SECONDS = 10.0  # to end cleanly after a signal, or after the process that started this one has ended
@@ -25,13 +27,15 @@ _parent: list[int] = []  # file descriptor of the way to the process that starte
 
 
 def note_signals(received: list[int]) -> None:
-    """From now on, only note the signals that end a process: an exception could leave something half done.
+    """From now on, only note the signals that end a process: an exception could leave something half done."""
+    on_signals(lambda number, _: received.append(number))
 
-    A SIGHUP that is ignored, as `nohup` does it, stays ignored.
-    """
+
+def on_signals(react: Callable[[int, Any], object]) -> None:
+    """React to the signals that end a process; a SIGHUP that is ignored, as `nohup` does it, stays ignored."""
     for number in STOP_SIGNALS:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, lambda which, _: received.append(which))
+            signal.signal(number, react)
 
 
 def end_late_by_force(name: str) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, V, X
 from grasp_ros.scene.scene import Scene
 
-POSITION_GAIN, VELOCITY_GAIN, SET_POINT, FEED_FORWARD = range(4)
 Place = tuple[str, int, int]  # array of a system, row, column
 _ARM = {"mass_kg": Of.MASS, "stiffness_N_per_m": Of.STIFFNESS, "damping_Ns_per_m": Of.DAMPING}
 _PAIR = {"hertz_N_per_m1_5": Law.HERTZIAN, "dissipation_s_per_m": Law.DISSIPATION}
-_GAIN = {"position_gain_N_per_m": POSITION_GAIN, "velocity_gain_Ns_per_m": VELOCITY_GAIN, "set_point_m": SET_POINT,
-         "feed_forward_N": FEED_FORWARD}
+_GAIN = {"position_gain_N_per_m": Column.POSITION_GAIN, "velocity_gain_Ns_per_m": Column.VELOCITY_GAIN,
+         "set_point_m": Column.SET_POINT, "feed_forward_N": Column.FEED_FORWARD}
 PLACES: dict[str, Place] = {
     f"{section}.{key}": place
     for side, name in ((LEFT, "left"), (RIGHT, "right"))

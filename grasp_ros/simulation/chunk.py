@@ -18,13 +18,13 @@ from grasp_ros.observe.ensemble import Limits, Rows, integrate_rows
 from grasp_ros.observe.observer import settle, watch
 from grasp_ros.observe.record import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
 from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.places import SET_POINT
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
@@ -132,7 +132,7 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
     """Integrate rows in one call; returns those that are left to `_run`, because they do not just reach the end."""
     block, n = variants.block(), len(which)
     loop, own, gains, pairs, coulomb, state = map(np.ascontiguousarray, (
-        block.closed_loop[which], block.bodies[which], block.laws[which][..., :SET_POINT], block.pairs[which],
+        block.closed_loop[which], block.bodies[which], block.laws[which][..., : Column.SET_POINT], block.pairs[which],
         block.coulomb[which, 0, 0], block.state[which, :, 0]))
     rows = Rows(loop, own, gains, pairs, coulomb, state, np.full((n, SEEN), np.nan), np.zeros((n, TOUCHES)),
                 np.full(n, LEFT_OUT))

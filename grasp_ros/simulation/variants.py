@@ -17,13 +17,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_ros.physics import given
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import Systems, outside_rows
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.places import FEED_FORWARD, PLACES, POSITION_GAIN, SET_POINT, VELOCITY_GAIN, place_of
+from grasp_ros.scene.places import PLACES, place_of
 
 
 @dataclass
@@ -40,10 +41,10 @@ class Block:
     def closed_loop(self) -> Array:
         """`bodies` with the continuous feedback in them, as `System.closed_loop` has it."""
         bodies = self.bodies.copy()
-        gains, offset = self.laws[..., :SET_POINT], self.laws[..., SET_POINT]
-        bodies[:, : OBJECT, Of.STIFFNESS] += gains[..., POSITION_GAIN]
-        bodies[:, : OBJECT, Of.DAMPING] += gains[..., VELOCITY_GAIN]
-        bodies[:, : OBJECT, Of.FORCE] += gains[..., POSITION_GAIN] * offset + self.laws[..., FEED_FORWARD]
+        gains, offset = self.laws[..., : Column.SET_POINT], self.laws[..., Column.SET_POINT]
+        bodies[:, : OBJECT, Of.STIFFNESS] += gains[..., Column.POSITION_GAIN]
+        bodies[:, : OBJECT, Of.DAMPING] += gains[..., Column.VELOCITY_GAIN]
+        bodies[:, : OBJECT, Of.FORCE] += gains[..., Column.POSITION_GAIN] * offset + self.laws[..., Column.FEED_FORWARD]
         return bodies
 
 

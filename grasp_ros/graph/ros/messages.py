@@ -169,7 +169,8 @@ class StateReader:
         if self._template is not None and (found := self._template.read(cdr)) is not None:
             n, numbers = len(self._name), found[2:]
             position, velocity, effort = numbers[:n], numbers[n : 2 * n], numbers[2 * n :]
-            return State(raw_stamp_ns(cdr), self._name, position, velocity, effort) if _finite(numbers) else None
+            time_ns = found[0] * NANOSECONDS + found[1]
+            return State(time_ns, self._name, position, velocity, effort) if _finite(numbers) else None
         message = deserialize_message(cdr, JointState)
         lists = tuple(message.position), tuple(message.velocity), tuple(message.effort)
         name = tuple(message.name)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
 import time
 from array import array
@@ -23,7 +22,7 @@ from std_srvs.srv import Trigger
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
-from grasp_ros.graph.stopping import STOP_SIGNALS, note_signals
+from grasp_ros.graph.stopping import note_signals, on_signals
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.suggestion import allowed
@@ -78,9 +77,7 @@ class Remote(GraspNode):
             self._received.append(number)
             raise Stopped
 
-        for number in STOP_SIGNALS:
-            if signal.getsignal(number) is not signal.SIG_IGN:
-                signal.signal(number, stop)
+        on_signals(stop)
         try:
             return "" if self._received else sys.stdin.readline()
         finally:
