@@ -18,10 +18,8 @@ from typing import Any
 from grasp_ros.graph.host import check_reach, this_host
 from grasp_ros.graph.parameters import NODES, PARAMETERS, TOOLS, usage
 from grasp_ros.graph.shared_memory import remove_left
-from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, end_late_by_force, end_with_parent, note_signals
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_late_by_force, end_with_parent, note_signals
 from grasp_ros.physics.errors import Refused
-
-INTERRUPTED = 130  # of a tool that a signal ends before it is through; nodes of a graph are meant to end by one
 
 
 def main(name: str, child: bool = False) -> int:
@@ -59,11 +57,6 @@ def main(name: str, child: bool = False) -> int:
     names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
     makes = {each: _maker(each) for each in names}
     status: int = import_module("grasp_ros.graph.ros.executor").run(makes, received)
-    for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
-        signal.signal(number, signal.SIG_IGN)
-    if received and name in TOOLS:
-        status = status or INTERRUPTED
-    end_by_force(name, status)  # a thread that a law has left would keep the interpreter
     return status
 
 

@@ -112,6 +112,7 @@ def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_d
         result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
         assert result.reason == f"{gain}: another controller acts in place of this feedback"
         assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
-        controller.end()
+        controller.close()
+        controller.destroy_node()
     finally:
         context.shutdown()

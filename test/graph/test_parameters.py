@@ -47,8 +47,10 @@ def loop() -> Iterator[tuple[Plant, Controller, SingleThreadedExecutor]]:
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or plant.tick > 10, "some ticks")
     yield plant, controller, executor
     executor.shutdown()
-    plant.end()
-    controller.end()
+    plant.close()
+    plant.destroy_node()
+    controller.close()
+    controller.destroy_node()
     context.shutdown()
 
 
@@ -105,7 +107,8 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: 
         loop.spin_once(timeout_sec=0.1)
     wait_for(lambda: [executor.spin_once(timeout_sec=0.001) for executor in (loop, behind)] and monitor.finished, "end")
     for node in (plant, controller, monitor):
-        node.end()
+        node.close()
+        node.destroy_node()
     context.shutdown()
     recording = bag.read(tmp_path / "bag")
     assert len(recording.changes) > 400

@@ -143,6 +143,26 @@ def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signa
     assert process.returncode == 1
 
 
+HANGING_END = """
+import sys, threading
+import rclpy
+from grasp_ros.graph import __main__ as start, stopping
+stopping.GRACE_SECONDS = 0.5
+rclpy.try_shutdown = threading.Event().wait
+sys.exit(start.main("plant"))
+"""
+
+
+@pytest.mark.parametrize(("name", "status"), [("none", 2), ("case_01", 0)])
+def test_a_finished_node_keeps_its_status_where_dds_does_not_end(launch: Any, name: str, status: int) -> None:
+    numbers = {"scene": name, "free_running": "true", "real_time_factor": "10.0", "time.duration_s": "0.1"}
+    words = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
+    process = launch(sys.executable, "-c", HANGING_END, "--ros-args", *words, stderr=subprocess.PIPE)
+    _, err = process.communicate(timeout=DEADLINE)
+    assert err.endswith("plant: has not ended within 0.5 s: ended by force\n"), err
+    assert process.returncode == status
+
+
 def test_a_second_signal_writes_to_no_file(tmp_path: Path) -> None:
     """Python writes the numbers of signals to a descriptor, which must stay ours after the first one."""
     script = """

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -278,9 +277,12 @@ class Monitor(PeerNode):
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
-            with suppress(*[BagError] if self.exit_code else []):  # it has been said
+            try:
                 self._complete()
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
+            except BagError as error:
+                if not self.exit_code:  # otherwise it has been said
+                    self.fail(str(error))
         if self.finished:
             self.flush(self._output)

@@ -13,37 +13,57 @@ import rclpy
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
+from grasp_ros.graph.parameters import TOOLS
 from grasp_ros.graph.ros.node import GraspNode
-from grasp_ros.graph.stopping import tell_parent
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, tell_parent
 from grasp_ros.physics.errors import Refused, place_of
 
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
 # A spin without a time limit burns a core and can hang; one until a future is complete, which does not return between
 # messages, takes less time, and has corrupted the heap of a process.
 POLL_SECONDS = 0.2
+INTERRUPTED = 130  # of a tool that a signal ends before it is through; nodes of a graph are meant to end by one
 
 
 def run(makes: Mapping[str, Callable[[], GraspNode]], received: list[int]) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
 
-    0 after a finished run or a signal, 2 if a node refuses its parameters, otherwise the first status of a node that is
-    not 0. The signal handlers are ours, see `start`: those of rclpy invalidate the context under a callback, which then
-    raises.
+    0 after a finished run or a signal, which interrupts a tool (130); 2 if a node refuses its parameters, otherwise the
+    first status of a node that is not 0. The signal handlers are ours, see `start`: those of rclpy invalidate the
+    context under a callback, which then raises.
     """
     nodes: list[GraspNode] = []
+    status = _live(makes, nodes, received)
+    if received and not status and TOOLS.keys() & makes.keys():
+        status = INTERRUPTED
+    for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
+        signal.signal(number, signal.SIG_IGN)
+    end_by_force(", ".join(makes), status)  # the end of DDS can hang, and a thread of a law keeps the interpreter
+    for node in nodes:
+        node.destroy_node()
+    rclpy.try_shutdown()
+    return status
+
+
+def _live(makes: Mapping[str, Callable[[], GraspNode]], nodes: list[GraspNode], received: list[int]) -> int:
+    """Make the nodes and run them until there is nothing left to do; returns the exit status."""
     names = together = ", ".join(makes)
     try:
         try:
             rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
         except RuntimeError as error:  # the base of what rcl raises
             raise Refused(f"--ros-args: {' '.join(str(error).split())}") from None
-        for names, make in makes.items():  # noqa: B007 - which one is refused
-            nodes.append(make())
-        names = together
-        gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
-        gc.enable()
-        if not nodes[0].work(received):
-            _spin(nodes, received, names)
+        try:
+            for names, make in makes.items():  # noqa: B007 - which one is refused
+                nodes.append(make())
+            names = together
+            gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
+            gc.enable()
+            if not nodes[0].work(received):
+                _spin(nodes, received, names)
+        finally:
+            for node in nodes:
+                node.close()
     except Refused as error:
         tell_parent(names, str(error))
         with suppress(OSError):  # nobody reads it
@@ -55,14 +75,10 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: list[int]) -> in
         with suppress(OSError):
             print(f"{names}: {words}", file=sys.stderr)
         return 1
-    finally:
-        for node in nodes:
-            node.end()
-        rclpy.try_shutdown()
     return next((node.exit_code for node in nodes if node.exit_code), 0)
 
 
-def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:
+def _spin(nodes: Sequence[GraspNode], received: list[int], names: str) -> None:
     """Run nodes in this thread until plant and monitor, or whatever there is, have finished, or a signal has come.
 
     Controllers go on for the next plant and end when nothing else is left.

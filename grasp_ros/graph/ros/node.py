@@ -60,7 +60,6 @@ class GraspNode(ParameterNode):
         self.counters: dict[str, int | float | str] = {}  # the values of its /diagnostics
         self.inputs: list[Topic] = []  # what it subscribes to
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
-        self._ended = False
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
         self.other_sources = ""  # who publishes what somebody else does
@@ -245,13 +244,6 @@ class GraspNode(ParameterNode):
     def behind(self) -> object:
         """What changes while it takes what had arrived before a signal; None: nothing that must be taken."""
         return None
-
-    def end(self) -> None:
-        """Close and destroy, once."""
-        if not self._ended:
-            self._ended = True
-            self.close()
-            self.destroy_node()
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
