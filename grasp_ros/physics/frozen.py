@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+UNCHANGEABLE = frozenset({bool, int, float, str, type(None)})
+
 
 def frozen(value: Any) -> Any:
     """The same value, read-only: arrays as a view, mappings as a copy."""
@@ -62,7 +64,7 @@ class Frozen:
     def __post_init__(self) -> None:
         """Freeze all fields."""
         own = vars(self)
-        own.update({name: frozen(value) for name, value in own.items()})
+        own.update({name: frozen(value) for name, value in own.items() if type(value) not in UNCHANGEABLE})
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
         """A new record of the same fields."""

@@ -127,6 +127,8 @@ def forces(name: str, values: Any) -> NDArray[np.float64]:
 
 def _array(name: str, values: Any) -> NDArray[Any]:
     """What numpy makes of it."""
+    if type(values) is np.ndarray and values.dtype.kind == "f":  # most are: what follows costs a short run its time
+        return values
     try:
         array = np.asarray(list(values) if isinstance(values, Iterator) else values)
     except (TypeError, ValueError) as error:
