@@ -15,19 +15,13 @@ import math
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
-from grasp_ros.exact.kinematics import approach, surface_factor
-from grasp_ros.exact.numerics.roots import value_and_rate
+from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
+from grasp_ros.exact.numerics.roots import shift, value_and_rate
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
-from grasp_ros.sensitivity.contact import (
-    exact_length,
-    expand_tangents,
-    shift,
-    step_tangents,
-    variable_at,
-)
+from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, variable_at
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import (
@@ -63,11 +57,11 @@ def scale_object(moved: Array, factor: float) -> None:
 
 
 @kernel
-def turning_ratio(motion: Motion, old: Array) -> float:
-    """Acceleration of an object after it turns, by that before, with its row (4,) before; nan: it had none."""
+def turning_ratio(motion: Motion, old: float) -> float:
+    """Acceleration of an object after it turns, by that before, under its constant force before; nan: it had none."""
     push, new = impact_now(motion, LEFT) - impact_now(motion, RIGHT), motion.bodies[OBJECT]
     push -= new[Of.STIFFNESS] * motion.before[X.O] + new[Of.DAMPING] * motion.before[V.O]
-    first = push + old[Of.FORCE]
+    first = push + old
     return (push + new[Of.FORCE]) / first if first != 0.0 else math.nan
 
 
@@ -81,7 +75,7 @@ def pass_friction(motion: Motion, moved: Array, outputs: Outputs) -> None:
     if now == Slide.STUCK:
         factor = 0.0
     elif before == Slide.RIGHTWARD or before == Slide.LEFTWARD:
-        factor = turning_ratio(motion, outputs.numbers[Number.OBJECT :])
+        factor = turning_ratio(motion, outputs.numbers[Number.FORCE])
     elif before == UNSEEN and motion.before[V.O] == 0.0:
         for j in range(moved.shape[1]):
             if moved[V.O, j] != 0.0:
@@ -93,25 +87,17 @@ def pass_friction(motion: Motion, moved: Array, outputs: Outputs) -> None:
 
 
 @kernel
-def acceleration(motion: Motion, body: Body) -> float:
-    """Acceleration of a body at the begin of a segment, m/s^2; of an arm that is not pushed."""
-    row, v = motion.bodies[body], velocity_lane(body)
-    push = row[Of.FORCE] - row[Of.STIFFNESS] * motion.before[v - 1] - row[Of.DAMPING] * motion.before[v]
-    if body == OBJECT:
-        push += impact_now(motion, LEFT) - impact_now(motion, RIGHT)
-    return push / row[Of.MASS]
-
-
-@kernel
 def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
     """Note a run that begins with a pair at u' = -1/p which nothing moves off: a change to one side has a force."""
+    row, y = motion.bodies[OBJECT], motion.before
+    pushed = (impact_now(motion, LEFT) - impact_now(motion, RIGHT)) / row[Of.MASS]
     for side in (LEFT, RIGHT):
-        loss, d = motion.pairs[side, Law.DISSIPATION], approach(motion.before, side)
-        if motion.before[U.L + side] <= 0.0 or surface_factor(motion.pairs, motion.before, side, SURFACE) != 0.0:
+        loss, d, arm = motion.pairs[side, Law.DISSIPATION], approach(y, side), velocity_lane(side)
+        x, v, sign = arm_of(y, side)
+        if y[U.L + side] <= 0.0 or surface_factor(motion.pairs, y, side, SURFACE) != 0.0:
             continue
-        if acceleration(motion, side) != acceleration(motion, OBJECT):
+        if own_acceleration(motion.bodies[side], x, v) != own_acceleration(row, y[X.O], y[V.O]) + pushed:
             continue
-        sign, arm = 1.0 if side == LEFT else -1.0, velocity_lane(side)
         for j in range(rates.x.shape[1]):
             faster = sign * (rates.x[arm, j] - rates.x[V.O, j])
             if rates.law[side, Law.DISSIPATION, j] * d + loss * faster != 0.0:
@@ -218,8 +204,6 @@ def pass_flight(t: Tangents, begin: float, span: float) -> None:
 def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
     """Move the tangents over a Taylor step, in parts where their series end later than those of the run."""
     motion, rates, left = t.motion, t.rates, s
-    for place in range(LANES * (n + 1)):
-        motion.c[place] = t.source[place]
     while True:
         expand_tangents(motion, rates, t.table, n)
         part = exact_length(motion, t.table, n, left)
@@ -237,7 +221,8 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         copy_matrix(rates.at, rates.x)  # what flies stays at the begin
         step_tangents(motion, rates, t.table, n, part)
         copy_matrix(rates.x, rates.at)
-        shift(motion.c, n, part)
+        for lane in range(LANES):
+            shift(motion.c[lane::LANES], n, part)
         left -= part
 
 
@@ -261,8 +246,7 @@ def pass_segment(t: Tangents, kind: int, begin: float, span: float, s: float, n:
 def remember(t: Tangents) -> None:
     """Keep what the next segment begins with."""
     t.outputs.counts[Count.SLIDE] = t.motion.mode[OBJECT]
-    for column in range(4):
-        t.outputs.numbers[Number.OBJECT + column] = t.motion.bodies[OBJECT, column]
+    t.outputs.numbers[Number.FORCE] = t.motion.bodies[OBJECT, Of.FORCE]
     for place in range(t.motion.y.shape[0]):
         t.motion.before[place] = t.motion.y[place]
 
@@ -276,8 +260,6 @@ def propagate(address: int, kind: int, span: float, s: float, degree: int) -> in
     t = tangents_at(address)
     clock, ends = t.motion.clock, kind == FINISH
     begin = span if ends else (clock[0] + clock[1] - span) + clock[2]
-    if not math.isfinite(span):
-        return 0
     if not ends:
         if t.outputs.counts[Count.SLIDE] == UNSEEN:
             check_glide(t.motion, t.rates, t.outputs)

@@ -58,8 +58,8 @@ class Carrier:
 
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""
-        if tables.c is not self._tangents.source:  # a run in many pieces brings the same ones
-            self._tangents = self._tangents._replace(source=tables.c)
+        if tables.c is not self._tangents.motion.c:  # a run in many pieces brings the same ones
+            self._tangents = self._tangents._replace(motion=self._tangents.motion._replace(c=tables.c))
             self._block = block_of(self._tangents)
         return np.array([address_of(propagate), self._block.ctypes.data])
 

@@ -73,16 +73,13 @@ class Number(IntEnum):
     TIME = 0  # up to which the tangents are known, s
     PERIOD = 1  # control period, s
     CORNER = 2  # first time at which one-sided derivatives differ, s; inf: none
-    OBJECT = 3  # row (4,) of the object in the last segment
-
-
-NUMBERS = Number.OBJECT + 4
+    FORCE = 3  # constant force on the object in the last segment, its friction in it, N
 
 
 class Motion(NamedTuple):
     """The segment that the run has just made."""
 
-    c: Array  # (LANES TERMS,) a copy of its Taylor table
+    c: Array  # its Taylor table: the run has done with it
     y: Array  # (8,) state at its end
     mode: Integers  # (3,)
     clock: Array  # (3,)
@@ -143,7 +140,6 @@ class Tangents(NamedTuple):
     inputs: Inputs
     outputs: Outputs
     matrices: Array  # (5, 6, 6) scratch
-    source: Array  # (LANES TERMS,) the Taylor table of the run
 
 
 def zeros(*shape: int) -> Array:
@@ -165,16 +161,16 @@ def _padded(array: Array) -> Array:
 def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) -> Tangents:
     """The tangents of a run that begins, without held commands, for output times (m,) in s."""
     n, m, x = changes.state.shape[1], len(grid), _padded(changes.state)
-    wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(NUMBERS)
+    wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(len(Number))
     counts[Count.TICK], counts[Count.SLIDE], numbers[Number.CORNER] = -1, UNSEEN, math.inf
-    motion = Motion(zeros(LANES * TERMS), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
+    motion = Motion(np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
     rates = Rates(x, zeros(STATES, wide), zeros(3, 4, wide), _padded(changes.pairs))
     table = Table(zeros(wide // HALF * BLOCK), np.zeros((ROWS, TERMS)), zeros(5 * WEIGHTS), zeros(2, ROOM),
                   zeros(3, ROOM), zeros(wide // HALF * SUMS))
     inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
                     np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
     outputs = Outputs(counts, numbers, grid, np.zeros((m, STATES, n)), np.zeros((m, 3, 1 + n)))
-    return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)), motion.c)
+    return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)))
 
 
 tangents_at = reader(typeof(tangents_of(*new_run()[3:], no_directions(1), np.zeros(0))))
