@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,8 +17,11 @@ from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import format_of, needing
-from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup
+from grasp_ros.simulation.chunk import HORIZONS, SETTLED, STATUSES, Setup, compute
 from grasp_ros.simulation.outcomes import GROUPS, find
+
+if TYPE_CHECKING:
+    from grasp_ros.maps.plan import Plan
 
 RANGE = "KEY[+KEY]=low:high[:n[:log]]"
 
@@ -81,6 +85,8 @@ def _run(options: argparse.Namespace) -> int:
     data = store.read(options.output)
     found = data_of(data)
     show(options, report(found), found)
+    for why in reasons(data, plan):
+        note(why)
     done = data["status"].values == DONE
     for outcome in find(outcomes):
         if outcome.wanted & Wanted.SETTLING and np.isnan(data[outcome.name].values[done]).any():
@@ -114,6 +120,14 @@ def data_of(data: Any) -> dict[str, Any]:
     found["status"] = {STATUSES[code] if code >= 0 else "not done": int(count)
                        for code, count in zip(codes, counts, strict=True)}
     return found
+
+
+def reasons(data: Any, plan: Plan) -> Iterator[str]:
+    """Why the first run of each status did not reach its end: it is made again, because a map keeps no sentences."""
+    codes, firsts = np.unique(data["status"].values, return_index=True)
+    for code, first in zip(codes.tolist(), firsts.tolist(), strict=True):
+        for why in compute(plan.variants(first, first + 1), plan.setup).stops.values() if code >= 0 else ():
+            yield f"{STATUSES[code]}, the first: {why}"
 
 
 def report(found: dict[str, Any]) -> str:

@@ -12,10 +12,11 @@ from grasp_ros.identification.numbers import acts, numbers_of
 from grasp_ros.identification.result import Against, Fit, identifiability_of, residual_table
 from grasp_ros.identification.search import Problem, first_noise, fitted, mean_square, refine, search
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import mapping, names, number, truth
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import needing
-from grasp_ros.simulation.variants import check_scene
+from grasp_ros.scene.places import check_scene
 
 
 def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
@@ -49,7 +50,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         import scipy.optimize  # noqa: F401
     if scene is not None:
         check_scene(scene)
-    free, found = [free] if isinstance(free, str) else list(free), measured(data, scene, by_sensors)
+    free, found = names("free", free), measured(data, scene, truth("by_sensors", by_sensors))
+    against = {key: number(f"against: {key}", value) for key, value in mapping("against", against).items()}
     numbers = numbers_of(found.scene, free, found)
     if any(acts(number.key) for number in numbers):
         found = found._replace(inputs=None)

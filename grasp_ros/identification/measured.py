@@ -14,6 +14,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.verify import answers_of
 from grasp_ros.physics import given
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
@@ -27,7 +28,9 @@ from grasp_ros.simulation.trajectory_file import load
 
 CHANNELS = tuple(HEADS[column.name] for column in COLUMNS[:6])  # names of the states, in their order
 INPUTS = tuple(HEADS[f"input_{NAMES[body]}"] for body in sorted(BODIES))  # by body
+T = HEADS[TIME.name]
 FEWEST = 10  # samples
+FARTHEST = RANGES["position, set-point"].high  # that of velocities, too
 Source: TypeAlias = str | os.PathLike[str] | Recording | Trajectory
 
 
@@ -69,6 +72,8 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         If the source cannot be read, holds too little, or holds what is no number.
     """
     if not isinstance(source, (Recording, Trajectory)):
+        if not isinstance(source, (str, os.PathLike)):
+            raise Refused(f"data: {type(source).__name__} is not allowed; allowed: a path, a Recording or a Trajectory")
         path = Path(source)
         with reading(path):
             directory = path.is_dir()
@@ -112,19 +117,12 @@ def _of_trajectory(run: Trajectory, name: str) -> Measured:
 def _of_table(path: Path, scene: Scene) -> Measured:
     """Columns as `Trajectory.to_csv` names them: the time, states, and the inputs of a scene that holds them."""
     columns = _columns(path)
-    time = HEADS[TIME.name]
-    if time not in columns or not any(name in columns for name in CHANNELS):
-        raise Refused(f"{path}: columns {', '.join(columns)}; allowed: {time} and at least one of"
-                      f" {', '.join(CHANNELS)}")
-    for name in columns:
-        if name not in HEADS.values():
-            raise Refused(f"{path}: column {name!r}: not known; {allowed(name, [*HEADS.values()])}")
-    t = columns[time]
+    t = columns[T]
     missing = np.full(len(t), np.nan)
     state = np.stack([columns.get(name, missing) for name in CHANNELS], axis=1)
     held = scene.sampled and all(name in columns for name in INPUTS)
     if held and not np.array_equal(t, tick_times(scene)[: len(t)]):
-        raise Refused(f"{path}: {time}: not the ticks of {scene.name}, every"
+        raise Refused(f"{path}: {T}: not the ticks of {scene.name}, every"
                       f" {scene.time_of(1):g} s from 0 to {scene.duration:g} s, at which its inputs change")
     inputs = np.stack([columns[name] for name in INPUTS], axis=1)[:-1] if held else None
     return Measured(str(path), scene, t, state, inputs, scene.sampled)
@@ -132,10 +130,17 @@ def _of_table(path: Path, scene: Scene) -> Measured:
 
 def _columns(path: Path) -> Mapping[str, Array]:
     """Numbers (n,) by the names in the first line; NaN where nothing stands."""
-    with reading(path), decoding(path, "a table", also=(csv.Error,)):
-        names, *lines = [*csv.reader(path.read_text(encoding="utf-8-sig").splitlines())] or [[""]]
-    if len({*names}) < len(names):
-        raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
+    with decoding(path, "a table", also=(csv.Error,)), reading(path):
+        heads, *lines = [*csv.reader(path.read_text(encoding="utf-8-sig").splitlines())] or [[""]]
+    names = [*map(str.strip, heads)]
+    if T not in names or not {*CHANNELS} & {*names}:
+        raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: {T} and at least one of {', '.join(CHANNELS)},"
+                      " with commas between them")
+    for place, name in enumerate(names):
+        if name not in HEADS.values():
+            raise Refused(f"{path}: column {name!r}: not known; {allowed(name, [*HEADS.values()])}")
+        if name in names[:place]:
+            raise Refused(f"{path}: line 1: {', '.join(names)}; allowed: each name once")
     rows = []
     for number, line in enumerate(lines, 2):
         if not line:  # an empty one
@@ -146,23 +151,22 @@ def _columns(path: Path) -> Mapping[str, Array]:
             rows.append([given.read_number(word.strip() or "nan") for word in line])
         except ValueError as error:
             raise Refused(f"{path}: line {number}: {error}; allowed: numbers") from None
-    return dict(zip(map(str.strip, names), np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
+    return dict(zip(names, np.array(rows, dtype=float).reshape(-1, len(names)).T, strict=True))
 
 
 def _checked(found: Measured) -> Measured:
     """Refuse what no fit can use."""
-    found = found._replace(t=given.times("times", found.t))  # kernels read a row of numbers, no column of a table
-    name, t, present = found.name, found.t, found.scene.system.present
-    if len(t) < FEWEST:
-        raise Refused(f"{name}: {len(t)} samples; allowed: at least {FEWEST}")
-    if not (np.isfinite(t).all() and t[0] >= 0.0 and (np.diff(t) > 0.0).all() and t[-1] <= found.scene.duration):
-        raise Refused(f"{name}: times are not allowed; allowed: ascending from 0 to {found.scene.duration:g} s,"
-                      " the time of the scene")
+    name, present = found.name, found.scene.system.present
+    if len(found.t) < FEWEST:
+        raise Refused(f"{name}: {len(found.t)} samples; allowed: at least {FEWEST}")
+    t = given.ascending(f"{name}: {T}", found.t, found.scene.duration, strictly=True)
+    found = found._replace(t=t)  # kernels read a row of numbers, no column of a table
     for place, channel in enumerate(CHANNELS):
-        gone = ~np.isfinite(found.state[:, place])
+        gone = ~(np.abs(found.state[:, place]) <= FARTHEST)
         if gone.any() and not np.isnan(found.state[:, place]).all():
-            raise Refused(f"{name}: {channel}: no number at t = {t[np.argmax(gone)]:g} s; allowed: numbers throughout,"
-                          " or a column that is not there")
+            at = int(np.argmax(gone))
+            raise Refused(f"{name}: {channel}: {float(found.state[at, place])!r} at t = {t[at]:g} s; allowed: numbers"
+                          f" throughout, of a size <= {FARTHEST:g}, or a column that is not there")
         if not gone.any() and BODIES[place // 2] not in present:
             raise Refused(f"{name}: {channel}: {found.scene.name} has no such body")
     if not found.channels:

@@ -12,12 +12,13 @@ import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import number, read_number, whole
+from grasp_ros.physics.given import number, read_number, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.places import parameter_of
 from grasp_ros.simulation.chunk import Setup, checked
 from grasp_ros.simulation.chunk import check as check_setup
-from grasp_ros.simulation.variants import Variants, parameter_of
+from grasp_ros.simulation.variants import Variants
 
 POINTS, MOST, MOST_AXES = 101, 10**9, 2
 
@@ -101,10 +102,10 @@ class Plan:
     def __post_init__(self) -> None:
         """Numbers of Python's own, which a file takes."""
         axes = tuple(
-            Axis(axis.name, number(f"{axis.name}: low", axis.low), number(f"{axis.name}: high", axis.high),
-                 whole(f"{axis.name}: points", axis.points, 2), bool(axis.log)) for axis in self.axes)
+            Axis(name, number(f"{name}: low", low), number(f"{name}: high", high), whole(f"{name}: points", points, 2),
+                 truth(f"{name}: log", log)) for name, low, high, points, log in self.axes)
         own = {"setup": checked(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
-               "seed": whole("seed", self.seed, 0), "quasi": bool(self.quasi)}
+               "seed": whole("seed", self.seed, 0), "quasi": truth("quasi", self.quasi)}
         for name, value in own.items():
             object.__setattr__(self, name, value)
 
@@ -171,11 +172,12 @@ def check(plan: Plan) -> None:
         raise Refused(f"axes: {', '.join(names) or 'none'}; allowed: one or more numbers of the scene, each once")
     if not plan.sample and len(plan.axes) > MOST_AXES:
         raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
+    if plan.rows > MOST:
+        raise Refused(f"axes: {plan.rows:,} runs; allowed: at most {MOST:,}")
     for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
-        ascends = -math.inf < axis.low < axis.high < math.inf
-        if not ascends or not 2 <= axis.points <= MOST or (axis.log and axis.low <= 0.0):
-            raise Refused(f"{key}: {axis.low!r} to {axis.high!r}, {axis.points} values is not allowed; allowed: low <"
-                          f" high, 2 to {MOST:,} values, and > 0 where logarithmic")
+        if not -math.inf < axis.low < axis.high < math.inf or (axis.log and axis.low <= 0.0):
+            raise Refused(f"{key}: {axis.low!r} to {axis.high!r} is not allowed; allowed: low < high, and > 0 where"
+                          " logarithmic")
         parameter = parameter_of(plan.scene, key)
         if parameter.whole:
             raise Refused(f"{plan.scene.name}: {key}: a whole number; allowed: numbers with a range")

@@ -13,10 +13,10 @@ import numpy as np
 from grasp_ros.maps.plan import Axis, Plan, check
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import read_number
+from grasp_ros.physics.given import names, read_number
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.chunk import Setup, checked
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.outcomes import GROUPS, find, wanted_by
 
@@ -58,9 +58,10 @@ class Problem:
 
     def __init__(self, scene: Scene, axes: Sequence[Axis], minimise: Sequence[str], bounds: Sequence[Bound] = (),
                  setup: Setup | None = None) -> None:
+        minimise = names("minimise", minimise)
         if not 1 <= len(minimise) <= 2 or len(set(minimise)) < len(minimise):
             raise Refused(f"minimise: {', '.join(minimise) or 'nothing'}; allowed: one outcome, or two different ones")
-        self.scene, self.axes, self.minimise, self.bounds = scene, tuple(axes), tuple(minimise), tuple(bounds)
+        self.scene, self.minimise, self.bounds = scene, minimise, tuple(bounds)
         for bound in self.bounds:
             if not math.isfinite(bound.most):
                 raise Refused(f"{bound.outcome} <= {bound.most!r} is not allowed; allowed: a finite number")
@@ -68,8 +69,9 @@ class Problem:
         for name in self.names:
             if len({column.unit for column in find([name])}) > 1:
                 raise Refused(f"outcome {name}: has several units; allowed: one of {', '.join(GROUPS[name])}")
-        self.setup = (setup or Setup())._replace(outcomes=self.names)
-        check(Plan(scene, self.setup, self.axes, sample=1))
+        plan = Plan(scene, checked(setup, self.names), tuple(axes), sample=1)
+        check(plan)
+        self.axes, self.setup = plan.axes, plan.setup
 
     def why_unsettled(self) -> str:
         """Why no run is known to settle, where that is asked for and V_c may rise."""

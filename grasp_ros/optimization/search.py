@@ -16,7 +16,7 @@ from grasp_ros.maps.plan import Axis
 from grasp_ros.optimization.problem import Bound, Problem
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import number, whole
+from grasp_ros.physics.given import mapping, number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import needing
@@ -75,9 +75,14 @@ def design(
     Refused
         If a number, a range, an outcome or a bound cannot be; and see `search`.
     """
-    axes = [Axis(name, number(f"{name}: low", low), number(f"{name}: high", high))
-            for name, (low, high) in free.items()]
-    bounds = [Bound(name, number(name, most)) for name, most in (subject_to or {}).items()]
+    axes = []
+    for name, ends in mapping("free", free).items():
+        try:
+            low, high = ends
+        except (TypeError, ValueError):
+            raise Refused(f"{name}: {ends!r} is not allowed; allowed: two numbers, low and high") from None
+        axes.append(Axis(name, low, high))
+    bounds = [Bound(name, number(name, most)) for name, most in mapping("subject_to", subject_to or {}).items()]
     return search(Problem(scene, axes, [minimise], bounds, setup), seed, progress)
 
 

@@ -7,7 +7,7 @@ not. What is not taken is refused with its name.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from datetime import timedelta
 from numbers import Integral, Real
 from typing import Any
@@ -76,6 +76,46 @@ def whole(name: str, value: Any, low: int) -> int:
     return int(found)
 
 
+def truth(name: str, value: Any) -> bool:
+    """True or False, 1 or 0: a text that says no would count as true.
+
+    Raises
+    ------
+    Refused
+        If it is none of them.
+    """
+    if not isinstance(value, (bool, np.bool_)) and plain(value) not in (0, 1):
+        raise Refused(f"{name}: {value!r} is not allowed; allowed: True or False")
+    return bool(value)
+
+
+def names(name: str, values: Any) -> tuple[str, ...]:
+    """Texts in a row; one alone is a row of one.
+
+    Raises
+    ------
+    Refused
+        If they are none.
+    """
+    found = (values,) if isinstance(values, str) or not isinstance(values, Iterable) else tuple(values)
+    if not all(isinstance(entry, str) for entry in found):
+        raise Refused(f"{name}: {values!r} is not allowed; allowed: a list of texts")
+    return tuple(map(str, found))
+
+
+def mapping(name: str, values: Any) -> dict[Any, Any]:
+    """What a dict, or a table of columns, maps.
+
+    Raises
+    ------
+    Refused
+        If it maps nothing.
+    """
+    if not hasattr(values, "keys"):
+        raise Refused(f"{name}: {values!r} is not allowed; allowed: a dict")
+    return dict(values)
+
+
 def column(name: str, values: Any) -> NDArray[np.float64]:
     """Numbers (n,) from anything that holds them in a row, a generator as well; always a new array.
 
@@ -109,6 +149,27 @@ def times(name: str, values: Any, several: bool = False) -> NDArray[np.float64]:
         array = array / SECOND
     found = column(name, array.ravel() if several or array.ndim == 0 else array)
     return found.reshape(array.shape) if several else found
+
+
+def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDArray[np.float64]:
+    """Times (n,) in s that ascend from 0 to an end, see `times`; strictly: each is there once.
+
+    Raises
+    ------
+    Refused
+        Names the first that does not.
+    """
+    found = times(name, values)
+    good = found <= end
+    good[:1] &= found[:1] >= 0.0
+    good[1:] &= (found[1:] > found[:-1]) if strictly else (found[1:] >= found[:-1])
+    if not good.all():
+        place = int(np.argmin(good))
+        behind = f" behind {float(found[place - 1])!r}" if place else ""
+        once = ", each once" if strictly else ""
+        raise Refused(f"{name}: {float(found[place])!r}{behind} is not allowed; allowed: ascending from 0 to {end!r} s"
+                      + once)
+    return found
 
 
 def forces(name: str, values: Any) -> NDArray[np.float64]:

@@ -1,9 +1,13 @@
-"""Numbers of a scene that go straight into one place of the arrays of its system, which is linear in them."""
+"""Numbers of a scene: what each is, and which go straight into one place of the arrays of its system."""
 
 from __future__ import annotations
 
+import os
+
 from grasp_ros.physics.control import Column
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, V, X
+from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.scene import Scene
 
 Place = tuple[str, int, int]  # array of a system, row, column
@@ -33,3 +37,18 @@ PLACES: dict[str, Place] = {
 def place_of(scene: Scene, key: str) -> Place | None:
     """The only place where a number of a scene enters; None: a mass has a weight, too, and others have no place."""
     return None if "tilt" in scene.values and key.endswith(".mass_kg") else PLACES.get(key)
+
+
+def check_scene(scene: object) -> None:
+    """Refuse what is no scene."""
+    if not isinstance(scene, Scene):
+        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
+        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
+
+
+def parameter_of(scene: Scene, name: str) -> Parameter:
+    """What a number of a scene is, by "section.key"; lists are refused."""
+    check_scene(scene)
+    if (parameter := scene.parameter(name)).several:
+        raise Refused(f"{scene.name}: {name}: is a list; allowed: single numbers")
+    return parameter

@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
@@ -131,8 +132,7 @@ class Scene(Frozen):
     @property
     def topics(self) -> list[Topic]:
         """Topics with one message per tick, in the order in which they are recorded."""
-        forces = [output.topic for output in self.outputs]
-        return [JOINT_STATES, *self.controllers.values(), *forces, LYAPUNOV]
+        return [JOINT_STATES, *self.controllers.values(), *(output.topic for output in self.outputs), LYAPUNOV]
 
     @property
     def live(self) -> list[str]:
@@ -175,7 +175,7 @@ class Scene(Frozen):
             If the result cannot be run.
         """
         document = self._document()
-        for name, number in numbers.items():
+        for name, number in given.mapping("numbers", numbers).items():
             key = self.parameter(name).key
             document[name.partition(".")[0]][key] = number
         return _read(document, self.name, self.name, self.values)
@@ -224,7 +224,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
     SceneError
         If there is no such scene, or if it cannot be run as written.
     """
-    reference, settings = os.fspath(reference), [settings] if isinstance(settings, str) else settings
+    reference, settings = os.fspath(reference), given.names("settings", settings)
     path = Path(reference)
     if path.suffix.lower() in YAML:
         with reading(reference, SceneError):
@@ -283,7 +283,7 @@ def compose(
     SceneError
         If it is not a scene that can be run.
     """
-    check_keys(name, "", sections, tuple(BY_SECTION), ("time",))
+    check_keys(name, "", given.mapping("sections", sections), tuple(BY_SECTION), ("time",))
     texts = {"title": name if title is None else title, "readings": readings, "watch": watch}
     return _read({**texts, **sections}, name, name)
 

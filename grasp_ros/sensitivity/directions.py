@@ -20,11 +20,10 @@ from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import build
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.places import place_of
+from grasp_ros.scene.places import parameter_of, place_of
 
 NOT_SMOOTH = {  # by the unit of a number: why no derivative is to be had
     "s": "it moves ticks, which are whole", "Hz": "its effect grows with the time; allowed: phase_rad",
-    "1": "it is a seed", "control periods": "it is whole",
 }
 STEPS = (Column.POSITION_STEP, Column.VELOCITY_STEP)
 LARGEST = 1e300  # N, in place of no limit
@@ -95,9 +94,8 @@ def check_keys(scene: Scene, keys: Sequence[str], sampled: bool) -> list[Paramet
     Refused
         If the scene does not name a number, or it does not enter smoothly, or a sensor measures in steps.
     """
-    if not keys or isinstance(keys, str):
-        raise Refused(f"{scene.name}: sensitivity: {keys!r}; allowed: a list of numbers, such as"
-                      " [\"object.position_m\"]")
+    if not keys:
+        raise Refused(f"{scene.name}: sensitivity: nothing; allowed: numbers of the scene, such as object.position_m")
     for side, law in scene.system.laws.items():
         if sampled and law.row[[*STEPS]].any():
             raise Refused(f"{scene.name}: the {('left', 'right')[side]} arm is measured in steps, which have no"
@@ -113,9 +111,7 @@ def check_key(scene: Scene, key: str) -> Parameter:
     Refused
         If the scene does not name it, or it does not enter smoothly.
     """
-    parameter = scene.parameter(key)
-    if parameter.several:
-        raise Refused(f"{scene.name}: {key}: it is a list; allowed: single numbers")
+    parameter = parameter_of(scene, key)
     if parameter.unit in NOT_SMOOTH or parameter.whole:
         raise Refused(f"{scene.name}: {key} has no derivative: {NOT_SMOOTH.get(parameter.unit, 'it is whole')}")
     return parameter

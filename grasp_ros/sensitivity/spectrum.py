@@ -16,6 +16,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
+from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import no_directions
 from grasp_ros.sensitivity.run import Carrier
 
@@ -32,6 +33,7 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     Refused
         If commands are held or external forces act, or the run does not reach its end.
     """
+    check_scene(scene)
     if scene.sampled or scene.system.external:
         raise Refused(f"{scene.name}: Lyapunov exponents: allowed: continuous feedback, no external force")
     places = [place for body in scene.system.present for place in (COLUMN[body], COLUMN[body] + 1)]

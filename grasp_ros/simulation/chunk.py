@@ -20,15 +20,16 @@ from grasp_ros.observe.record import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import number, whole
+from grasp_ros.physics.given import names, number, truth, whole
 from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.places import check_scene
 from grasp_ros.simulation.closed_loop import drive
 from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
-from grasp_ros.simulation.variants import Variants, check_scene
+from grasp_ros.simulation.variants import Variants
 
 SETTLED = 0.02  # of the largest initial displacement
 HORIZONS = 120  # for which a run goes on at most, until V_c decides whether it has settled
@@ -76,11 +77,14 @@ class Chunk(NamedTuple):
     stops: dict[int, str]  # why and where a row was refused or stopped, by its place among these rows
 
 
-def checked(setup: Setup) -> Setup:
-    """A setup with numbers of Python's own."""
-    outcomes = (setup.outcomes,) if isinstance(setup.outcomes, str) else tuple(setup.outcomes)
+def checked(setup: Setup | None, outcomes: Sequence[str] | None = None) -> Setup:
+    """A setup with numbers of Python's own, by default that without arguments; other outcomes take the place of its."""
+    setup = Setup() if setup is None else setup
+    if not isinstance(setup, Setup):
+        raise Refused(f"setup: {setup!r} is not allowed; allowed: a Setup of grasp_ros.simulation")
     return Setup(
-        outcomes, check_accuracy(setup.accuracy), bool(setup.sampled), number("settled", setup.settled),
+        names("outcomes", setup.outcomes if outcomes is None else outcomes), check_accuracy(setup.accuracy),
+        truth("sampled", setup.sampled), number("settled", setup.settled),
         *(whole(name, getattr(setup, name), 1) for name in ("horizons", "max_events", "max_work")))
 
 

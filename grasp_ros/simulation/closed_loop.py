@@ -20,7 +20,7 @@ from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.control import ControlLaw, Law
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import plain
+from grasp_ros.physics.given import mapping, names, plain
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import check
@@ -63,7 +63,7 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
     for tick, numbers in changes.items():
         at = plain(tick)
         is_tick = at is not None and 0 <= at <= scene.ticks and at == int(at)
-        for name in numbers:
+        for name in names(f"changes: at tick {tick}", mapping(f"changes: at tick {tick}", numbers)):
             if name.startswith(replaced):
                 raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
             if name not in live or not is_tick:

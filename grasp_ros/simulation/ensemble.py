@@ -26,11 +26,12 @@ from grasp_ros.physics.given import whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
+from grasp_ros.scene.places import parameter_of
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
 from grasp_ros.simulation.outcomes import OUTCOMES
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
-from grasp_ros.simulation.variants import Variants, parameter_of
+from grasp_ros.simulation.variants import Variants
 
 CHUNK_S, ROW_S, TICK_S = 0.1, 2e-4, 1e-6  # seconds that a chunk is meant to take, and that its parts take about
 Span = tuple[int, int]
@@ -134,7 +135,7 @@ def ensemble(
     Refused
         If a key or an outcome is not known, or a setting is outside its range.
     """
-    setup = checked((setup or Setup())._replace(outcomes=tuple([outcomes] if isinstance(outcomes, str) else outcomes)))
+    setup = checked(setup, outcomes)
     columns, variants = check(scene, setup), Variants(scene, changes)
     found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}
     status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()

@@ -49,14 +49,14 @@ def last_outside(t: Array, position: Array, distance: float) -> Array:
     return found
 
 
-def as_row(run: Trajectory, *outcomes: str, part: float = SETTLED, horizons: int = HORIZONS) -> dict[str, float] | None:
+def as_row(run: Trajectory, *outcomes: str, horizons: int = HORIZONS) -> dict[str, float] | None:
     """Outcomes of an exact run, those of a row of an ensemble: it is integrated again, and watched.
 
     None for another method, a run that stopped or had controllers from outside, and where a number was set on the way.
     """
     if run.method != EXACT or run.status is not Status.DONE or run.controllers:
         return None
-    setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, part, horizons, UNLIMITED, UNLIMITED)
+    setup = Setup((*outcomes, "last_state"), run.setting, run.sampled, SETTLED, horizons, UNLIMITED, UNLIMITED)
     columns = compute(Variants(run.scene, {}), setup, in_one_call=False).columns
     found = {name: float(own[0]) for name, own in columns.items()}
     last = [found[name] for name in GROUPS["last_state"]]
@@ -65,17 +65,17 @@ def as_row(run: Trajectory, *outcomes: str, part: float = SETTLED, horizons: int
     return found
 
 
-def settling_times(run: Trajectory, part: float = SETTLED, horizons: int = HORIZONS) -> Array:
+def settling_times(run: Trajectory, horizons: int = HORIZONS) -> Array:
     """When left arm, object and right arm settled for good, (3,) in s.
 
     Infinite: V_c does not prove it within so many horizons, for which an exact run goes on, or within the output times
     of any other. nan: V_c proves nothing, because it can rise here, or bounds no mass that is not driven to 0.
     """
-    if not may_settle(run, part):
+    if not may_settle(run):
         return np.full(3, np.nan)
-    if (row := as_row(run, "settling_times", part=part, horizons=horizons)) is not None:
+    if (row := as_row(run, "settling_times", horizons=horizons)) is not None:
         return settled_in(run, row)
-    system, distance = run.scene.system, settled_distance(run.scene, part)
+    system, distance = run.scene.system, settled_distance(run.scene)
     ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
     if not np.isfinite(ahead).all():
         return np.full(3, np.nan)
@@ -93,9 +93,9 @@ def may_rise(run: Trajectory) -> bool:
     return bool(run.controllers or run.scene.caveats(run.sampled))
 
 
-def may_settle(run: Trajectory, part: float = SETTLED) -> bool:
+def may_settle(run: Trajectory) -> bool:
     """Whether V_c cannot rise, and there is a distance to come into."""
-    return not (run.sampled or may_rise(run)) and settled_distance(run.scene, part) > 0.0
+    return not (run.sampled or may_rise(run)) and settled_distance(run.scene) > 0.0
 
 
 def contact_intervals(run: Trajectory, side: int) -> Array:

@@ -14,7 +14,6 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop, new_place
 from grasp_ros.physics import given
 from grasp_ros.physics.control import ControlLaw, normals_over
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Answer, Place
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.observation import Observation
@@ -117,9 +116,7 @@ class SampledPlant:
             If the commands are not three finite numbers, or the offsets do not ascend within the period.
         """
         commands = given.forces("commands", commands)
-        times = NO_TIMES if offsets is None else given.times("offsets", offsets)
-        if len(times) and not (times[0] >= 0.0 and times[-1] <= self._period and (np.diff(times) >= 0.0).all()):
-            raise Refused(f"offsets: allowed: ascending from 0 to {self._period:g} s, the control period")
+        times = NO_TIMES if offsets is None else given.ascending("offsets", offsets, self._period)
         waits, loop = len(self._waiting), self._one
         self.effort = self._waiting[self.tick % waits].copy() if waits else commands
         loop.begins[0], loop.bounds[1], loop.answers[0] = self.time, len(times), commands

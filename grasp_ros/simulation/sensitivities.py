@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
+from grasp_ros.physics.given import names, truth
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import check_keys
@@ -114,7 +115,8 @@ def ensemble_sensitivities(
     Refused
         If a key is not known, or a number has no derivative.
     """
-    check_keys(scene, keys, sampled or scene.sampled)  # what is refused of all rows
+    keys = names("keys", keys)
+    check_keys(scene, keys, truth("sampled", sampled) or scene.sampled)  # what is refused of all rows
     variants = Variants(scene, changes)
 
     def row(i: int) -> Sensitivity | str:
@@ -134,4 +136,4 @@ def ensemble_sensitivities(
         state[i], rates[i] = found.state[-1], found.state_rates[-1]
         level[i], level_rates[i] = found.V_c[-1], found.V_c_rates[-1]
         corner[i] = np.inf if found.corner is None else found.corner
-    return SensitivityTable(scene, tuple(keys), variants.changes, state, rates, level, level_rates, corner, stops)
+    return SensitivityTable(scene, keys, variants.changes, state, rates, level, level_rates, corner, stops)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from operator import length_hint
@@ -17,16 +16,16 @@ from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import times, whole
+from grasp_ros.physics.given import ascending, mapping, names, truth, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
+from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.closed_loop import NO_CHANGES, Changes, Progress, check_changes, solve, wrap_controllers
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.ticks import tick_times
 from grasp_ros.simulation.trajectory import Trajectory
-from grasp_ros.simulation.variants import check_scene
 
 GRID_POINTS = 2001
 
@@ -92,10 +91,12 @@ def simulate(
         finite number. What a controller raises passes through, with a note of the tick.
     """
     check_scene(scene)
-    sampled = bool(sampled or scene.sampled or controllers)
+    changes, controllers = mapping("changes", changes), mapping("controllers", controllers)
+    sampled = truth("sampled", sampled) or scene.sampled or bool(controllers)
     max_events, max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
     check_changes(scene, sampled, changes, controllers)
     if sensitivity is not None:
+        sensitivity = names("sensitivity", sensitivity)
         check_keys(scene, sensitivity, sampled)
         if method != EXACT or controllers or changes:
             raise Refused(f"{scene.name}: sensitivity: allowed: the method {EXACT}, without controllers and changes")
@@ -104,8 +105,7 @@ def simulate(
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)
-    grid = times("grid", grid)  # new: kernels are compiled anew for arrays that nobody may write to
-    check_grid(scene, grid)
+    grid = ascending("grid", grid, scene.duration)  # new: kernels are compiled anew for arrays that nobody may write to
     _check_ticks(scene, sampled, max_work)
     by_user = wrap_controllers(scene, controllers)
     with showing(progress, scene.duration, "s", scene.name) as progress:
@@ -131,12 +131,3 @@ def _check_ticks(scene: Scene, sampled: bool, max_work: int) -> None:
     ticks, most = scene.ticks if sampled else max(changes, default=0), max(MAX_WORK, max_work)
     if ticks > most:
         raise Refused(f"{scene.name}: {ticks} control periods with an input each; allowed: max_work, {most}")
-
-
-def check_grid(scene: Scene, grid: Array) -> None:
-    """Refuse output times that do not ascend or lie outside the horizon."""
-    first, last = (float(grid[0]), float(grid[-1])) if len(grid) else (0.0, 0.0)
-    if not (math.isfinite(first) and math.isfinite(last) and (len(grid) < 2 or (grid[1:] >= grid[:-1]).all())):
-        raise Refused("grid: allowed: ascending finite times")
-    if not 0.0 <= first <= last <= scene.duration:
-        raise Refused(f"grid: [{first!r}, {last!r}] is not allowed; allowed: within [0, {scene.duration!r}] s")

@@ -18,7 +18,7 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import times
+from grasp_ros.physics.given import number, times
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array, Contact, impact_force
@@ -226,7 +226,7 @@ class Trajectory(Tabular, Frozen):
         Refused
             If the function or the direction is none, or the run cannot be repeated, see `at`.
         """
-        return crossings(as_function(function, level), direction, breaks_of(self), self.at)
+        return crossings(as_function(function, number("level", level)), direction, breaks_of(self), self.at)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

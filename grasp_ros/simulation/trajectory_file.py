@@ -11,9 +11,9 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import find
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.given import ascending
+from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts
-from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
@@ -76,13 +76,13 @@ def _check(found: Trajectory) -> None:
     gone = found.scene.system.absent_columns
     there, absent = np.delete(found.state, gone, axis=1), found.state[:, gone]
     acted = found.scene.ticks if found.sampled else 0
+    ascending("t", found.t, end)
+    ascending("events", events[:, Entry.TIME], end)
     for name, good, allowed in (
-        ("t", _ascending(found.t, end), "ascending times within the horizon"),
         ("state", not done or np.isfinite(there).all(), "finite numbers"),
         ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
         ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
         ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
-        ("events", _ascending(events[:, 0], end), "ascending times within the horizon"),
         ("events", np.isfinite(events).all() and np.isin(events[:, 1], list(COLUMN)).all(), "events of this scene"),
         ("events", np.isin(events[:, 2], list(Transition)).all(), "events of this scene"),
         ("work", (found.work >= 0).all(), "numbers >= 0"),
@@ -90,8 +90,3 @@ def _check(found: Trajectory) -> None:
     ):
         if not good:
             raise Refused(f"{name}: not allowed; allowed: {allowed}")
-
-
-def _ascending(times: Array, end: float) -> bool:
-    """Whether times ascend within [0, end]."""
-    return bool((times[1:] >= times[:-1]).all() and (times >= 0.0).all() and (times <= end).all())

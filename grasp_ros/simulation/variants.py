@@ -7,7 +7,6 @@ so that the rules and the sentences are those of `scene.validation` alone.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
@@ -23,8 +22,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
-from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.places import PLACES, place_of
+from grasp_ros.scene.places import PLACES, parameter_of, place_of
 
 
 @dataclass
@@ -53,7 +51,8 @@ class Variants:
 
     def __init__(self, scene: Scene, changes: Mapping[str, ArrayLike]) -> None:
         self.scene = scene
-        self.changes = {str(name): given.column(f"changes: {name}", values) for name, values in changes.items()}
+        self.changes = {str(name): given.column(f"changes: {name}", values)
+                        for name, values in given.mapping("changes", changes).items()}
         self._parameters = {name: parameter_of(scene, name) for name in self.changes}
         lengths = {name: len(values) for name, values in self.changes.items()}
         if len(set(lengths.values())) > 1:
@@ -111,18 +110,3 @@ class Variants:
             array, row, place = PLACES[name]
             getattr(block, array)[:, row, place] = column
         return block
-
-
-def check_scene(scene: object) -> None:
-    """Refuse what is no scene."""
-    if not isinstance(scene, Scene):
-        hint = f"load({scene!r})" if isinstance(scene, (str, os.PathLike)) else "load and compose"
-        raise Refused(f"scene: {type(scene).__name__} is not allowed; allowed: a Scene, see {hint}")
-
-
-def parameter_of(scene: Scene, name: str) -> Parameter:
-    """What a number of a scene is, by "section.key"; lists are refused."""
-    check_scene(scene)
-    if (parameter := scene.parameter(name)).several:
-        raise Refused(f"{scene.name}: {name}: is a list; allowed: single numbers")
-    return parameter

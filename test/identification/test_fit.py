@@ -225,10 +225,11 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=-1"), "dissipation_s_per_m: -1.0 is not"),
     (ROWS.replace("t_s", "t"), ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
     (ROWS.replace("x_object_m", "x_left_m"), ("--scene", "case_01", "--free", P_LEFT), "allowed: each name once"),
-    (ROWS.replace("-0.298,", "nan,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: no number at t = 0.02 s"),
+    (ROWS.replace("-0.298,", "nan,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: nan at t = 0.02 s; all"),
     (ROWS.replace("-0.298,", "north,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
     (ROWS.replace("-0.298,", ""), ("--scene", "case_01", "--free", P_LEFT), "line 4: 2 entries; allowed: 3"),
-    (ROWS.replace("0.02,", "0.2,"), ("--scene", "case_01", "--free", P_LEFT), "allowed: ascending from 0 to 20 s"),
+    (ROWS.replace("0.02,", "0.2,"), ("--scene", "case_01", "--free", P_LEFT),
+     "t_s: 0.03 behind 0.2 is not allowed; allowed: ascending from 0 to 20.0 s, each once"),
     ("\n".join(ROWS.splitlines()[:10]), ("--scene", "case_01", "--free", P_LEFT), "samples; allowed: at least 10"),
     ("", ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
     (ROWS.replace("x_object_m", "x_objekt_m"), ("--scene", "case_01", "--free", P_LEFT),
@@ -238,7 +239,12 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     (re.sub(r"-0\.\d+", "0", ROWS), ("--scene", "case_01", "--free", P_LEFT), "positions do not change; allowed: a"),
     (ROWS, ("--scene", "arm_alone", "--free", "left_arm.mass_kg"), "x_object_m: arm_alone has no such body"),
     (HELD, ("--scene", "case_01", "--set", "loop={}", "--free", P_LEFT), "not the ticks of case_01, every 0.001 s"),
-], ids=range(24))
+    (ROWS.replace("-0.298,", "-2e200,"), ("--scene", "case_01", "--free", P_LEFT), "x_left_m: -2e+200 at t = 0.02 s"),
+    (ROWS.replace(",", ";"), ("--scene", "case_01", "--free", P_LEFT), "one of x_left_m, v_left_m_per_s"),
+    ("# mine\n" + ROWS, ("--scene", "case_01", "--free", P_LEFT), "line 1: # mine; allowed: t_s and at least one of"),
+    (re.sub("0$", "0,ok", ROWS.replace("object_m", "object_m,why"), flags=re.MULTILINE),
+     ("--scene", "case_01", "--free", P_LEFT), "column 'why': not known"),
+], ids=range(28))
 def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
     (tmp_path / "data.csv").write_text(content)
     result = command("fit", "data.csv", *words)

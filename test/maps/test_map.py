@@ -258,10 +258,18 @@ def test_a_settling_time_that_nothing_proves_is_counted_and_explained(
 
 
 @pytest.mark.slow
+def test_the_command_says_why_runs_did_not_reach_their_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["map", "case_01", "--set", SHORT, "--x", f"{GAIN}=-20:9:3", "--outcome", "touches", "--max-events", "1"]
+    assert main([*words, "-o", str(tmp_path / "map.zarr")]) == 0
+    told = capsys.readouterr().err
+    assert "REFUSED, the first: case_01: left_arm, left_feedback: stiffness_N_per_m + position_gain_N_per_m: -1" in told
+    assert "EVENT_BUDGET, the first: stopped: the event budget is used up before the end of the horizon: t = " in told
+
+
 def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for words, answer in (
         ([], "axes: none"), (["--x", "mass"], "--x mass: not understood; allowed: section.key=low:high"),
-        (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0, 4 values is not allowed"),
+        (["--x", f"{GAIN}=9:1:4"], "9.0 to 1.0 is not allowed"),
         (["--x", f"{GAIN}=-1:1:4:log"], "> 0 where logarithmic"),
         (["--x", "object.mass_kg=-1:1"], "object.mass_kg: -1.0 is not allowed; allowed: a number >= 1e-12"),
         (["--x", "object.weight=1:2"], "object.weight: not in this scene"),
@@ -270,6 +278,7 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
         (["--x", f"{GAIN}=1:2:2", "--independent"], "--independent: allowed: with --sample N"),
         (["--x", f"{GAIN}=1:2:3", "--sample", "9"], "there is no grid of 3 values; allowed: low:high, and ::log"),
         (["--x", f"{GAIN}=1:2", "--settled", "2"], "settled: 2.0"),
+        (["--x", f"{GAIN}=1:2:99999", "--y", "object.mass_kg=1:2:99999"], "axes: 9,999,800,001 runs; allowed: at most"),
         (["--x", f"{GAIN}=1:2:2", "--scheduler", "tcp://127.0.0.1:9"], "nobody answers"),
     ):
         assert main(["map", "case_01", "--set", SHORT, *words, "-o", str(tmp_path / "new.zarr")]) == 2

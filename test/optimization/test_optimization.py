@@ -63,8 +63,12 @@ def test_no_choice_along_two_outcomes_is_better_in_both() -> None:
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"beauty": 1.0}, "outcome beauty: not known"),
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": 1e-3}, "none of .* with peak_input <= 0.001"),
     ({}, "settling_time", {}, "axes: none"),
-    ({BOTH_KV: (2.0, 1.0)}, "settling_time", {}, "2.0 to 1.0, .* allowed: low < high"),
+    ({BOTH_KV: (2.0, 1.0)}, "settling_time", {}, "2.0 to 1.0 is not .* allowed: low < high"),
     ({BOTH_KV: ("1", 2.0)}, "settling_time", {}, "low: '1' is not allowed; allowed: a number"),
+    ({BOTH_KV: 3.0}, "settling_time", {}, "3.0 is not allowed; allowed: two numbers, low and high"),
+    ([BOTH_KV], "settling_time", {}, "free: .* is not allowed; allowed: a dict"),
+    ({BOTH_KV: (1.0, 2.0)}, ["settling_time"], {}, "minimise: .* is not allowed; allowed: a list of texts"),
+    ({BOTH_KV: (1.0, 2.0)}, "settling_time", [1.0], "subject_to: .* is not allowed; allowed: a dict"),
     ({BOTH_KV: (1.0, 2.0)}, "settling_time", {"peak_input": float("nan")}, "peak_input <= nan is not allowed"),
 ])
 def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: Any, words: str) -> None:

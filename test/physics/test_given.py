@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import pickle
+import re
+from collections.abc import Callable
 from datetime import timedelta
 from decimal import Decimal
 from fractions import Fraction
@@ -18,10 +20,12 @@ import xarray
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.exact import Integrator
+from grasp_ros.identification.fit import fit
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.run import run as run_map
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import compose
+from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import Setup, ensemble, load, simulate
 
 GAIN = "left_feedback.position_gain_N_per_m"
@@ -119,6 +123,34 @@ def test_what_a_run_takes_its_file_gives_back(tmp_path: Path, settings: dict[str
 def test_settings_that_are_none(settings: dict[str, Any], words: str) -> None:
     with pytest.raises(Refused, match=rf"^{words} is"):
         simulate(CASE, **settings)
+
+
+NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
+    (lambda changes: ensemble(CASE, changes), [1], "changes: [1]"),
+    (lambda setup: ensemble(CASE, {}, setup=setup), {}, "setup: {}"),
+    (lambda outcomes: ensemble(CASE, {}, outcomes), 3, "outcomes: 3"),
+    (lambda sampled: ensemble(CASE, {}, setup=Setup(sampled=sampled)), "no", "sampled: 'no'"),
+    (lambda quasi: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0),), 9, quasi=quasi), "no", "quasi: 'no'"),
+    (lambda log: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0, log=log),)), "no", f"{GAIN}: log: 'no'"),
+    (lambda sampled: simulate(CASE, sampled=sampled), "no", "sampled: 'no'"),
+    (lambda changes: simulate(CASE, changes=changes), [1], "changes: [1]"),
+    (lambda changes: simulate(CASE, sampled=True, changes=changes), {0: [1]}, "changes: at tick 0: [1]"),
+    (lambda controllers: simulate(CASE, controllers=controllers), ["left"], "controllers: ['left']"),
+    (lambda keys: simulate(CASE, sensitivity=keys), [3], "sensitivity: [3]"),
+    (lambda free: fit(simulate(CASE), free), 3, "free: 3"),
+    (lambda against: fit(simulate(CASE), GAIN, against=against), [GAIN], f"against: ['{GAIN}']"),
+    (lambda data: fit(data, GAIN), None, "data: NoneType"),
+    (CASE.changed, [1], "numbers: [1]"), (lambda sections: compose("case", sections), [1], "sections: [1]"),
+    (lambda settings: scenes.load("case_01", settings), 3, "settings: 3"),
+    (lambda level: simulate(CASE).section([1, 0, 0, 0, 0, 0], level), "a", "level: 'a'"),
+    (lambda scene: spectrum(scene), "case_01", "scene: str"),
+]
+
+
+@pytest.mark.parametrize(("door", "given", "words"), NO_ARGUMENTS, ids=[words for *_, words in NO_ARGUMENTS])
+def test_what_is_of_another_kind_is_refused(door: Callable[[Any], object], given: Any, words: str) -> None:
+    with pytest.raises(Refused, match=f"^{re.escape(words)} is not allowed; allowed: "):
+        door(given)
 
 
 def test_columns_of_an_ensemble_of_any_kind() -> None:
