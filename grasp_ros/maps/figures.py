@@ -108,10 +108,11 @@ def label_of(name: str) -> str:
 
 def correlations(data: Any, plan: Plan, values: np.ndarray) -> list[tuple[str, float]]:
     """Rank correlation (Spearman) of an outcome with each number of a sample, the strongest first."""
-    finite = np.isfinite(values)
-    found = []
+    from scipy import stats
+
+    finite, found = np.isfinite(values), []
+    spread = finite.sum() > 1 and np.ptp(values[finite]) > 0.0
     for axis in plan.axes:
-        ranks = np.array([np.argsort(np.argsort(column[finite])) for column in (data[axis.name].values, values)])
-        spread = finite.sum() > 1 and np.ptp(values[finite]) > 0.0
-        found.append((axis.name, float(np.corrcoef(ranks.astype(float))[0, 1]) if spread else 0.0))
+        rank = stats.spearmanr(data[axis.name].values[finite], values[finite]).statistic if spread else 0.0
+        found.append((axis.name, float(rank)))
     return sorted(found, key=lambda entry: -abs(entry[1]))

@@ -31,7 +31,6 @@ from grasp_ros.physics.layout import EPS
 DONE, NOT_FINITE, NOT_SOLVED = 0, 1, 2
 _STATUS = (Status.DONE, Status.NOT_FINITE, Status.STALLED)
 MOST_ITERATIONS = 100
-STEPS, IMPLICIT_ITERATIONS = int(Work.STEPS), int(Work.IMPLICIT_ITERATIONS)
 
 
 def solve(problem: Problem) -> Solution:
@@ -89,7 +88,7 @@ def forces(q: Any, h: float, u_l: float, u_r: float, free_l: float, free_r: floa
     end_l, end_r = free_l, free_r
     last = math.inf
     for _ in range(MOST_ITERATIONS):
-        work[IMPLICIT_ITERATIONS] += 1
+        work[Work.IMPLICIT_ITERATIONS] += 1
         rest_l = end_l - free_l + give[0] * f_l - give[2] * f_r
         rest_r = end_r - free_r + give[1] * f_r - give[2] * f_l
         a, b = 1.0 + give[0] * slope_l, -give[2] * slope_r
@@ -155,7 +154,7 @@ def run(q: Any, y: Any, duration: float, grid: Any, step: float, out: Any, work:
         # Equal steps conserve better than number * step - t, whose rounding differs from step to step.
         h = end - t if end == duration else step
         z = advance(q, y, h, work)
-        work[STEPS] += 1
+        work[Work.STEPS] += 1
         total = z[0] + z[1] + z[2] + z[3] + z[4] + z[5]
         if not math.isfinite(total):
             return NOT_SOLVED if math.isnan(total) else NOT_FINITE, row

@@ -50,9 +50,6 @@ PLAIN, PAPER, LOCATED = 0, 1, 2
 MOST_EVENTS = 10**6  # rows of memory, which is only taken where it is written
 DONE, NOT_FINITE, EVENTS_FULL = 0, 1, 2
 _STATUS = (Status.DONE, Status.NOT_FINITE, Status.EVENT_BUDGET)
-STEPS, RIGHT_HAND_SIDES, EVENT_EVALUATIONS = (
-    int(Work.STEPS), int(Work.RIGHT_HAND_SIDES), int(Work.EVENT_EVALUATIONS)
-)
 
 
 def solve(rule: int, problem: Problem) -> Solution:
@@ -130,8 +127,8 @@ def root_fraction(q: Any, y: Any, f: Any, h: float, mode: Any, side: int, after:
         if high - low <= 4.0 * EPS * high or not low < theta < high:
             break
         z = rk4(q, mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT, y, f, theta * h)
-        work[RIGHT_HAND_SIDES] += 3
-        work[EVENT_EVALUATIONS] += 1
+        work[Work.RIGHT_HAND_SIDES] += 3
+        work[Work.EVENT_EVALUATIONS] += 1
         value = distance(q, z, side, mode[side], after)
         if value > 0.0:
             high, at_high = theta, value
@@ -220,8 +217,8 @@ def run(rule: int, q: Any, y: Any, duration: float, grid: Any, step: float, out:
             push_l, push_r = mode[LEFT] == CONTACT, mode[RIGHT] == CONTACT
             f = rates(q, push_l, push_r, y)
             z = rk4(q, push_l, push_r, y, f, h)
-            work[STEPS] += 1
-            work[RIGHT_HAND_SIDES] += 4
+            work[Work.STEPS] += 1
+            work[Work.RIGHT_HAND_SIDES] += 4
             theta, side, after = first_transition(rule, q, y, f, z, h, mode, free, work)
             reached = end
             if theta <= 1.0:

@@ -16,6 +16,7 @@ from grasp_ros.exact.compilation.vectors import (
     add_product,
     highest,
     larger,
+    load,
     load_half,
     spread_half,
     store,
@@ -184,6 +185,16 @@ def exact_length(motion: Motion, table: Table, n: int, s: float) -> float:
             ):
                 s, halvings = 0.5 * s, halvings + 1
     return s
+
+
+@kernel
+def shift(c: Array, n: int, s: float) -> None:
+    """Expand the polynomials of all lanes about s, by Horner's scheme."""
+    for first in range(n):
+        above = load(c, LANES * n)
+        for i in range(LANES * (n - 1), LANES * first - 1, -LANES):
+            above = load(c, i) + s * above
+            store(c, i, above)
 
 
 @kernel

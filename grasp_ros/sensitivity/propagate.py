@@ -16,12 +16,12 @@ from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
-from grasp_ros.exact.numerics.roots import shift, value_and_rate
+from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
-from grasp_ros.sensitivity.contact import exact_length, expand_tangents, step_tangents, variable_at
+from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents, variable_at
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import (
@@ -221,8 +221,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         copy_matrix(rates.at, rates.x)  # what flies stays at the begin
         step_tangents(motion, rates, t.table, n, part)
         copy_matrix(rates.x, rates.at)
-        for lane in range(LANES):
-            shift(motion.c[lane::LANES], n, part)
+        shift(motion.c, n, part)
         left -= part
 
 

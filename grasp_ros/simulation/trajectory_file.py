@@ -12,28 +12,24 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import find
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending
-from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
+from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.lyapunov import Parts
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
 from grasp_ros.scene.npz import TEXT, Field, read_npz
 from grasp_ros.simulation.ticks import Loop, tick_of
-from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.trajectory import MOMENTS, Trajectory
 
-_ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate")}
-_TIMES = {
-    f"{kind}_{side}": Field("<f8", (f"{kind} {side}",)) for kind in ("touch", "release") for side in ("left", "right")
-}
+_ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate", *Parts._fields)}
 _WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene", "energy_of")}
 FIELDS = {
-    **_ROW, **dict.fromkeys(Parts._fields, Field("<f8", ("n",))), "epsilon": Field("<f8", ("n", 2)),
-    "impacts": Field("<f8", ("n", 2)),
-    "state": Field("<f8", ("n", 6)), "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)),
-    "mode": Field("<i8", ("n",)), **_TIMES, "events": Field("<f8", ("events", 5)), "work": Field("<i8", ("work",)),
+    **_ROW, "epsilon": Field("<f8", ("n", 2)), "impacts": Field("<f8", ("n", 2)), "state": Field("<f8", ("n", 6)),
+    "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)), "mode": Field("<i8", ("n",)),
+    "events": Field("<f8", ("events", 5)),
+    **{name: Field("<f8", (name,)) for name in MOMENTS}, "work": Field("<i8", ("work",)),
     "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
-    "at_rest": Field("<f8"),
-    "controllers": Field(TEXT, (2,)),
+    "at_rest": Field("<f8"), "controllers": Field(TEXT, (2,)),
 }
 
 
@@ -62,11 +58,9 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         if found.energy_of != words["energy_of"]:
             raise Refused(f"energy_of: {words['energy_of']}; allowed with these controllers: {found.energy_of}")
         _check(found)
-        for side, name in ((LEFT, "left"), (RIGHT, "right")):
-            for kind in (Transition.TOUCH, Transition.RELEASE):
-                key = f"{kind.name.lower()}_{name}"
-                if data[key].tolist() != found.times(kind, side).tolist():
-                    raise Refused(f"{key}: not those of the events")
+        for name, which in MOMENTS.items():
+            if data[name].tolist() != found.times(*which).tolist():
+                raise Refused(f"{name}: not those of the events")
         return found
 
 

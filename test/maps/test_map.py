@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray
 
 from grasp_ros import scene as scenes
 from grasp_ros.cli.main import main
@@ -283,6 +284,12 @@ def test_what_cannot_be_asked_is_refused(tmp_path: Path, capsys: pytest.CaptureF
     ):
         assert main(["map", "case_01", "--set", SHORT, *words, "-o", str(tmp_path / "new.zarr")]) == 2
         assert answer in capsys.readouterr().err, words
+
+
+def test_ranks_of_equal_values_are_equal() -> None:
+    plan = Plan(scenes.load("case_01"), Setup(), (Axis(GAIN, 1.0, 9.0),), 5)
+    data = {GAIN: xarray.DataArray([1.0, 2.0, 3.0, 4.0, 5.0])}
+    assert figures.correlations(data, plan, np.array([0.0, 0.0, 1.0, 0.0, 0.0])) == [(GAIN, 0.0)]
 
 
 def test_ends_of_an_axis_are_exact() -> None:
