@@ -160,11 +160,10 @@ def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDA
         Names the first that does not.
     """
     found = times(name, values)
-    good = found <= end
-    good[:1] &= found[:1] >= 0.0
-    good[1:] &= (found[1:] > found[:-1]) if strictly else (found[1:] >= found[:-1])
-    if not good.all():
-        place = int(np.argmin(good))
+    after = np.greater if strictly else np.greater_equal
+    within = not len(found) or (found.item(0) >= 0.0 and found.item(-1) <= end)  # of floats: a short run feels arrays
+    if not (within and (len(found) < 2 or after(found[1:], found[:-1]).all())):
+        place = int(np.argmin(np.append(found[:1] >= 0.0, after(found[1:], found[:-1])) & (found <= end)))
         behind = f" behind {float(found[place - 1])!r}" if place else ""
         once = ", each once" if strictly else ""
         raise Refused(f"{name}: {float(found[place])!r}{behind} is not allowed; allowed: ascending from 0 to {end!r} s"
