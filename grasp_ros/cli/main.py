@@ -47,16 +47,19 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
             stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115 - for as long as we live
             os.set_inheritable(stream.fileno(), True)  # the number that was free: for the nodes that we start as well
             setattr(sys, name, stream)
+    if isinstance(sys.stdout.buffer, io.FileIO):  # unbuffered: drops what cannot be written at once
+        sys.stdout = open(sys.stdout.fileno(), "w", 1, sys.stdout.encoding, closefd=False)  # noqa: SIM115 - likewise
     try:
         status = _status(parser, words)
         sys.stdout.flush()  # here, where it can still be said that it failed
         return status
     except OSError as error:
         enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
-        of_output = enough or error.errno in (*FULL, errno.EIO, errno.EBADF)  # EIO: the terminal is gone
+        lost = error.errno in (*FULL, errno.EAGAIN)  # the second one: full, and nobody is to wait
+        of_output = enough or lost or error.errno in (errno.EIO, errno.EBADF)  # EIO: the terminal is gone
         if not of_output or hasattr(error, "__notes__"):  # which an error of a user's controller has
             raise
-        if error.errno in FULL:
+        if lost:
             with suppress(OSError):
                 print(f"grasp: the output cannot be written: {error.strerror}", file=sys.stderr)
         nothing = os.open(os.devnull, os.O_WRONLY)

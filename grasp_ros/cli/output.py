@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from grasp_ros.graph.stopping import stop_if_signalled
-from grasp_ros.scene.files import replacing, writing
+from grasp_ros.scene.files import replacing
 
 if TYPE_CHECKING:
     from grasp_ros.scene import Scene
@@ -74,9 +74,8 @@ def destination(path: Path) -> Iterator[BinaryIO]:
         note(f"written to {path}")
         return
     sys.stdout.flush()
-    with writing("standard output"):
-        yield sys.stdout.buffer
-        sys.stdout.buffer.flush()
+    yield sys.stdout.buffer
+    sys.stdout.buffer.flush()
 
 
 def write_scene(scene: Scene, path: Path) -> None:

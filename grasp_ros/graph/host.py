@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import errno
 import hashlib
+import os
 import socket
+import sys
 from collections.abc import Mapping
+from pathlib import Path
 
 from grasp_ros import CONFIG
 from grasp_ros.physics.errors import Refused
@@ -22,7 +25,8 @@ DOMAIN, MOST_DOMAIN = "ROS_DOMAIN_ID", 232  # the last one whose ports exist
 PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 PROFILE = CONFIG / "this_host.xml"
 OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
-OURS = "rmw_fastrtps_cpp"  # the middleware that the profile is for
+MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
+INDEX = "share/ament_index/resource_index/rmw_typesupport"  # where an installation of ROS lists those that it has
 
 
 def network(given: Mapping[str, str]) -> dict[str, str]:
@@ -38,7 +42,7 @@ def this_host(given: Mapping[str, str]) -> dict[str, str]:
     """
     if given.get(RANGE, LOCALHOST) != LOCALHOST:
         return {}
-    own = given.get("RMW_IMPLEMENTATION", OURS) != OURS or any(given.get(name) for name in OTHER_WISHES)
+    own = given.get(MIDDLEWARE, OURS) != OURS or any(given.get(name) for name in OTHER_WISHES)
     return {RANGE: LOCALHOST} if own else {RANGE: LOCALHOST, PROFILES: str(PROFILE)}
 
 
@@ -70,13 +74,19 @@ def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
 
 
 def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
-    """Refuse variables with which a graph would be somewhere else, or in no place where its nodes find each other.
+    """Refuse variables with which a graph would be nowhere, somewhere else, or where its nodes do not find each other.
 
     If all are alone in one process, they need not.
     """
-    domain, reach = given.get(DOMAIN, ""), given.get(RANGE, "")
+    domain, reach, middleware = (given.get(name, "") for name in (DOMAIN, RANGE, MIDDLEWARE))
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):
         raise Refused(f"{DOMAIN}: {domain!r} is not allowed; allowed: 0 to {MOST_DOMAIN}")
     if reach not in RANGES and not (alone and reach == OFF):
         why = ", no node would find another" if reach == OFF else ""
         raise Refused(f"{RANGE}: {reach!r} is not allowed{why}; allowed: {', '.join(RANGES[1:])}")
+    roots = [sys.prefix, *given.get("AMENT_PREFIX_PATH", "").split(os.pathsep)]
+    names = (file.name for root in roots for file in Path(root, INDEX).glob("rmw_*"))
+    installed = sorted({OURS, *names} - {"rmw_implementation"})
+    if middleware and middleware not in installed:  # with which ROS's library would end the process
+        there = f"allowed: {', '.join(installed)}, which is installed"
+        raise Refused(f"{MIDDLEWARE}: {middleware!r} is not allowed; {there}")

@@ -169,6 +169,8 @@ class Graph:
         GraphError
             If a process ends with another status than 0, a controller ends early, or plant and monitor do not end
             together.
+        Refused
+            If a node refuses what it is given.
         """
         deadline = math.inf
         awaited = [name for name in self.processes if not name.endswith("controller")]
@@ -198,7 +200,7 @@ class Graph:
             if status < 0:
                 self._causes.append((time.monotonic(), f"{name}: was killed by {signal.Signals(-status).name}"))
         if ended and self._causes:
-            raise GraphError(min(self._causes)[1])
+            raise (Refused if 2 in ended.values() else GraphError)(min(self._causes)[1])
         for name, status in ended.items():
             if status or name.endswith("controller"):
                 raise GraphError(f"{name}: ended with exit status {status} before the run was over")

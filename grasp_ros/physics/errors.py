@@ -13,14 +13,19 @@ def printable(text: str) -> str:
 
 
 def place_of(error: BaseException) -> str:
-    """Where an exception was raised: "file, line n"."""
-    place = extract_tb(error.__traceback__)[-1]
+    """Where an exception was raised, if possible not in a library: "file, line n"."""
+    places = extract_tb(error.__traceback__)
+    place = next((place for place in reversed(places) if "/lib/python3" not in place.filename), places[-1])
     return f"{place.filename}, line {place.lineno}"
 
 
 def described(error: BaseException) -> str:
     """What went wrong in somebody else's code, and where: "ValueError: words, file, line n"."""
-    return ": ".join(filter(None, [type(error).__name__, str(error)])) + f", {place_of(error)}"
+    try:
+        words = str(error)
+    except Exception:  # its `__str__` is somebody else's, too
+        words = "without words"
+    return ": ".join(filter(None, [type(error).__name__, words])) + f", {place_of(error)}"
 
 
 class Refused(ValueError):  # noqa: N818 - it is what happens to the input, and no error of the package

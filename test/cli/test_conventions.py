@@ -154,11 +154,23 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
     assert "Exception" not in result.stderr
 
 
-@pytest.mark.parametrize("words", ["--help", "simulate --help", "scenes"])
+@pytest.mark.parametrize("words", ["--help", "simulate --help", "scenes", "new -o - -q"])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_an_output_that_cannot_be_written_is_no_success(words: str, unbuffered: str) -> None:
     result = shell(f"$GRASP {words} > /dev/full", PYTHONUNBUFFERED=unbuffered)
     assert (result.returncode, result.stderr) == (1, "grasp: the output cannot be written: No space left on device\n")
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_table_that_nobody_takes_in_time_is_no_success(unbuffered: str) -> None:
+    """Into a pipe that does not wait; without a buffer Python would drop the rest without a word."""
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    result = subprocess.run([*GRASP, "simulate", "case_01", "-q", "-o", "-"], stdout=writer, stderr=subprocess.PIPE,
+                            text=True, timeout=60, check=False, env={**os.environ, "PYTHONUNBUFFERED": unbuffered})
+    os.close(reader), os.close(writer)
+    words = "grasp: the output cannot be written: write could not complete without blocking"
+    assert (result.returncode, result.stderr.splitlines()[-1]) == (1, words)
 
 
 def test_a_working_directory_that_is_gone_is_refused_in_a_line(tmp_path: Path) -> None:

@@ -40,6 +40,9 @@ ENDS = {  # what a law does beside answering, and how it is told
     "raise GeneratorExit": "GeneratorExit",
     "raise BrokenPipeError('mine')": "BrokenPipeError: mine", "raise OSError(28, 'No')": r"OSError: \[Errno 28\] No",
     "1 / 0": "ZeroDivisionError: division by zero",
+    "raise type('Mute', (Exception,), {'__str__': lambda error: 1 / 0})": "Mute: without words",
+    "__import__('json').loads('')": "JSONDecodeError: Expecting value: line 1 column 1 .char 0.",
+    "__import__('rclpy').shutdown()": "RuntimeError: Context must be initialized before it can be shutdown",
 }
 DOORS: dict[str, Callable[[str], object]] = {
     "simulate": lambda place: load_controllers([f"left={place}"])["left"], "graph": OwnLaw,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -155,6 +156,7 @@ REFUSED = [
     ("ROS_DOMAIN_ID", "233", "allowed: 0 to 232"),
     ("ROS_AUTOMATIC_DISCOVERY_RANGE", "OFF", "no node would find another"),
     ("ROS_AUTOMATIC_DISCOVERY_RANGE", "local", "allowed: LOCALHOST, SUBNET, SYSTEM_DEFAULT"),
+    ("RMW_IMPLEMENTATION", "rmw_other_cpp", "allowed: rmw_fastrtps_cpp, which is installed"),
 ]
 
 
@@ -171,6 +173,34 @@ def test_where_no_graph_can_be_none_starts(
     found = subprocess.run([*START, "monitor"], capture_output=True, text=True, timeout=DEADLINE, check=False)
     assert found.returncode == 2
     assert why in found.stderr
+
+
+def test_a_warning_that_the_user_makes_an_error_is_no_fault() -> None:
+    found = subprocess.run([*START, "monitor"], capture_output=True, text=True, timeout=DEADLINE, check=False,
+                           env={**os.environ, "PYTHONWARNINGS": "error"})
+    assert found.returncode == 1
+    assert found.stderr.startswith("monitor: PYTHONWARNINGS makes it an error: DeprecationWarning: ")
+
+
+NOT_BEGUN = {  # variables of the environment, and what a node says of them
+    "ROS_LOG_DIR=/proc/nowhere": "ROS does not start: .*'/proc/nowhere'.*; environment: .*ROS_LOG_DIR=/proc/nowhere",
+    "ROS_SECURITY_ENABLE=true ROS_SECURITY_STRATEGY=Enforce": "ROS does not start: .*ROS_SECURITY_STRATEGY=Enforce",
+    "ROS_STATIC_PEERS=no.such.host.invalid": "error creating node: Unable to resolve peer no.such.host.invalid",
+    "": "grasp: left_controller: law: laws:Camera: .* does not begin: ValueError: no camera, .*laws.py, line 3$",
+}
+
+
+@pytest.mark.slow  # real processes
+@pytest.mark.parametrize("variables", NOT_BEGUN)
+def test_a_run_whose_nodes_refuse_what_they_are_given_is_refused(tmp_path: Path, variables: str) -> None:
+    (tmp_path / "laws.py").write_text("class Camera:\n    def __init__(self):\n        raise ValueError('no camera')\n")
+    environment = {**os.environ, **dict(word.split("=") for word in variables.split())}
+    run = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=laws:Camera"]
+    found = subprocess.run(run, capture_output=True, text=True, timeout=DEADLINE, check=False, env=environment,
+                           cwd=tmp_path)
+    assert found.returncode == 2
+    assert re.search(NOT_BEGUN[variables], found.stderr, re.M)
+    assert "Traceback" not in found.stderr
 
 
 def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:

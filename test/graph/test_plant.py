@@ -45,9 +45,13 @@ REFUSED = [
     ("plant", "-p object.mass_kg:=abc", "object.mass_kg: 'abc' is not allowed; allowed: a number >= 1e-12"),
     ("plant", "-p scene:=table -p left_arm_table.time_s:=3.0", "left_arm_table.time_s: 3.0 is not allowed"),
     ("plant", "-p use_sim_time:=3", "use_sim_time"),
-    ("plant", "-p nothing", "--ros-args: "),
-    ("plant", "--params-file nothing.yaml", "--ros-args: "),
-    ("monitor", "-p bag:=.", "bag: '.' exists"),
+    ("plant", "-p nothing", "ROS does not start: "),
+    ("plant", "--params-file nothing.yaml", "ROS does not start: "),
+    ("monitor", "-p bagg:=new", "bagg: no such parameter; did you mean bag?"),
+    ("left_controller", "-p wait_for_monitr:=true", "wait_for_monitr: no such parameter; did you mean wait_for_moni"),
+    ("monitor", "-p bag:=.", "bag: .: is there; allowed: a new directory"),
+    ("monitor", "-p bag:=/dev/null/bag", "bag: /dev/null/bag: cannot be written: Not a directory"),
+    ("monitor", "-p bag:=/proc/bag", "bag: /proc/bag: cannot be written: No such file or directory"),
 ]
 
 
@@ -78,6 +82,16 @@ def test_bad_parameters_are_refused(refusals: list[tuple[int, str]], row: int) -
     assert status == 2
     assert REFUSED[row][2] in message.splitlines()[-1]
     assert "Traceback" not in message
+
+
+def test_a_file_of_parameters_for_another_node_is_named(launch: Any, tmp_path: Path) -> None:
+    (tmp_path / "file.yaml").write_text("plannt:\n  ros__parameters:\n    scene: case_03\n")
+    words = [*START, "plant", "--ros-args", "--params-file", "file.yaml"]
+    plant = launch(*words, cwd=tmp_path, stderr=subprocess.PIPE)
+    first = plant.stderr.readline()
+    plant.terminate()
+    plant.communicate(timeout=DEADLINE)
+    assert first.endswith("[plant]: no parameter file has anything for /plant\n")
 
 
 def test_the_plant_logs_what_its_scene_can_hardly_mean(launch: Any, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -145,10 +146,10 @@ def test_what_cannot_end_is_ended_by_force(launch: Any, held: str, number: signa
 
 HANGING_END = """
 import sys, threading
-import rclpy
+from rclpy.context import Context
 from grasp_ros.graph import __main__ as start, stopping
 stopping.GRACE_SECONDS = 0.5
-rclpy.try_shutdown = threading.Event().wait
+Context.try_shutdown = lambda _: threading.Event().wait()
 sys.exit(start.main("plant"))
 """
 
@@ -213,6 +214,8 @@ def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> Non
     [
         ("sys.exit(0)", [], r"left_controller: law: mine:law: SystemExit: 0, .*mine.py, line 4, at tick 50"),
         ("sys.exit(0)", ["--one-process"], r"left_controller: law: mine:law: SystemExit: 0, .*, line 4, at tick 50"),
+        ("rclpy.shutdown()", [], r"left_controller: law: mine:law: RuntimeError: .*, line 4, at tick 50"),
+        ("rclpy.shutdown()", ["--one-process"], r"left_controller: law: mine:law: Runtime.*, line 4, at tick 50"),
         ("os._exit(0)", [], r"left_controller: ended with exit status 0 before the run was over"),
         ("os._exit(0)", ["--one-process"], r"graph: ended with exit status 0 before the run was over"),
     ],
@@ -220,13 +223,44 @@ def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> Non
 def test_a_law_that_ends_its_process_has_ended_no_run(
     launch: Any, tmp_path: Path, line: str, options: list[str], words: str
 ) -> None:
-    (tmp_path / "mine.py").write_text(f"import os, sys\ndef law(tick, t, x, v):\n    if tick == 50:\n        {line}\n"
-                                      "    return -5.0 * x - 0.5 * v\n")
+    (tmp_path / "mine.py").write_text("import os, rclpy, sys\ndef law(tick, t, x, v):\n    if tick == 50:\n"
+                                      f"        {line}\n    return -5.0 * x - 0.5 * v\n")
     command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=mine:law", "-o", "run"]
     process = launch(*command, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     out, err = process.communicate(timeout=DEADLINE)
     assert (process.returncode, out) == (1, "")
     assert re.search(rf"^grasp: {words}; run/bag has what was recorded$", err, re.M), err
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("options", [[], ["--one-process"]])
+def test_a_law_that_is_a_node_itself_disturbs_no_end(launch: Any, tmp_path: Path, options: list[str]) -> None:
+    """`rclpy.init` sets signal handlers that would end all contexts of the process."""
+    (tmp_path / "mine.py").write_text("import rclpy\nrclpy.init()\nnode = rclpy.create_node('mine')\n"
+                                      "def law(tick, t, x, v):\n    return -5.0 * x - 0.5 * v\n")
+    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=mine:law", "-o", "run"]
+    process = launch(*command, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    recorded = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 20_000, "a bag that grows")
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, "a fault" in err) == (0, False), err
+    assert "interrupted" in out
+
+
+def test_a_bag_that_cannot_be_closed_is_a_sentence(launch: Any, tmp_path: Path) -> None:
+    """No tick comes that would say it earlier."""
+    names = {"monitor": ["bag:=bag"], "plant": ["scene:=arm_alone", "-p", "paused:=true"]}
+    nodes = [launch(*START, name, "--ros-args", "-p", *words, cwd=tmp_path, stderr=subprocess.PIPE)
+             for name, words in names.items()]
+    while "recording" not in nodes[0].stderr.readline():
+        pass
+    shutil.rmtree(tmp_path / "bag")
+    for node in nodes:
+        node.send_signal(signal.SIGINT)
+    (_, err), _ = [node.communicate(timeout=DEADLINE) for node in nodes]
+    assert nodes[0].returncode == 1
+    assert re.search(r"\[monitor\]: bag: (was deleted during the recording|cannot be written: No such file.*)\n$", err)
     assert "Traceback" not in err
 
 

@@ -65,7 +65,6 @@ class PeerNode(GraspNode):
         if reaction not in ("end", "wait"):
             raise Refused(f"on_silence: {reaction!r} is not allowed; allowed: end, wait")
         self._ends = reaction == "end"
-        self.begun = False  # whether the peers it waited for at first have come
         self._silent: dict[str, float] = {}  # by topic: since when
         self._said = 0.0  # when that was last said
         self._left: tuple[Phase, str] | None = None  # what it did before a peer ended without which it stays

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from pathlib import Path
@@ -30,7 +31,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
-from grasp_ros.scene.files import reading
+from grasp_ros.scene.files import writing
 from grasp_ros.scene.topics import (
     CHANGES,
     CLOCK,
@@ -66,9 +67,9 @@ class Monitor(PeerNode):
         super().__init__("monitor", **options)
         default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
         self._path = Path(self.read_only("bag", default))
-        with reading(self._path):
-            if self._path.exists():
-                raise Refused(f"bag: {str(self._path)!r} exists; allowed: a directory that does not exist yet")
+        with writing(f"bag: {self._path}"):  # now, and not when a plant comes
+            self._path.mkdir(parents=True)
+            self._path.rmdir()
         self._running: Running | None = None
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
@@ -277,12 +278,9 @@ class Monitor(PeerNode):
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
-            try:
+            with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._complete()
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
-            except BagError as error:
-                if not self.exit_code:  # otherwise it has been said
-                    self.fail(str(error))
         if self.finished:
             self.flush(self._output)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import time
@@ -10,14 +11,16 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
 import rclpy
+from rclpy.context import Context
 from rclpy.experimental import EventsExecutor
 from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.graph.parameters import TOOLS
 from grasp_ros.graph.ros.node import GraspNode
-from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, tell_parent
+from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, note_signals, tell_parent
 from grasp_ros.physics.errors import Refused, place_of
 
+OF_ROS = ("ROS_", "RMW_", "RCUTILS_", "FAST")  # how variables begin that rcl and the middleware read
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
 # A spin without a time limit burns a core and can hang; one until a future is complete, which does not return between
 # messages, takes less time, and has corrupted the heap of a process.
@@ -25,7 +28,7 @@ POLL_SECONDS = 0.2
 INTERRUPTED = 130  # of a tool that a signal ends before it is through; nodes of a graph are meant to end by one
 
 
-def run(makes: Mapping[str, Callable[[], GraspNode]], received: list[int]) -> int:
+def run(makes: Mapping[str, Callable[..., GraspNode]], received: list[int]) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
 
     0 after a finished run or a signal, which interrupts a tool (130); 2 if a node refuses its parameters, otherwise the
@@ -33,7 +36,8 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: list[int]) -> in
     context under a callback, which then raises.
     """
     nodes: list[GraspNode] = []
-    status = _live(makes, nodes, received)
+    context = Context()  # not the default one, which is that of a user's law: to begin, and to shut down
+    status = _live(context, makes, nodes, received)
     if received and not status and TOOLS.keys() & makes.keys():
         status = INTERRUPTED
     for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
@@ -41,21 +45,26 @@ def run(makes: Mapping[str, Callable[[], GraspNode]], received: list[int]) -> in
     end_by_force(", ".join(makes), status)  # the end of DDS can hang, and a thread of a law keeps the interpreter
     for node in nodes:
         node.destroy_node()
-    rclpy.try_shutdown()
+    context.try_shutdown()
     return status
 
 
-def _live(makes: Mapping[str, Callable[[], GraspNode]], nodes: list[GraspNode], received: list[int]) -> int:
-    """Make the nodes and run them until there is nothing left to do; returns the exit status."""
+def _live(
+    context: Context, makes: Mapping[str, Callable[..., GraspNode]], nodes: list[GraspNode], received: list[int]
+) -> int:
+    """Make the nodes, run them until there is nothing left to do, and close them; returns the exit status."""
     names = together = ", ".join(makes)
     try:
         try:
-            rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+            rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         except RuntimeError as error:  # the base of what rcl raises
-            raise Refused(f"--ros-args: {' '.join(str(error).split())}") from None
+            given = " ".join(f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS))
+            raise Refused(f"ROS does not start: {' '.join(str(error).split())}; environment: {given}") from None
         try:
             for names, make in makes.items():  # noqa: B007 - which one is refused
-                nodes.append(make())
+                nodes.append(make(context=context))
+                nodes[-1].refuse_unknown(numbers=False)
+            note_signals(received)  # again: a law may have put its own reactions in their place, as `rclpy.init` does
             names = together
             gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
             gc.enable()
@@ -63,14 +72,15 @@ def _live(makes: Mapping[str, Callable[[], GraspNode]], nodes: list[GraspNode], 
                 _spin(nodes, received, names)
         finally:
             for node in nodes:
-                node.close()
+                node.guarded(node.close)
     except Refused as error:
         tell_parent(names, str(error))
         with suppress(OSError):  # nobody reads it
             print(error, file=sys.stderr)
         return 2
-    except Exception as error:  # a fault of this package: in one line, and where
-        words = f"a fault of this package: {type(error).__name__}: {error}, in {place_of(error)}"
+    except Exception as error:  # in one line, and where
+        whose = "PYTHONWARNINGS makes it an error" if isinstance(error, Warning) else "a fault of this package"
+        words = f"{whose}: {type(error).__name__}: {error}, in {place_of(error)}"
         tell_parent(names, words)
         with suppress(OSError):
             print(f"{names}: {words}", file=sys.stderr)
@@ -78,7 +88,7 @@ def _live(makes: Mapping[str, Callable[[], GraspNode]], nodes: list[GraspNode], 
     return next((node.exit_code for node in nodes if node.exit_code), 0)
 
 
-def _spin(nodes: Sequence[GraspNode], received: list[int], names: str) -> None:
+def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:
     """Run nodes in this thread until plant and monitor, or whatever there is, have finished, or a signal has come.
 
     Controllers go on for the next plant and end when nothing else is left.

@@ -55,8 +55,9 @@ class GraspNode(ParameterNode):
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
+        self.begun = False  # whether the peers it waited for at first have come
         self.finished = False  # whether there is nothing left to do
-        self.exit_code = 0  # 1 after a failure, 2 after a refusal
+        self.exit_code = 0  # 1 after a failure, 2 after a refusal before it has begun
         self.counters: dict[str, int | float | str] = {}  # the values of its /diagnostics
         self.inputs: list[Topic] = []  # what it subscribes to
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
@@ -103,7 +104,7 @@ class GraspNode(ParameterNode):
             action(*words)
         except Refused as error:
             self.fail(str(error))
-            self.exit_code = 2
+            self.exit_code = 1 if self.begun else 2
 
     def sources(self, topic: Topic) -> list[str]:
         """Full names of the nodes that publish on a topic, as far as discovery has them."""

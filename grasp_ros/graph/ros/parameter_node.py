@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -31,6 +32,8 @@ class ParameterNode(Node):
         self._in_words = PARAMETERS.get(name, {})
         with _refusing():
             super().__init__(name, **options)
+        if "--params-file" in sys.argv and not self._parameter_overrides:  # one of a file for many, or a wrong name
+            self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
 
     def read_only(self, name: str, default: Any) -> Any:
         """Declare a parameter that is set at start only, and return its value."""
@@ -64,13 +67,18 @@ class ParameterNode(Node):
                     raise Refused(f"{name}: {found!r} is not allowed; allowed: {parameter.allowed}")
                 if (found := parameter.read(found)) != value:
                     given[name] = found
-        unknown = [name for name in self._parameter_overrides if not self.has_parameter(name)]
+        self.refuse_unknown()
+        return given
+
+    def refuse_unknown(self, numbers: bool = True) -> None:
+        """Refuse what the start has given and nobody has declared; numbers of a scene too, if it is known by now."""
+        given = [name for name in self._parameter_overrides if numbers or "." not in name]
+        unknown = [name for name in given if not self.has_parameter(name)]
         if unknown:  # rclpy itself would not say a word
             name, free = unknown[0], self._parameters.get("free_running")
             missed = free is not None and not free.value and name in FREE
             hint = "allowed: with free_running:=true" if missed else allowed(name, sorted(self._parameters))
             raise Refused(f"{', '.join(unknown)}: no such parameter; {hint}")
-        return given
 
     def forget_scene(self) -> None:
         """Take back what `declare_scene` declared; rclpy itself does not let go of what is read-only."""
