@@ -67,13 +67,15 @@ def copy(state: State, lane: int, source: int) -> None:
 
 @inlined
 def move_in_flight(state: State, body: Body, flown: Flown) -> None:
-    """Move a body on by a flight; a long one is known by where it ends."""
+    """Move a body on by a flight; of a long one only where it ends may be known."""
     v = velocity_lane(body)
     if math.isnan(flown.way):
         put(state, v - 1, flown.x)
-        put(state, v, flown.v)
     else:
         add(state, v - 1, flown.way)
+    if math.isnan(flown.change):
+        put(state, v, flown.v)
+    else:
         add(state, v, flown.change)
 
 

@@ -88,8 +88,8 @@ def fly(flight: Flight, t: float) -> Flown:
         return Flown(x_e + swing * (slow_decay - slow * response) + v * response, velocity, math.nan, math.nan)
     slow_part = t if slow == 0.0 else math.expm1(slow * t) / slow
     fast_part = t if fast == 0.0 else math.expm1(fast * t) / fast
-    x += v * response + push * (slow_part - fast_part) / (2.0 * rate)
-    return Flown(x, velocity, math.nan, math.nan)
+    way = v * response + push * (slow_part - fast_part) / (2.0 * rate)
+    return Flown(x + way, velocity, way, math.nan)
 
 
 @inlined
