@@ -111,19 +111,6 @@ def envelope_step(pair: PairFlight, at: Motion) -> float:
     return safe_step(-room, towards, max(-pair.sign * body.force, 0.0))
 
 
-@inlined
-def envelope_of_speed(pair: PairFlight, at: Motion, a: float, a_o: float) -> float:
-    """Time for which the speed of the arm's swing cannot bring u' to -1/p beyond rounding, as `envelope_step`.
-
-    a, a_o are the accelerations. Drag only lessens that of an object.
-    """
-    if pair.arm_rates.stiffness <= 0.0 or pair.body_rates.damping < 0.0:
-        return 0.0
-    swing = bound_by(pair.arm_rates, at.v, a, math.inf)
-    room = pair.sign * at.v_o - swing - pair.inverse_p * (1.0 - 8.0 * EPS)
-    return safe_step(-room, max(-pair.sign * a_o, 0.0), 0.0) if room > 0.0 else 0.0
-
-
 @kernel
 def bound(body: Array, q: float, q_rate: float, span: float) -> float:
     """`bound_by` of a body's row (4,)."""

@@ -7,13 +7,13 @@ few of them: plant and state cross as one block of numbers each, of which the ar
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.layout import LANES, Kind, Pair, Place, Slide, Transition
+from grasp_ros.physics.layout import LANES, Kind, Pair, Place
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -234,7 +234,7 @@ class PairFlight(NamedTuple):
     u: float  # at the begin, m
     alike: bool  # equal rates: they move relative to each other as one such body
     horizon: float  # time in s for which a bound may be taken: what a feedback drives may grow
-    inverse_p: float  # 1 / p, m/s; only read by a re-entry
+    inverse_p: float  # 1 / p, m/s
     x_e: float  # rest position of an arm with a spring, m
     square_rate: float  # of the faster body, 1/s^2
 
@@ -252,17 +252,10 @@ class Motion(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """The first event of a pair in a segment."""
+    """The first event of a pair or of the object in a segment."""
 
     when: float  # time in s in a flight, s in units of the step in contact; inf: none, nan: the search does not end
-    what: Transition
-
-
-class SlideCandidate(NamedTuple):
-    """The first event of the object in a segment."""
-
-    when: float
-    what: Slide  # the mode that follows; after a stop `modes.initial_slide` decides
+    what: Any  # the Transition of a pair; of the object the Slide that follows, after a stop `initial_slide` decides
 
 
 class Push(NamedTuple):
@@ -285,7 +278,7 @@ class Ends(NamedTuple):
 
     left: Candidate
     right: Candidate
-    slide: SlideCandidate
+    slide: Candidate
     known: float  # s, or the variable of a Taylor step
 
 

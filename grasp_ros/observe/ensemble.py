@@ -34,7 +34,6 @@ from grasp_ros.exact.records import (
 from grasp_ros.observe.observe import BEGIN, FINISH
 from grasp_ros.observe.observer import RunObserver
 from grasp_ros.observe.record import UNDECIDED, Memory, Seen, Switch, Wanted
-from grasp_ros.observe.settling import takes_energy
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
 
 
@@ -161,9 +160,8 @@ def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, memory: Memory,
     seen, switches, outcome, done = memory.seen, memory.switches, Outcome.DONE.value, 1
     wanted, losses = switches[Switch.WANTED], switches[Switch.LOSSES]
     switches[Switch.WANTED], switches[Switch.LOSSES] = Wanted.SETTLING.value, 0
-    losing = takes_energy(memory.loop, room.plant.pairs, room.plant_block[COULOMB])
     left, right = rows.touches[i, 0], rows.touches[i, 1]
-    while seen[Seen.SETTLED] == UNDECIDED and losing and done < limits.horizons and outcome == Outcome.DONE:
+    while seen[Seen.SETTLED] == UNDECIDED and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
         outcome = run_row(door, loop, rows, i, room, limits)
         call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)

@@ -21,7 +21,7 @@ def weights(segment: SegmentRecord, q: int) -> tuple[float, float, float]:
     """a, b, c of the quantity a x + b v + c."""
     if q == Quantity.INPUT_L or q == Quantity.INPUT_R:
         side = LEFT if q == Quantity.INPUT_L else RIGHT
-        gains, constant = segment.gains[side], segment.given[side, Of.FORCE] - segment.own[side, Of.FORCE]
+        gains, constant = segment.m.gains[side], segment.m.given[side, Of.FORCE] - segment.m.own[side, Of.FORCE]
         return -gains[POSITION], -gains[VELOCITY], constant
     return (1.0, 0.0, 0.0) if q in (X.L, X.O, X.R) else (0.0, 1.0, 0.0)
 
@@ -53,12 +53,12 @@ def first_zero(flight: Flight, r: float, r_rate: float) -> float:
 def in_flight(segment: SegmentRecord, q: int) -> tuple[float, float]:
     """Least and largest value of a quantity in a flight."""
     (a, b, c), body = weights(segment, q), owner(q)
-    row, lane = segment.bodies[body], velocity_lane(body)
-    x, v = segment.before[lane - 1], segment.before[lane]
+    row, lane = segment.m.bodies[body], velocity_lane(body)
+    x, v = segment.m.before[lane - 1], segment.m.before[lane]
     flight = launch(row, x, v)
     push = own_acceleration(row, x, v)
     jerk = next_derivative(row, v, push)
-    at_begin, at_end = a * x + b * v + c, a * segment.y[lane - 1] + b * segment.y[lane] + c
+    at_begin, at_end = a * x + b * v + c, a * segment.m.y[lane - 1] + b * segment.m.y[lane] + c
     low, high = min(at_begin, at_end), max(at_begin, at_end)
     first = first_zero(flight, a * v + b * push, a * push + b * jerk)
     if not first < segment.t:
@@ -78,8 +78,8 @@ def in_flight(segment: SegmentRecord, q: int) -> tuple[float, float]:
 def flight_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     """Bounds on positions and velocities in a flight, by the energy of the swing."""
     for body in (LEFT, OBJECT, RIGHT):
-        row, lane = segment.bodies[body], velocity_lane(body)
-        x, v, at, rate = segment.before[lane - 1], segment.before[lane], segment.y[lane - 1], segment.y[lane]
+        row, lane = segment.m.bodies[body], velocity_lane(body)
+        x, v, at, rate = segment.m.before[lane - 1], segment.m.before[lane], segment.m.y[lane - 1], segment.m.y[lane]
         if row[Of.STIFFNESS] > 0.0 and row[Of.MASS] < math.inf:
             push = own_acceleration(row, x, v)
             x_e = x + (row[Of.MASS] * push + row[Of.DAMPING] * v) / row[Of.STIFFNESS]
@@ -90,5 +90,6 @@ def flight_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
             low[lane - 1], high[lane - 1] = min(x, at) - way, max(x, at) + way
             low[lane], high[lane] = min(v, rate), max(v, rate)
     for lane in (U.L, U.R):
-        low[lane], high[lane] = min(segment.before[lane], segment.y[lane]), max(segment.before[lane], segment.y[lane])
+        u, u_end = segment.m.before[lane], segment.m.y[lane]
+        low[lane], high[lane] = min(u, u_end), max(u, u_end)
     low[Quantity.IMPACT_L] = high[Quantity.IMPACT_L] = low[Quantity.IMPACT_R] = high[Quantity.IMPACT_R] = 0.0

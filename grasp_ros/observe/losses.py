@@ -27,12 +27,12 @@ NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(16)[0] + 1.0), 0.5 * np
 @inlined
 def add_damping(segment: SegmentRecord, seen: Array, body: Body, squares: float) -> None:
     """What damper and feedback of a body take, from the integral of v^2; drag of the object is friction."""
-    taken = segment.own[body, Of.DAMPING] * squares
+    taken = segment.m.own[body, Of.DAMPING] * squares
     if body == OBJECT:
         seen[Seen.FRICTION] += taken
     else:
         seen[Seen.DAMPERS] += taken
-        seen[Seen.FEEDBACK] += (segment.bodies[body, Of.DAMPING] - segment.own[body, Of.DAMPING]) * squares
+        seen[Seen.FEEDBACK] += (segment.m.bodies[body, Of.DAMPING] - segment.m.own[body, Of.DAMPING]) * squares
 
 
 @kernel
@@ -51,8 +51,8 @@ def undamped_squares(row: Array, x: float, v: float, t: float) -> float:
 @kernel
 def flight_squares(segment: SegmentRecord, body: Body) -> float:
     """Integral of v^2 over a flight, m^2/s."""
-    row, lane = segment.bodies[body], velocity_lane(body)
-    x, v, x_end, v_end = segment.before[lane - 1], segment.before[lane], segment.y[lane - 1], segment.y[lane]
+    row, lane = segment.m.bodies[body], velocity_lane(body)
+    x, v, x_end, v_end = segment.m.before[lane - 1], segment.m.before[lane], segment.m.y[lane - 1], segment.m.y[lane]
     if row[Of.MASS] == math.inf:  # an object that sticks
         return 0.0
     if row[Of.DAMPING] == 0.0:
@@ -65,10 +65,10 @@ def flight_squares(segment: SegmentRecord, body: Body) -> float:
 @inlined
 def clamped_loss(segment: SegmentRecord, side: Body) -> float:
     """What a pair that is closed without force takes: its stored energy goes."""
-    if segment.mode[side] not in (Pair.CLAMPED, Pair.LEAVING):
+    if segment.m.mode[side] not in (Pair.CLAMPED, Pair.LEAVING):
         return 0.0
-    hertzian = segment.pairs[side, Law.HERTZIAN]
-    before, after = max(segment.before[U.L + side], 0.0), max(segment.y[U.L + side], 0.0)
+    hertzian = segment.m.pairs[side, Law.HERTZIAN]
+    before, after = max(segment.m.before[U.L + side], 0.0), max(segment.m.y[U.L + side], 0.0)
     return stored_energy(hertzian, before) - stored_energy(hertzian, after)
 
 
@@ -76,7 +76,7 @@ def clamped_loss(segment: SegmentRecord, side: Body) -> float:
 def flight_losses(segment: SegmentRecord, seen: Array) -> None:
     """Add what a flight takes."""
     for body in (LEFT, OBJECT, RIGHT):
-        if segment.own[body, Of.DAMPING] != 0.0 or segment.bodies[body, Of.DAMPING] != 0.0:
+        if segment.m.own[body, Of.DAMPING] != 0.0 or segment.m.bodies[body, Of.DAMPING] != 0.0:
             add_damping(segment, seen, body, flight_squares(segment, body))
     seen[Seen.IMPACTS] += clamped_loss(segment, LEFT) + clamped_loss(segment, RIGHT)
 
@@ -86,27 +86,27 @@ def pace(segment: SegmentRecord, s: float) -> float:
     """dt/ds of the variable of the polynomials, s."""
     total = 0.0
     for k in range(segment.degree, 0, -1):
-        total = total * s + k * segment.c[LANES * k + Lane.TIME]
+        total = total * s + k * segment.m.c[LANES * k + Lane.TIME]
     return total
 
 
 @inlined
 def impact_power(segment: SegmentRecord, at: Array, side: Body) -> float:
     """p H u^(3/2) u'^2 of a pair in contact, W."""
-    if segment.mode[side] != Pair.CONTACT:
+    if segment.m.mode[side] != Pair.CONTACT:
         return 0.0
-    pair, d, z = segment.pairs[side], approach(at, side), max(at[U.L + side], 0.0)
+    pair, d, z = segment.m.pairs[side], approach(at, side), max(at[U.L + side], 0.0)
     return pair[Law.DISSIPATION] * elastic_force(pair[Law.HERTZIAN], z * z) * d * d
 
 
 @kernel
 def step_losses(segment: SegmentRecord, seen: Array) -> None:
     """Add what a step with polynomials in regularised time takes."""
-    at = segment.rows[WORK]
+    at = segment.m.rows[WORK]
     left = right = middle = impacts = 0.0
     for j in range(NODES.shape[0]):
         s = segment.s * NODES[j]
-        values(segment.c, segment.degree, s, at)
+        values(segment.m.c, segment.degree, s, at)
         share = segment.s * WEIGHTS[j] * pace(segment, s)
         left += share * at[velocity_lane(LEFT)] ** 2
         right += share * at[velocity_lane(RIGHT)] ** 2
@@ -127,8 +127,8 @@ def add_losses(segment: SegmentRecord, base: Array, seen: Array) -> None:
         step_losses(segment, seen)
     for body in (LEFT, OBJECT, RIGHT):
         place = velocity_lane(body) - 1
-        push = segment.given[body, Of.FORCE] - base[body, Of.FORCE]
-        seen[Seen.WORK] += push * (segment.y[place] - segment.before[place])
-    if segment.bodies[OBJECT, Of.MASS] < math.inf:
-        against = segment.given[OBJECT, Of.FORCE] - segment.bodies[OBJECT, Of.FORCE]
-        seen[Seen.FRICTION] += against * (segment.y[X.O] - segment.before[X.O])
+        push = segment.m.given[body, Of.FORCE] - base[body, Of.FORCE]
+        seen[Seen.WORK] += push * (segment.m.y[place] - segment.m.before[place])
+    if segment.m.bodies[OBJECT, Of.MASS] < math.inf:
+        against = segment.m.given[OBJECT, Of.FORCE] - segment.m.bodies[OBJECT, Of.FORCE]
+        seen[Seen.FRICTION] += against * (segment.m.y[X.O] - segment.m.before[X.O])

@@ -7,19 +7,16 @@ import math
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, inlined, kernel
 from grasp_ros.exact.driver.callback import call
-from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.records import Array
 from grasp_ros.observe.flight_extremes import flight_ranges, owner, weights
 from grasp_ros.observe.losses import add_losses
 from grasp_ros.observe.record import (
     LOWER,
-    NONE,
     QUANTITIES,
     SEEN,
     STATES,
     UPPER,
-    Kept,
     Memory,
     Quantity,
     Seen,
@@ -27,9 +24,8 @@ from grasp_ros.observe.record import (
     Switch,
     Wanted,
     memory_at,
-    segment_record,
 )
-from grasp_ros.observe.settling import kept_record, last_outside, settled_from, watch_bound
+from grasp_ros.observe.settling import settled_from, watch_bound
 from grasp_ros.observe.step_extremes import extremes_of, step_ranges
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Kind, Law, Of, Pair, U, X
 
@@ -58,7 +54,7 @@ def level(loop: Array, pairs: Array, y: Array) -> float:
 @kernel
 def write_ranges(segment: SegmentRecord) -> None:
     """Write bounds of all quantities to scratch."""
-    low, high = segment.rows[LOWER], segment.rows[UPPER]
+    low, high = segment.m.rows[LOWER], segment.m.rows[UPPER]
     if segment.kind == Kind.FLIGHT:
         flight_ranges(segment, low, high)
     else:
@@ -78,7 +74,7 @@ def is_wanted(segment: SegmentRecord, q: int, wanted: int) -> bool:
         return wanted & Wanted.MOTION.value != 0
     if q >= Quantity.INPUT_L:
         return wanted & Wanted.INPUTS.value != 0
-    return wanted & Wanted.IMPACTS.value != 0 and segment.mode[q % 2] == Pair.CONTACT
+    return wanted & Wanted.IMPACTS.value != 0 and segment.m.mode[q % 2] == Pair.CONTACT
 
 
 @kernel
@@ -87,7 +83,7 @@ def watch_quantities(segment: SegmentRecord, seen: Array, wanted: int) -> None:
     for q in range(QUANTITIES):
         if not is_wanted(segment, q, wanted):
             continue
-        if segment.rows[LOWER, q] < seen[Seen.LOW + q] or segment.rows[UPPER, q] > seen[Seen.HIGH + q]:
+        if segment.m.rows[LOWER, q] < seen[Seen.LOW + q] or segment.m.rows[UPPER, q] > seen[Seen.HIGH + q]:
             low, high = extremes_of(segment, q)
             seen[Seen.LOW + q] = min(seen[Seen.LOW + q], low)
             seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
@@ -111,28 +107,21 @@ def begin(m: Memory, bound: float) -> None:
     for q in range(QUANTITIES):
         seen[Seen.LOW + q], seen[Seen.HIGH + q] = math.inf, -math.inf
     for place in range(STATES):
-        seen[Seen.STATE + place] = y[place]
+        m.before[place] = y[place]
     seen[Seen.LEVEL] = seen[Seen.LEAST] = level(m.loop, m.pairs, y)
     seen[Seen.BOUND], seen[Seen.SETTLED] = bound * max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])), math.nan
     for body in (LEFT, OBJECT, RIGHT):
-        m.kept[body, Kept.KIND] = NONE
         if abs(y[velocity_lane(body) - 1]) > seen[Seen.BOUND]:
             seen[Seen.OUTSIDE + body] = math.inf
 
 
 @kernel
 def finish(m: Memory) -> None:
-    """What follows at the end of a run: the last times outside the bound, and whether they are the last for good."""
-    seen, kept = m.seen, m.kept
-    for body in (LEFT, OBJECT, RIGHT):
-        if kept[body, Kept.KIND] != NONE:
-            segment = kept_record(segment_record(m, 0, 0.0, 0.0, 0), kept[body])
-            seen[Seen.OUTSIDE + body] = kept[body, Kept.BEGIN] + last_outside(segment, body, seen[Seen.BOUND])
-            kept[body, Kept.KIND] = NONE
+    """What follows at the end of a run: whether the last times outside the bound are the last for good."""
+    seen = m.seen
     seen[Seen.LAST_OUTSIDE] = max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
     if m.switches[Switch.CERTAIN] != 0:
-        V_c, rests = level(m.loop, m.pairs, m.y), m.rest[SINCE] < math.inf
-        seen[Seen.SETTLED] = settled_from(m.loop, m.pairs, V_c, rests, seen)
+        seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
 
 
 @door
@@ -149,22 +138,21 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
     if kind == FINISH:
         finish(m)
         return 0
-    segment, seen, wanted = segment_record(m, kind, t, s, degree), m.seen, m.switches[Switch.WANTED]
-    if not math.isfinite(segment.y.sum() + t):
+    segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
+    if not math.isfinite(segment.m.y.sum() + t):
         return 0
-    seen[Seen.SEGMENTS] += 1.0
     bound = wanted & (Wanted.SETTLING.value | Wanted.BOUND.value)
     if bound or wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value):
         write_ranges(segment)
         watch_quantities(segment, seen, wanted)
     if bound:
-        watch_bound(segment, seen, m.kept, m.clock[2] + (m.clock[0] + m.clock[1]))
+        watch_bound(segment, seen, m.clock[2] + (m.clock[0] + m.clock[1]))
     if m.switches[Switch.LOSSES] != 0:
         call(m.switches[Switch.LOSSES], address, kind, t, s, degree)
     if wanted & Wanted.RISE.value:
         watch_level(m)
     for place in range(STATES):
-        segment.before[place] = segment.y[place]
+        m.before[place] = m.y[place]
     return 0
 
 
@@ -172,5 +160,5 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
 def observe_losses(address: int, kind: int, t: float, s: float, degree: int) -> int:
     """Add the losses of a segment; a function of its own, so that only who asks for them waits for its compilation."""
     m = memory_at(address)
-    add_losses(segment_record(m, kind, t, s, degree), m.base, m.seen)
+    add_losses(SegmentRecord(kind, t, s, degree, m), m.base, m.seen)
     return 0

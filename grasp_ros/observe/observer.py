@@ -10,10 +10,9 @@ import numpy as np
 from grasp_ros.exact.compilation.jit import compiled_address
 from grasp_ros.exact.driver.callback import block_of
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
+from grasp_ros.exact.records import Integers, Plant, State, Tables
 from grasp_ros.observe.observe import BEGIN, FINISH, observe, observe_losses
 from grasp_ros.observe.record import UNDECIDED, Seen, Switch, Wanted, memory_of
-from grasp_ros.observe.settling import takes_energy
 
 SIGNATURE = "int64(int64, int64, float64, float64, int64)"
 
@@ -57,28 +56,18 @@ class RunObserver:
         observe(self._block.ctypes.data, FINISH, 0.0, 0.0, 0)
 
 
-def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> Array:
-    """Go on with a watched run, in stretches of s, until V_c decides whether it has settled.
-
-    Returns
-    -------
-    array (3,)
-        Last times outside the bound of left arm, right arm and object in s, if nothing leaves it any more; infinite: it
-        has not settled for good within so many horizons; nan: V_c proves nothing here.
-    """
-    run_observer.finish()
+def settle(integrator: Integrator, run_observer: RunObserver, stretch: float, horizons: int) -> None:
+    """Go on with a watched run that is over, in stretches of s, until V_c decides whether it has settled."""
     run_observer.memory.switches[: Switch.CERTAIN] = Wanted.SETTLING, 0
-    system, seen = integrator.system, run_observer.seen
-    losing, done = takes_energy(run_observer.memory.loop, system.pairs, system.coulomb), 1
-    while seen[Seen.SETTLED] == UNDECIDED and losing and done < horizons:
+    seen, done = run_observer.seen, 1
+    while seen[Seen.SETTLED] == UNDECIDED and done < horizons:
         integrator.advance(stretch, start=done * stretch)
         if integrator.status is not Status.DONE:
             break
         run_observer.finish()
         done += 1
     if seen[Seen.SETTLED] == UNDECIDED:
-        return np.full(3, np.inf)
-    return np.where(np.isnan(seen[Seen.SETTLED]), np.nan, seen[Seen.OUTSIDE : Seen.OUTSIDE + 3])
+        seen[Seen.SETTLED] = np.inf
 
 
 def watch(integrator: Integrator, wanted: Wanted, bound: float) -> RunObserver:

@@ -8,16 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof
 
-from grasp_ros.exact.compilation.jit import inlined
 from grasp_ros.exact.contact.step_order import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
-from grasp_ros.physics.layout import LANES
 
 QUANTITIES = 12
 STATES = 8
-COUNTS, MODES = 4, 3
+COUNTS = 4
 POSITION, VELOCITY = 0, 1  # columns of gains
 LOOKS = 6  # rows of scratch, one polynomial each
 LOWER, UPPER = 4, 5  # those of them that hold bounds of the quantities
@@ -62,30 +60,10 @@ class Seen(IntEnum):
     BOUND = 35  # m
     SETTLED = 36  # time from which on no body leaves the bound, s; inf: not within the run; nan: V_c cannot tell
     LAST_OUTSIDE = 37  # the largest of OUTSIDE at the end of the run, s; a run that goes on until it settles keeps it
-    SEGMENTS = 38
-    STATE = 39  # at the begin of the next segment
 
 
-SEEN = Seen.STATE + STATES
+SEEN = Seen.LAST_OUTSIDE + 1
 UNDECIDED = -1.0  # in place of SETTLED: V_c is not low enough yet
-
-
-class Kept(IntEnum):
-    """Places of the segment that is kept for a body, to be searched for the last time outside."""
-
-    KIND = 0  # NONE: there is none, the time is known
-    TIME = 1  # its length, s
-    BEGIN = 2  # s
-    STEP = 3  # its end in the variable of its polynomials
-    DEGREE = 4
-    MODES = 5
-    STATE = 8  # at its begin
-    BODIES = 16
-    TABLE = 28
-
-
-NONE = -1.0
-KEPT = Kept.TABLE + LANES * LONGEST
 
 
 class Switch(IntEnum):
@@ -113,9 +91,9 @@ class Memory(NamedTuple):
     base: Array  # (3, 4) those of them that the motion has without held commands and external forces
     gains: Array  # (2, 2) Kp and Kv of the feedback that acts all the time; 0 where commands are held
     seen: Array  # (SEEN,)
-    kept: Array  # (3, KEPT) see `Kept`, by body
+    before: Array  # (8,) y at the begin of the segment
     rows: Array  # (LOOKS, LONGEST) scratch
-    counts: Integers  # (COUNTS + MODES,) scratch, and the modes of a segment that was kept
+    counts: Integers  # (COUNTS,) scratch
     switches: Integers  # (3,)
 
 
@@ -124,36 +102,18 @@ def memory_of(plant: Plant, state: State) -> Memory:
     scratch = np.zeros((LOOKS, LONGEST))
     return Memory(
         scratch[0], scratch[0], state.y, state.mode, state.clock, state.rest, plant.bodies, plant.given, plant.pairs,
-        np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((2, 2)), np.zeros(SEEN), np.zeros((3, KEPT)),
-        scratch, np.zeros(COUNTS + MODES, dtype=np.int64), np.zeros(len(Switch), dtype=np.int64))
+        np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((3, 4)), np.zeros((2, 2)), np.zeros(SEEN), np.zeros(STATES),
+        scratch, np.zeros(COUNTS, dtype=np.int64), np.zeros(len(Switch), dtype=np.int64))
 
 
 memory_at = reader(typeof(memory_of(*new_run()[3:])))
 
 
 class SegmentRecord(NamedTuple):
-    """A segment, with the state at its begin and at its end."""
+    """A segment that has just ended."""
 
     kind: int  # `layout.Kind`
     t: float  # s
     s: float  # end in the variable of the polynomials
     degree: int
-    c: Array  # table of polynomials
-    size: Array  # (8,) of a Taylor step: sums of |c_k| s^k, k >= 2
-    before: Array  # (8,) state
-    y: Array  # (8,)
-    mode: Integers  # (3,)
-    bodies: Array  # (3, 4)
-    pairs: Array  # (2, 2)
-    given: Array  # (3, 4)
-    own: Array  # (3, 4)
-    gains: Array  # (2, 2)
-    rows: Array  # (LOOKS, LONGEST) scratch
-    counts: Integers  # (COUNTS + MODES,) scratch
-
-
-@inlined
-def segment_record(m: Memory, kind: int, t: float, s: float, degree: int) -> SegmentRecord:
-    """The segment that has just ended."""
-    return SegmentRecord(kind, t, s, degree, m.c, m.size, m.seen[Seen.STATE :], m.y, m.mode, m.bodies, m.pairs, m.given,
-                         m.own, m.gains, m.rows, m.counts)
+    m: Memory  # with the states at its begin and at its end

@@ -1,104 +1,68 @@
-"""The last time at which each body was outside a bound.
-
-Only the last segment in which a body leaves the bound matters, so it is kept as it is, and searched when the run is
-over.
-"""
+"""The last time at which each body was outside a bound."""
 
 from __future__ import annotations
 
 import math
 
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import inlined, kernel
+from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import own_acceleration
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
 from grasp_ros.observe.flight_extremes import first_zero
-from grasp_ros.observe.record import COUNTS, LOWER, MODES, NONE, STATES, UNDECIDED, UPPER, Kept, Seen, SegmentRecord
+from grasp_ros.observe.record import LOWER, UNDECIDED, UPPER, Memory, Seen, SegmentRecord
 from grasp_ros.observe.step_extremes import FIRST, ROW, WORK, expand_quantity, extremes_of
 from grasp_ros.physics import reach as bounds
-from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of
+from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Slide
 
 BISECTIONS = 60
 reach = kernel(bounds.reach)
 
 
 @kernel
-def settled_from(loop: Array, pairs: Array, V_c: float, at_rest: bool, seen: Array) -> float:
-    """The time in s from which on no body leaves the bound for good; inf: one rests outside; see `Seen.SETTLED`.
+def settled_from(m: Memory, V_c: float) -> float:
+    """The time in s from which on no body leaves the bound for good; inf: it never comes; see `Seen.SETTLED`.
 
     V_c never rises: once its level holds every body inside, nothing that follows leaves the bound.
     """
-    left, middle, right, _, _ = reach(loop, pairs, V_c)
-    most, bound = max(left, middle, right), seen[Seen.BOUND]
+    left, middle, right, _, _ = reach(m.loop, m.pairs, V_c)
+    most, bound = max(left, middle, right), m.seen[Seen.BOUND]
     if not (most < math.inf and bound > 0.0):
         return math.nan
-    if most <= bound or at_rest:
-        return max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
-    return UNDECIDED
+    if most <= bound or m.rest[SINCE] < math.inf:
+        return max(m.seen[Seen.OUTSIDE + LEFT], m.seen[Seen.OUTSIDE + OBJECT], m.seen[Seen.OUTSIDE + RIGHT])
+    return UNDECIDED if takes_energy(m) else math.inf
 
 
 @kernel
-def takes_energy(loop: Array, pairs: Array, coulomb: float) -> bool:
+def takes_energy(m: Memory) -> bool:
     """Whether anything takes energy; what loses none comes back to near its start (Poincare) and never settles."""
-    total = coulomb
-    for body in (LEFT, OBJECT, RIGHT):
-        total += loop[body, Of.DAMPING]
-    for side in (LEFT, RIGHT):
-        total += pairs[side, Law.DISSIPATION]
-    return total > 0.0
+    loss = m.loop[LEFT, Of.DAMPING] + m.loop[OBJECT, Of.DAMPING] + m.loop[RIGHT, Of.DAMPING]
+    loss += m.pairs[LEFT, Law.DISSIPATION] + m.pairs[RIGHT, Law.DISSIPATION]
+    return loss > 0.0 or m.mode[OBJECT] != Slide.FREE
 
 
 @kernel
 def leaves(segment: SegmentRecord, x: int, bound: float) -> bool:
     """Whether a position leaves the bound within a segment; the ranges stand in scratch."""
-    if segment.rows[LOWER, x] >= -bound and segment.rows[UPPER, x] <= bound:
+    if segment.m.rows[LOWER, x] >= -bound and segment.m.rows[UPPER, x] <= bound:
         return False
     low, high = extremes_of(segment, x)
     return bool(low < -bound or high > bound)
 
 
 @kernel
-def watch_bound(segment: SegmentRecord, seen: Array, kept: Array, now: float) -> None:
-    """Remember when each body was outside, or the segment in which it was."""
+def watch_bound(segment: SegmentRecord, seen: Array, now: float) -> None:
+    """Remember when each body was outside last."""
     bound = seen[Seen.BOUND]
     for body in (LEFT, OBJECT, RIGHT):
         x = int(velocity_lane(body) - 1)
-        if abs(segment.y[x]) > bound:
-            seen[Seen.OUTSIDE + body], kept[body, Kept.KIND] = math.inf, NONE
-        elif abs(segment.before[x]) > bound or leaves(segment, x, bound):
-            seen[Seen.OUTSIDE + body] = 0.0
-            keep(segment, kept[body], now)
-
-
-@kernel
-def keep(segment: SegmentRecord, kept: Array, now: float) -> None:
-    """Copy all that the search needs of a segment that has just ended."""
-    kept[Kept.KIND], kept[Kept.TIME], kept[Kept.BEGIN] = float(segment.kind), segment.t, now - segment.t
-    kept[Kept.STEP], kept[Kept.DEGREE] = segment.s, segment.degree
-    for place in range(STATES):
-        kept[Kept.STATE + place] = segment.before[place]
-    for body in range(3):
-        kept[Kept.MODES + body] = segment.mode[body]
-        for column in range(4):
-            kept[Kept.BODIES + 4 * body + column] = segment.bodies[body, column]
-    if segment.kind != Kind.FLIGHT:
-        for i in range(LANES * (segment.degree + 1)):
-            kept[Kept.TABLE + i] = segment.c[i]
-
-
-@inlined
-def kept_record(segment: SegmentRecord, kept: Array) -> SegmentRecord:
-    """The segment that was kept, in place of the last one."""
-    for body in range(3):
-        segment.counts[COUNTS + body] = int(kept[Kept.MODES + body])
-    return SegmentRecord(
-        int(kept[Kept.KIND]), kept[Kept.TIME], kept[Kept.STEP], int(kept[Kept.DEGREE]), kept[Kept.TABLE :],
-        segment.size, kept[Kept.STATE : Kept.BODIES], segment.y, segment.counts[COUNTS : COUNTS + MODES],
-        kept[Kept.BODIES : Kept.TABLE].reshape((3, 4)), segment.pairs, segment.given, segment.own, segment.gains,
-        segment.rows, segment.counts,
-    )
+        if abs(segment.m.y[x]) > bound:
+            seen[Seen.OUTSIDE + body] = math.inf
+        elif abs(segment.m.before[x]) > bound or leaves(segment, x, bound):
+            seen[Seen.OUTSIDE + body] = (now - segment.t) + last_outside(segment, body, bound)
 
 
 @kernel
@@ -112,8 +76,8 @@ def last_outside(segment: SegmentRecord, body: Body, bound: float) -> float:
 @kernel
 def last_in_flight(segment: SegmentRecord, body: Body, bound: float) -> float:
     """The same for one body in flight; 0 if it never is outside."""
-    row, lane = segment.bodies[body], velocity_lane(body)
-    x, v = segment.before[lane - 1], segment.before[lane]
+    row, lane = segment.m.bodies[body], velocity_lane(body)
+    x, v = segment.m.before[lane - 1], segment.m.before[lane]
     flight = launch(row, x, v)
     low, high = 0.0, segment.t
     turn = first_zero(flight, v, own_acceleration(row, x, v))
@@ -140,7 +104,7 @@ def last_in_flight(segment: SegmentRecord, body: Body, bound: float) -> float:
 @kernel
 def last_in_step(segment: SegmentRecord, q: int, bound: float) -> float:
     """The same for a position in a step: the first time outside, on the way back from the end."""
-    rows, n = segment.rows, segment.degree
+    rows, n = segment.m.rows, segment.degree
     expand_quantity(segment, q)
     shift(rows[ROW], n, segment.s)
     first = math.inf
@@ -148,7 +112,7 @@ def last_in_step(segment: SegmentRecord, q: int, bound: float) -> float:
         for k in range(n + 1):
             rows[WORK, k] = sign * rows[ROW, k] * (1.0 if k % 2 == 0 else -1.0)
         rows[WORK, FIRST] -= bound
-        first = min(first, first_rise(rows[WORK], n, segment.s, 0.0, segment.counts))
+        first = min(first, first_rise(rows[WORK], n, segment.s, 0.0, segment.m.counts))
     if not first < math.inf:
         return 0.0
-    return value_and_rate(segment.c[Lane.TIME :: LANES], n, segment.s - first)[0]
+    return value_and_rate(segment.m.c[Lane.TIME :: LANES], n, segment.s - first)[0]

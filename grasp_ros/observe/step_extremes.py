@@ -13,7 +13,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import rate_lanes
-from grasp_ros.exact.numerics.polynomial import product
+from grasp_ros.exact.numerics.polynomial import lane_range, product
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Integers
 from grasp_ros.observe.flight_extremes import in_flight, owner, weights
@@ -27,18 +27,16 @@ FIRST = whole(0)  # coefficient
 
 @inlined
 def lane_bounds(segment: SegmentRecord, lane: int, at: float) -> tuple[float, float]:
-    """Bounds of a lane in a Taylor step that ends at the value `at`, see `polynomial.lane_range`."""
-    begin, size = segment.c[lane], segment.size[lane]
-    line = begin + segment.s * segment.c[LANES + lane]
-    middle, width = 0.5 * (line + at), 0.5 * size
-    return min(begin, middle - width), max(begin, middle + width)
+    """Bounds of a lane in a Taylor step that ends at the value `at`."""
+    low, high = lane_range(segment.m.c, segment.m.size, lane, segment.s, at)
+    return min(segment.m.c[lane], low), max(segment.m.c[lane], high)
 
 
 @inlined
 def penetration_bounds(segment: SegmentRecord, side: Body) -> tuple[float, float]:
     """Bounds of u."""
-    u = segment.y[U.L + side]
-    if segment.mode[side] != Pair.CONTACT:
+    u = segment.m.y[U.L + side]
+    if segment.m.mode[side] != Pair.CONTACT:
         return lane_bounds(segment, Z.L + side, u)
     low, high = lane_bounds(segment, Z.L + side, math.sqrt(max(u, 0.0)))
     return max(low, 0.0) * max(low, 0.0), high * high
@@ -47,19 +45,19 @@ def penetration_bounds(segment: SegmentRecord, side: Body) -> tuple[float, float
 @inlined
 def step_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
     """Bounds on all quantities but the inputs in a Taylor step."""
-    low[X.O], high[X.O] = lane_bounds(segment, X.O, segment.y[X.O])
+    low[X.O], high[X.O] = lane_bounds(segment, X.O, segment.m.y[X.O])
     for lane in (V.L, V.O, V.R):
-        low[lane], high[lane] = lane_bounds(segment, lane, segment.y[lane])
+        low[lane], high[lane] = lane_bounds(segment, lane, segment.m.y[lane])
     low[U.L], high[U.L] = penetration_bounds(segment, LEFT)
     low[U.R], high[U.R] = penetration_bounds(segment, RIGHT)
     low[X.L], high[X.L] = low[X.O] + low[U.L], high[X.O] + high[U.L]
     low[X.R], high[X.R] = low[X.O] - high[U.R], high[X.O] - low[U.R]
     for side in (LEFT, RIGHT):
         q, force = Quantity.IMPACT_L + side, 0.0
-        if segment.mode[side] == Pair.CONTACT:
+        if segment.m.mode[side] == Pair.CONTACT:
             front, back = rate_lanes(side)
-            factor = damping_factor(segment.pairs[side, Law.DISSIPATION], high[front] - low[back])
-            force = elastic_force(segment.pairs[side, Law.HERTZIAN], high[U.L + side]) * max(factor, 0.0)
+            factor = damping_factor(segment.m.pairs[side, Law.DISSIPATION], high[front] - low[back])
+            force = elastic_force(segment.m.pairs[side, Law.HERTZIAN], high[U.L + side]) * max(factor, 0.0)
         low[q], high[q] = 0.0, force
 
 
@@ -67,26 +65,26 @@ def step_ranges(segment: SegmentRecord, low: Array, high: Array) -> None:
 def copy_lane(segment: SegmentRecord, lane: int, row: int) -> None:
     """A lane as one polynomial."""
     for k in range(segment.degree + 1):
-        segment.rows[row, k] = segment.c[LANES * k + lane]
+        segment.m.rows[row, k] = segment.m.c[LANES * k + lane]
 
 
 @kernel
 def expand_penetration(segment: SegmentRecord, side: Body, row: int) -> None:
     """Series of u, the square of w in a Taylor step."""
     copy_lane(segment, int(Z.L + side), row)
-    if segment.mode[side] == Pair.CONTACT:
+    if segment.m.mode[side] == Pair.CONTACT:
         copy_lane(segment, int(Z.L + side), WORK)
-        product(segment.rows[WORK], segment.rows[WORK], segment.rows[row], segment.degree)
+        product(segment.m.rows[WORK], segment.m.rows[WORK], segment.m.rows[row], segment.degree)
 
 
 @kernel
 def expand_quantity(segment: SegmentRecord, q: int) -> None:
     """Write the series of a quantity to the first row of scratch."""
-    rows, n = segment.rows, segment.degree
+    rows, n = segment.m.rows, segment.degree
     if q in (U.L, U.R):
         expand_penetration(segment, LEFT if q == U.L else RIGHT, ROW)
     elif q == Quantity.IMPACT_L or q == Quantity.IMPACT_R:
-        expand_force(segment.c, segment.pairs, q - Quantity.IMPACT_L, n, rows.reshape(-1))
+        expand_force(segment.m.c, segment.m.pairs, q - Quantity.IMPACT_L, n, rows.reshape(-1))
     elif q == X.O or q == V.L or q == V.O or q == V.R:
         copy_lane(segment, q, ROW)
     else:
@@ -94,8 +92,8 @@ def expand_quantity(segment: SegmentRecord, q: int) -> None:
         sign, lane = 1.0 if side == LEFT else -1.0, velocity_lane(side)
         expand_penetration(segment, side, ROW)
         for k in range(n + 1):
-            x = segment.c[LANES * k + X.O] + sign * rows[ROW, k]
-            rows[ROW, k] = a * x + b * segment.c[LANES * k + lane]
+            x = segment.m.c[LANES * k + X.O] + sign * rows[ROW, k]
+            rows[ROW, k] = a * x + b * segment.m.c[LANES * k + lane]
         rows[ROW, FIRST] += c
 
 
@@ -131,4 +129,4 @@ def extremes_of(segment: SegmentRecord, q: int) -> tuple[float, float]:
     if segment.kind == Kind.FLIGHT:
         return in_flight(segment, q)
     expand_quantity(segment, q)
-    return polynomial_extremes(segment.rows, segment.degree, segment.s, segment.counts)
+    return polynomial_extremes(segment.m.rows, segment.degree, segment.s, segment.m.counts)

@@ -165,6 +165,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: 
         run_observer.finish()
         seen[:] = run_observer.seen
         if done and wanted & Wanted.SETTLING:
-            seen[Seen.OUTSIDE : Seen.OUTSIDE + 3] = settle(run, run_observer, scene.duration, setup.horizons)
-            seen[Seen.SETTLED] = seen[Seen.OUTSIDE : Seen.OUTSIDE + 3].max()
+            settle(run, run_observer, scene.duration, setup.horizons)
+            settled = [*range(Seen.OUTSIDE, Seen.OUTSIDE + 3), Seen.SETTLED]
+            seen[settled] = run_observer.seen[settled]
     return run

@@ -143,7 +143,6 @@ def test_an_arm_at_zero_has_the_roundings_of_the_object_that_it_touches(side: Bo
 def test_a_segment_without_an_end_or_with_a_number_that_is_none_is_stopped(side: Body) -> None:
     b = bench(side, -0.1, 0.5)
     level = energy_level(b.plant, b.state, 0.0)
-    assert check_segment(b.plant, b.state, b.settings, level, level, math.nan, 0, OPEN) == Outcome.STALLED
     assert check_segment(b.plant, b.state, b.settings, level, level, 0.0, 10_000, OPEN) == Outcome.STALLED
     b.state.y[U.L + side] = math.nan
     assert check_segment(b.plant, b.state, b.settings, level, level, 0.01, 0, OPEN) == Outcome.NOT_FINITE

@@ -26,13 +26,13 @@ from grasp_ros.exact.automaton.modes import (
 )
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.kinematics import is_closed, is_resting, other
-from grasp_ros.exact.records import Candidate, Ends, SlideCandidate, Tables
+from grasp_ros.exact.records import Candidate, Ends, Tables
 from grasp_ros.exact.tolerances import LEFT_OUT
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, X
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 NEVER = Candidate(math.inf, Transition.TOUCH)
-NO_SLIDE = SlideCandidate(math.inf, Slide.FREE)
+NO_SLIDE = Candidate(math.inf, Slide.FREE)
 
 
 def toward(side: Body, slide: Slide) -> Slide:
@@ -130,7 +130,7 @@ def test_a_touch_whose_speed_is_lost_to_rounding_makes_a_pair_at_rest(side: Body
 def now(b: Bench, left: float, right: float, slide: float) -> Bench:
     """Make the transitions of a segment that ended at 1.0 s, with candidates at these times."""
     candidates = Candidate(left, Transition.TOUCH), Candidate(right, Transition.TOUCH)
-    make_transitions(b.plant, b.state, Ends(*candidates, SlideCandidate(slide, Slide.STUCK), 1.0), 1.0, b.out)
+    make_transitions(b.plant, b.state, Ends(*candidates, Candidate(slide, Slide.STUCK), 1.0), 1.0, b.out)
     return b
 
 

@@ -355,7 +355,7 @@ def test_ranges_hold_and_are_not_idle(seed: int) -> None:
     share = np.linspace(0.0, 1.0, 201)[:, None]
     inside = np.array([at(c, h * float(part)) for part in share[:, 0]])
     for lane in range(LANES):
-        low, high = lane_range(tables_of(c, value, size), lane, h)
+        low, high = lane_range(c.ravel(), size, lane, h, value[lane])
         assert (inside[:, lane] >= c[0, lane] + share[:, 0] * (low - c[0, lane])).all()
         assert (inside[:, lane] <= c[0, lane] + share[:, 0] * (high - c[0, lane])).all()
         assert high - low == pytest.approx(size[lane], rel=1e-10)

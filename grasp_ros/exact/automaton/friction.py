@@ -15,7 +15,7 @@ from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
-from grasp_ros.exact.records import Array, Integers, Plant, Push, SlideCandidate, State, Tables
+from grasp_ros.exact.records import Array, Candidate, Integers, Plant, Push, State, Tables
 from grasp_ros.exact.tolerances import FRICTION
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Of, Pair, Slide, U, V, Z
 
@@ -87,17 +87,17 @@ def push_on_object(plant: Plant, state: State) -> Push:
 
 
 @inlined
-def slide_in_flight(plant: Plant, state: State) -> SlideCandidate:
+def slide_in_flight(plant: Plant, state: State) -> Candidate:
     """When a sliding object stops in flight: v' = a - c v is solved exactly."""
     slide, v = state.mode[OBJECT], state.y[V.O]
-    none = SlideCandidate(math.inf, Slide.STUCK)
+    none = Candidate(math.inf, Slide.STUCK)
     if slide == Slide.FREE or slide == Slide.STUCK:
         return none
     body = plant.bodies[OBJECT]
     a, c = body[Of.FORCE] / body[Of.MASS], body[Of.DAMPING] / body[Of.MASS]
     if v == 0.0 or a == 0.0 or (a > 0.0) == (v > 0.0):
         return none
-    return SlideCandidate(-v / a if c == 0.0 else math.log1p(-c * v / a) / c, Slide.STUCK)
+    return Candidate(-v / a if c == 0.0 else math.log1p(-c * v / a) / c, Slide.STUCK)
 
 
 @kernel
@@ -136,7 +136,7 @@ def excess(tables: Tables, plant: Plant, n: int, s: float) -> float:
 
 
 @kernel
-def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> SlideCandidate:
+def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float) -> Candidate:
     """Since when a push exceeds the friction by more than its rounding, as it does at h."""
     low, high = 0.0, h
     while high - low > 4.0 * EPS * high and high > EPS * EPS * h:
@@ -146,7 +146,7 @@ def since_certain(tables: Tables, plant: Plant, mode: Integers, n: int, h: float
         else:
             low = middle
     push = value_and_rate(tables.row, n, high)[0] + plant.given[OBJECT, Of.FORCE]
-    return SlideCandidate(high, Slide.RIGHTWARD if push > 0.0 else Slide.LEFTWARD)
+    return Candidate(high, Slide.RIGHTWARD if push > 0.0 else Slide.LEFTWARD)
 
 
 @kernel
@@ -163,7 +163,7 @@ def overcome(f: Array, n: int, h: float, noise: tuple[float, float], work: Integ
 
 @kernel
 def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[float, float], work: Integers
-                   ) -> SlideCandidate:
+                   ) -> Candidate:
     """First s in (0, h] at which an impact on a stuck object, `tables.row` in N, overcomes the friction.
 
     `noise` is the rounding of what pushes it at 0 and at h.
@@ -175,12 +175,12 @@ def slip_candidate(tables: Tables, plant: Plant, n: int, h: float, noise: tuple[
     row[0], copy[0] = push - plant.coulomb, -push - plant.coulomb
     to_right, to_left = overcome(row, n, h, noise, work), overcome(copy, n, h, noise, work)
     if math.isnan(to_right) or math.isnan(to_left):
-        return SlideCandidate(math.nan, Slide.STUCK)
-    return SlideCandidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else SlideCandidate(to_left, Slide.LEFTWARD)
+        return Candidate(math.nan, Slide.STUCK)
+    return Candidate(to_right, Slide.RIGHTWARD) if to_right <= to_left else Candidate(to_left, Slide.LEFTWARD)
 
 
 @kernel
-def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> SlideCandidate:
+def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: float, work: Integers) -> Candidate:
     """First s in a Taylor step of length h at which an object under dry friction stops or slips.
 
     `tables.at` is at h, or lost. The next order decides of one that has just slipped, unless more than half of the
@@ -195,7 +195,7 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
             accelerating = c[LANES + Lane.TIME] * push_on_object(plant, state).noise / plant.bodies[OBJECT, Of.MASS]
             if abs(row[1]) <= 0.5 * accelerating:
                 row[1] = 0.0
-        return SlideCandidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
+        return Candidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
     noise = push_on_object(plant, state).noise
     begin, end = excess(tables, plant, n, 0.0), excess(tables, plant, n, h)

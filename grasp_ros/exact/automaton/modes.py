@@ -1,18 +1,7 @@
 """The hybrid automaton: the mode of each pair and of the object, and every transition between modes.
 
-`docs/automaton.md` has the diagram and the rules. A pair, by condition (10):
-
-             TOUCH u up 0                CLAMP u' down -1/p
-      OPEN --------------> CONTACT ---------------------------> CLAMPED
-           <--------------            <------------------------
-            RELEASE u down 0             REENTRY u' up -1/p
-
-and the object, by dry friction:
-
-      RIGHTWARD, LEFTWARD --STICK v to 0, push within F--> STUCK --SLIP push beyond F--> RIGHTWARD, LEFTWARD
-
-A mode is frozen within a segment. `settle_pairs` makes the modes consistent where a segment begins, and
-`make_transitions` where it ends; `begin_interval` does so under new inputs.
+`docs/automaton.md` has the diagrams and the rules. A mode is frozen within a segment: `settle_pairs` makes the modes
+consistent where one begins, and `make_transitions` where it ends; `begin_interval` does so under new inputs.
 """
 
 from __future__ import annotations

@@ -24,7 +24,6 @@ from grasp_ros.exact.records import (
     Plant,
     Segment,
     Settings,
-    SlideCandidate,
     State,
     Tables,
 )
@@ -72,11 +71,11 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
 
     Most steps have none, and the ranges of the lanes prove it.
     """
-    mode, c = state.mode[side], tables.c
+    mode, c, size, at = state.mode[side], tables.c, tables.size, tables.at
     if mode in (Pair.RESTING, Pair.ABSENT, Pair.BEGINNING):
         return Candidate(math.inf, Transition.TOUCH)
     z = Z.L + side
-    low, high = lane_range(tables, z, h)
+    low, high = lane_range(c, size, z, h, at[z])
     if mode == Pair.OPEN:
         if c[z] <= 0.0 and high < 0.0:
             return Candidate(math.inf, Transition.TOUCH)
@@ -94,11 +93,11 @@ def pair_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Bod
 def surface_candidate(tables: Tables, plant: Plant, state: State, n: int, side: Body, h: float, work: Integers
                       ) -> tuple[float, Transition]:
     """First s in (0, h] at which u' crosses -1/p, down out of contact or up back into it; inf if there is none."""
-    mode, c = state.mode[side], tables.c
+    mode, c, size, at = state.mode[side], tables.c, tables.size, tables.at
     loss = plant.pairs[side, Law.DISSIPATION]
     front, back = rate_lanes(side)
     if mode == Pair.CONTACT and loss > 0.0:
-        slowest = lane_range(tables, front, h)[0] - lane_range(tables, back, h)[1]
+        slowest = lane_range(c, size, front, h, at[front])[0] - lane_range(c, size, back, h, at[back])[1]
         if damping_factor(loss, c[front] - c[back]) >= 0.0 and damping_factor(loss, slowest) > NOISE:
             return math.inf, Transition.CLAMP
         return rise_of_lanes(tables, n, h, -loss, front, back, -1.0, work), Transition.CLAMP
@@ -142,7 +141,7 @@ def step_ends(tables: Tables, plant: Plant, state: State, segment: Segment, work
     n, h = segment.step.order.number, segment.s
     left = pair_candidate(tables, plant, state, n, LEFT, h, work)
     right = pair_candidate(tables, plant, state, n, RIGHT, h, work)
-    slide = SlideCandidate(math.inf, Slide.FREE)
+    slide = Candidate(math.inf, Slide.FREE)
     if math.isnan(h) or math.isnan(left.when) or math.isnan(right.when):
         return Ends(left, right, slide, math.nan)
     s = clear_end(tables, plant, n, left, right, h)

@@ -122,7 +122,7 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
         return Outcome.NOT_FINITE
     if is_outside(state.y):
         return Outcome.OUTSIDE
-    if math.isnan(t) or idle > MAX_IDLE:
+    if idle > MAX_IDLE:
         return Outcome.STALLED
     if penetrates(plant, state, LEFT, before.u_l, size, t) or penetrates(plant, state, RIGHT, before.u_r, size, t):
         return Outcome.PENETRATES

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.flight.closed_form import fly
-from grasp_ros.exact.kinematics import bound_by, envelope_of_speed, envelope_step, rates_of
+from grasp_ros.exact.kinematics import bound_by, envelope_step, rates_of
 from grasp_ros.exact.numerics.roots import safe_step
 from grasp_ros.exact.records import Array, Flights, Integers, Motion, PairFlight, Plant, Rates
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, Body, Law, Transition, U, Work
@@ -204,8 +204,6 @@ def first_root(kind: Transition, pair: PairFlight, t: float, at: Motion, span: f
         step = certain_step(g, curvature, growth, step)
         if kind == Transition.TOUCH:
             step = max(step, envelope_step(pair, at))
-        if kind == Transition.REENTRY:
-            step = max(step, envelope_of_speed(pair, at, own.second, body.second))
         step = min(step, pair.horizon)
         if not step <= span - t or t > until:
             return (math.nan if math.isnan(step) else math.inf), math.inf

@@ -54,15 +54,15 @@ def curvatures(c: Array, n: int, s: float, size: Array) -> None:
 
 
 @inlined
-def lane_range(tables: Tables, lane: int, s: float) -> tuple[float, float]:
+def lane_range(c: Array, size: Array, lane: int, s: float, end: float) -> tuple[float, float]:
     """Bounds (low, high) of a lane in (0, s], in proportion to the distance from its value c_0 at 0.
 
-    With at = f(s) and size = sum of |c_k| s^k over k >= 2, the terms of one sign beyond the linear one lie between 0
+    With `end` = f(s) and size = sum of |c_k| s^k over k >= 2, the terms of one sign beyond the linear one lie between 0
     and half of their signed and absolute sums: f stays between the lines from c_0 to `low` and to `high`.
     """
-    begin, size = tables.c[lane], tables.size[lane]
-    line = begin + s * tables.c[LANES + lane]
-    middle, width = 0.5 * (line + tables.at[lane]), 0.5 * size + NOISE * (abs(begin) + abs(line) + size)
+    begin, curved = c[lane], size[lane]
+    line = begin + s * c[LANES + lane]
+    middle, width = 0.5 * (line + end), 0.5 * curved + NOISE * (abs(begin) + abs(line) + curved)
     return middle - width, middle + width
 
 
