@@ -124,15 +124,15 @@ def next_derivative(body: Array, before: float, value: float) -> float:
 
 
 @kernel
-def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, float, float]:
-    """Derivatives `order` >= 2 and order + 1 of a body's flight, m/s^order, and the sum of the sizes of the first."""
+def derivatives(body: Array, x: float, v: float, order: int) -> tuple[float, float]:
+    """Derivative `order` >= 2 of a body's flight, m/s^order, and the sum of the sizes of its terms."""
     m, k, c = body[Of.MASS], body[Of.STIFFNESS], body[Of.DAMPING]
     value, size = own_acceleration(body, x, v), own_size(body, x, v)
     before, before_size = v, abs(v)
     for _ in range(order - 2):
         following, following_size = next_derivative(body, before, value), (abs(c) * size + k * before_size) / m
         before, before_size, value, size = value, size, following, following_size
-    return value, next_derivative(body, before, value), size
+    return value, size
 
 
 @inlined

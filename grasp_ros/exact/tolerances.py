@@ -17,8 +17,7 @@ LEFT_OUT = 0.25  # impulse of a pair that leaves without force, in units of the 
 TURNS, CLAMPS = 20.0, 4.0  # times what u' may change before u = 0: both terms, and those behind them
 
 # The begin of a contact without its force.
-HELD = 56  # binary orders by which the impulse that is left out is below that of the motion: an eighth of a rounding
-OUTWEIGHS = 6  # binary orders by which the first term of u exceeds each later one: u and u' keep their sign
+HELD = 2.0**-56  # of the impulse of a motion, which a pair may leave out: an eighth of a rounding
 
 # Rest.
 REST = 2.0**-49  # of the scale of a scene: eight roundings, which forces that balance may have

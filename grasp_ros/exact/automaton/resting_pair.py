@@ -14,18 +14,20 @@ from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import (
     approach,
     arm_of,
-    bound,
     derivatives,
     other,
     reduced_mass,
     relative_motion,
     surface_factor,
 )
-from grasp_ros.exact.records import Array, Leaning, Plant, State
+from grasp_ros.exact.numerics.roots import first_rise
+from grasp_ros.exact.records import Array, Integers, Leaning, Plant, State
 from grasp_ros.exact.tolerances import CLAMPS, DERIVATIVE, SHORT_START, SURFACE, TURNS
+from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Body, Law, Of, Pair, U, V, X
 
 LOWEST, NEXT, HIGHEST = (whole(order) for order in (2, 3, 6))  # derivatives; typed, or each is compiled anew
+LONGEST = RANGES["duration"].high  # s
 UNDECIDED, NEVER = 0.0, math.inf  # orders of a `Leaning` that is none
 
 
@@ -86,32 +88,22 @@ def own_difference(plant: Plant, y: Array, side: Body) -> Leaning:
 def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, float]:
     """A derivative of u without impact forces, and the sum of the sizes of its terms."""
     x, v, sign = arm_of(y, side)
-    value, _, size = derivatives(plant.bodies[side], x, v, order)
-    value_o, _, size_o = derivatives(plant.bodies[OBJECT], y[X.O], y[V.O], order)
+    value, size = derivatives(plant.bodies[side], x, v, order)
+    value_o, size_o = derivatives(plant.bodies[OBJECT], y[X.O], y[V.O], order)
     return sign * (value - value_o), size + size_o
 
 
 @kernel
-def certain_time(plant: Plant, y: Array, side: Body, order: int, value: float, span: float) -> float:
-    """How long, in s, u of a flight from u = 0 has the sign of its first derivative, for certain.
-
-    Derivatives of the same sign only help, so each of them may be the one that a bound on the next is held against;
-    half of what that proves leaves room for rounding.
-    """
-    x, v, _ = arm_of(y, side)
-    arm, body = plant.bodies[side], plant.bodies[OBJECT]
-    longest = 0.0
-    for n in range(order, HIGHEST + 1):
-        here, size = (value, 0.0) if n == order else difference(plant, y, side, n)
-        if abs(here) <= DERIVATIVE * size:
-            continue
-        if (here > 0.0) != (value > 0.0):
-            break
-        q, q_rate, _ = derivatives(arm, x, v, n + 1)
-        q_o, q_o_rate, _ = derivatives(body, y[X.O], y[V.O], n + 1)
-        largest = bound(arm, q, q_rate, span) + bound(body, q_o, q_o_rate, span)
-        longest = max(longest, 0.5 * (n + 1) * abs(here) / largest if largest > 0.0 else math.inf)
-    return longest
+def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> bool:
+    """Write the series of u of arm and object by themselves, up to the order HIGHEST; whether it differs from 0."""
+    f[0], f[1], factorial = y[U.L + side], approach(y, side), 1.0
+    moves = f[0] != 0.0 or f[1] != 0.0
+    for order in range(LOWEST, HIGHEST + 1):
+        factorial *= order
+        value, size = difference(plant, y, side, order)
+        f[order] = value / factorial if abs(value) > DERIVATIVE * size else 0.0
+        moves = moves or f[order] != 0.0
+    return moves
 
 
 @kernel
@@ -153,9 +145,15 @@ def short_time(plant: Plant, side: Body) -> float:
 
 
 @kernel
-def parting_time(plant: Plant, state: State, side: Body, span: float) -> float:
-    """How long, in s, a pair at rest keeps the sign of u in a flight, for certain; it is a short flight."""
-    order, value = own_difference(plant, state.y, side)
-    if order == NEVER:
+def parting_time(f: Array, plant: Plant, state: State, side: Body, work: Integers) -> float:
+    """How long, in s, a pair at rest keeps the sign of u in a short flight; inf where nothing moves it.
+
+    It is half of what the series say that is written to f: higher orders are left out.
+    """
+    if not write_own_series(plant, state.y, side, f):
         return math.inf
-    return min(certain_time(plant, state.y, side, int(order), value, span), short_time(plant, side))
+    if own_difference(plant, state.y, side).value > 0.0:
+        for k in range(HIGHEST + 1):
+            f[k] = -f[k]
+    longest = short_time(plant, side)
+    return 0.5 * min(first_rise(f, HIGHEST, min(longest, LONGEST), 0.0, work), longest)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.automaton.begin import leaves_force_out
+from grasp_ros.exact.automaton.begin import leaves_force_out, speed_of_pair
 from grasp_ros.exact.automaton.friction import slide_in_contact
 from grasp_ros.exact.compensated import add, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
@@ -12,7 +12,7 @@ from grasp_ros.exact.contact.step_unit import new_step
 from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
 from grasp_ros.exact.flight.closed_form import fly, free_flights
 from grasp_ros.exact.impact import damping_factor
-from grasp_ros.exact.kinematics import rate_lanes
+from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
@@ -193,8 +193,8 @@ def may_last(plant: Plant, state: State, side: Body, at: Array) -> bool:
     """Whether a pair that begins has neither come back at the values `at`, nor a force that shows there."""
     if state.mode[side] != Pair.BEGINNING:
         return True
-    u = at[Z.L + side]
-    return bool(u >= -EPS * abs(at[X.O]) and leaves_force_out(plant, side, at, u))
+    u, d, speed = at[Z.L + side], approach(at, side), speed_of_pair(at, side)
+    return bool(u >= -EPS * abs(at[X.O]) and leaves_force_out(plant, side, u, d, speed))
 
 
 @inlined

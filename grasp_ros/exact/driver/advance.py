@@ -51,7 +51,7 @@ def next_segment(tables: Tables, plant: Plant, state: State, settings: Settings,
         ends = step_ends(tables, plant, state, segment, work)
         return cut_step(tables, plant, state, segment, ends, span), ends
     segment = fly_free(plant, state, span, work)
-    ends = flight_ends(plant, state, segment, work)
+    ends = flight_ends(tables.row, plant, state, segment, work)
     return cut_flight(segment, ends), ends
 
 

@@ -6,12 +6,12 @@ import math
 
 from grasp_ros.exact.automaton.begin import force_free_time
 from grasp_ros.exact.automaton.friction import slide_in_flight
-from grasp_ros.exact.automaton.resting_pair import parting_time
+from grasp_ros.exact.automaton.resting_pair import NEVER, own_difference, parting_time
 from grasp_ros.exact.compensated import keep_together, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.flight.closed_form import FLIGHT_ORDER, expand_flight, flights_of, fly, settling_time
 from grasp_ros.exact.flight.search import first_root, motion_at, pair_in_flight
-from grasp_ros.exact.kinematics import approach, arm_of, next_derivative, own_acceleration
+from grasp_ros.exact.kinematics import approach, arm_of, is_resting, next_derivative, own_acceleration
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.records import (
     Array,
@@ -52,8 +52,8 @@ def is_far(plant: Plant, y: Array, side: Body, span: float) -> bool:
 
 
 @kernel
-def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, span: float, until: float, work: Integers
-                   ) -> tuple[Candidate, float]:
+def pair_candidate(row: Array, plant: Plant, state: State, flights: Flights, side: Body, span: float, until: float,
+                   work: Integers) -> tuple[Candidate, float]:
     """First event of one pair in a flight of at most `span` seconds, unless it is later than `until`.
 
     And the time up to which it is known, as `first_root` says.
@@ -68,7 +68,7 @@ def pair_candidate(plant: Plant, state: State, flights: Flights, side: Body, spa
     t, d = 0.0, approach(y, side)
     at = Motion(pair.arm_flight.x, pair.arm_flight.v, pair.body_flight.x, pair.body_flight.v, pair.u, d, abs(pair.u))
     if pair.u == 0.0 and d == 0.0:
-        t = parting_time(plant, state, side, span)
+        t = parting_time(row, plant, state, side, work)
         if t >= span:
             return Candidate(math.inf, Transition.TOUCH), math.inf
         at = motion_at(pair, t)
@@ -96,15 +96,18 @@ def fly_free(plant: Plant, state: State, span: float, work: Integers) -> Segment
 
 
 @inlined
-def flight_ends(plant: Plant, state: State, segment: Segment, work: Integers) -> Ends:
-    """First events of the pairs and of the object within a flight, in s; it is known until the force of one shows."""
+def flight_ends(row: Array, plant: Plant, state: State, segment: Segment, work: Integers) -> Ends:
+    """First events of the pairs and of the object within a flight, in s; it is known until the force of one shows.
+
+    `row` is scratch.
+    """
     span, flights = segment.t, segment.flights
-    left, known_l = pair_candidate(plant, state, flights, LEFT, span, math.inf, work)
-    right, known_r = pair_candidate(plant, state, flights, RIGHT, span, TOGETHER * left.when, work)
+    left, known_l = pair_candidate(row, plant, state, flights, LEFT, span, math.inf, work)
+    right, known_r = pair_candidate(row, plant, state, flights, RIGHT, span, TOGETHER * left.when, work)
     slide = slide_in_flight(plant, state)
     if math.isnan(left.when) or math.isnan(right.when):
         return Ends(left, right, slide, math.nan)
-    begun = min(force_free_time(plant, state, LEFT), force_free_time(plant, state, RIGHT))
+    begun = min(force_free_time(row, plant, state, LEFT), force_free_time(row, plant, state, RIGHT))
     return Ends(left, right, slide, min(span, left.when, right.when, slide.when, known_l, known_r, begun))
 
 
@@ -132,7 +135,8 @@ def move_by_flight(plant: Plant, segment: Segment, state: State) -> None:
 def moves_alike(plant: Plant, state: State, side: Body) -> bool:
     """Whether arm and object of a pair without force stay together."""
     mode = state.mode[side]
-    return mode == Pair.RESTING or (mode == Pair.BEGINNING and force_free_time(plant, state, side) == math.inf)
+    alone = mode == Pair.BEGINNING and is_resting(state.y, side) and own_difference(plant, state.y, side).order == NEVER
+    return mode == Pair.RESTING or alone
 
 
 @inlined
