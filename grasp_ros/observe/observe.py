@@ -51,7 +51,7 @@ def level(loop: Array, pairs: Array, y: Array) -> float:
     return total
 
 
-@kernel
+@inlined
 def write_ranges(segment: SegmentRecord) -> None:
     """Write bounds of all quantities to scratch."""
     low, high = segment.m.rows[LOWER], segment.m.rows[UPPER]
@@ -77,7 +77,7 @@ def is_wanted(segment: SegmentRecord, q: int, wanted: int) -> bool:
     return wanted & Wanted.IMPACTS.value != 0 and segment.m.mode[q % 2] == Pair.CONTACT
 
 
-@kernel
+@inlined
 def watch_quantities(segment: SegmentRecord, seen: Array, wanted: int) -> None:
     """Keep the extremes of what is wanted, where its range may hold new ones."""
     for q in range(QUANTITIES):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compensated import velocity_lane
-from grasp_ros.exact.compilation.jit import kernel
+from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import own_acceleration
@@ -44,7 +44,7 @@ def takes_energy(m: Memory) -> bool:
     return loss > 0.0 or m.mode[OBJECT] != Slide.FREE
 
 
-@kernel
+@inlined
 def leaves(segment: SegmentRecord, x: int, bound: float) -> bool:
     """Whether a position leaves the bound within a segment; the ranges stand in scratch."""
     if segment.m.rows[LOWER, x] >= -bound and segment.m.rows[UPPER, x] <= bound:
@@ -53,7 +53,7 @@ def leaves(segment: SegmentRecord, x: int, bound: float) -> bool:
     return bool(low < -bound or high > bound)
 
 
-@kernel
+@inlined
 def watch_bound(segment: SegmentRecord, seen: Array, now: float) -> None:
     """Remember when each body was outside last."""
     bound = seen[Seen.BOUND]
