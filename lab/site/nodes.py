@@ -57,5 +57,6 @@ def _nodes() -> Iterator[dict[str, Any]]:
         yield made
     finally:
         for node in made.values():
-            node.end()
+            node.close()
+            node.destroy_node()
         context.try_shutdown()
