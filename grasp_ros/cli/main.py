@@ -47,7 +47,7 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
             stream = open(os.devnull, mode, encoding="utf-8")  # noqa: SIM115 - for as long as we live
             os.set_inheritable(stream.fileno(), True)  # the number that was free: for the nodes that we start as well
             setattr(sys, name, stream)
-    if isinstance(sys.stdout.buffer, io.FileIO):  # unbuffered: drops what cannot be written at once
+    if isinstance(getattr(sys.stdout, "buffer", None), io.FileIO):  # unbuffered: drops what cannot be written at once
         sys.stdout = open(sys.stdout.fileno(), "w", 1, sys.stdout.encoding, closefd=False)  # noqa: SIM115 - likewise
     try:
         status = _status(parser, words)
@@ -55,7 +55,7 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
         return status
     except OSError as error:
         enough = isinstance(error, BrokenPipeError)  # the reader of our output, `head` say, has had it
-        lost = error.errno in (*FULL, errno.EAGAIN)  # the second one: full, and nobody is to wait
+        lost = error.errno in FULL or hasattr(error, "characters_written")  # the second one: full, and nobody waits
         of_output = enough or lost or error.errno in (errno.EIO, errno.EBADF)  # EIO: the terminal is gone
         if not of_output or hasattr(error, "__notes__"):  # which an error of a user's controller has
             raise

@@ -60,7 +60,7 @@ def main(name: str, child: bool = False) -> int:
     return status
 
 
-def _maker(name: str) -> Callable[[], Any]:
+def _maker(name: str) -> Callable[..., Any]:
     """What makes the node of that name: its class, that of `monitor` is `nodes.monitor.Monitor`."""
     kind = "controller" if name.endswith("controller") else name
     module = import_module(f"grasp_ros.graph.{'tools' if name in TOOLS else 'nodes'}.{kind}")

@@ -74,7 +74,7 @@ class Graph:
     _segments: set[str] = field(default_factory=set)  # of shared memory, that were there before
     # The children read the other end: when this one closes, however that comes, they end. They say there why they end.
     _lifeline: socket.socket | None = None
-    _causes: list[tuple[float, str]] = field(default_factory=list)  # wall time, and what was said then
+    _causes: list[tuple[float, str, int]] = field(default_factory=list)  # wall time, what was said then, status
     _place: socket.socket | None = None  # see `host.hold`
 
     @property
@@ -194,13 +194,14 @@ class Graph:
         assert self._lifeline is not None
         with suppress(BlockingIOError):
             while content := self._lifeline.recv(LONGEST):
-                when, node, why = json.loads(content)
-                self._causes.append((when, f"{node}: {why}"))
+                when, node, why, status = json.loads(content)
+                self._causes.append((when, f"{node}: {why}", status))
         for name, status in ended.items():
             if status < 0:
-                self._causes.append((time.monotonic(), f"{name}: was killed by {signal.Signals(-status).name}"))
+                self._causes.append((time.monotonic(), f"{name}: was killed by {signal.Signals(-status).name}", 1))
         if ended and self._causes:
-            raise (Refused if 2 in ended.values() else GraphError)(min(self._causes)[1])
+            _, why, status = min(self._causes)
+            raise (Refused if status == 2 else GraphError)(why)
         for name, status in ended.items():
             if status or name.endswith("controller"):
                 raise GraphError(f"{name}: ended with exit status {status} before the run was over")

@@ -23,6 +23,7 @@ GRACE_SECONDS = 10.0  # to end cleanly after a signal, or after the process that
 MOST_WORDS = 4000  # characters
 PR_SET_PDEATHSIG = 1  # of prctl(2)
 _raised: list[int] = []  # signals that `raise_on_signals` has turned into an exception
+_status: list[int] = []  # of a process that ends by force
 _parent: list[int] = []  # file descriptor of the way to the process that started this one, if it is one of ours
 
 
@@ -55,13 +56,15 @@ def end_late_by_force(name: str) -> None:
 
 
 def end_by_force(name: str, status: int = 1) -> None:
-    """Give this process GRACE_SECONDS to end."""
+    """Give this process GRACE_SECONDS to end, and the status of the last call."""
+    _status[:] = [status]
+
     def end() -> None:
         time.sleep(GRACE_SECONDS)
         with suppress(OSError):  # nobody may read it
             print(f"{name}: has not ended within {GRACE_SECONDS:g} s: ended by force", file=sys.stderr,
                   flush=True)
-        os._exit(status)
+        os._exit(*_status)
 
     threading.Thread(target=end, name="end", daemon=True).start()
 
@@ -97,11 +100,11 @@ def stop_if_signalled() -> None:
         raise KeyboardInterrupt
 
 
-def tell_parent(node: str, why: str) -> None:
-    """Let the process that started this one know why a node ends early, and since when."""
+def tell_parent(node: str, why: str, status: int = 1) -> None:
+    """Let the process that started this one know why a node ends early, with what status, and since when."""
     with suppress(OSError):  # it has ended
         for way in _parent:
-            os.write(way, json.dumps([time.monotonic(), node, why[:MOST_WORDS]]).encode())
+            os.write(way, json.dumps([time.monotonic(), node, why[:MOST_WORDS], status]).encode())
 
 
 def end_with_parent(received: list[int], name: str) -> None:

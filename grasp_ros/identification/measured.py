@@ -14,7 +14,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.verify import answers_of
 from grasp_ros.physics import given
-from grasp_ros.physics.domain import RANGES
+from grasp_ros.physics.domain import LARGEST_POSITION
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
@@ -30,7 +30,6 @@ CHANNELS = tuple(HEADS[column.name] for column in COLUMNS[:6])  # names of the s
 INPUTS = tuple(HEADS[f"input_{NAMES[body]}"] for body in sorted(BODIES))  # by body
 T = HEADS[TIME.name]
 FEWEST = 10  # samples
-FARTHEST = RANGES["position, set-point"].high  # that of velocities, too
 Source: TypeAlias = str | os.PathLike[str] | Recording | Trajectory
 
 
@@ -162,11 +161,11 @@ def _checked(found: Measured) -> Measured:
     t = given.ascending(f"{name}: {T}", found.t, found.scene.duration, strictly=True)
     found = found._replace(t=t)  # kernels read a row of numbers, no column of a table
     for place, channel in enumerate(CHANNELS):
-        gone = ~(np.abs(found.state[:, place]) <= FARTHEST)
+        gone = ~(np.abs(found.state[:, place]) <= LARGEST_POSITION)
         if gone.any() and not np.isnan(found.state[:, place]).all():
             at = int(np.argmax(gone))
             raise Refused(f"{name}: {channel}: {float(found.state[at, place])!r} at t = {t[at]:g} s; allowed: numbers"
-                          f" throughout, of a size <= {FARTHEST:g}, or a column that is not there")
+                          f" throughout, of a size <= {LARGEST_POSITION:g}, or a column that is not there")
         if not gone.any() and BODIES[place // 2] not in present:
             raise Refused(f"{name}: {channel}: {found.scene.name} has no such body")
     if not found.channels:

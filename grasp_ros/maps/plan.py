@@ -173,7 +173,7 @@ def check(plan: Plan) -> None:
     if not plan.sample and len(plan.axes) > MOST_AXES:
         raise Refused(f"axes: {len(plan.axes)}; allowed: {MOST_AXES} of a map, any number of a sample")
     if plan.rows > MOST:
-        raise Refused(f"axes: {plan.rows:,} runs; allowed: at most {MOST:,}")
+        raise Refused(f"{'sample' if plan.sample else 'axes'}: {plan.rows:,} runs; allowed: at most {MOST:,}")
     for axis, key in [(own, key) for own in plan.axes for key in own.keys]:
         if not -math.inf < axis.low < axis.high < math.inf or (axis.log and axis.low <= 0.0):
             raise Refused(f"{key}: {axis.low!r} to {axis.high!r} is not allowed; allowed: low < high, and > 0 where"

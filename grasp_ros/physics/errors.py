@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from traceback import extract_tb
 
+OTHERS = re.compile("/lib/python3[^/]*/(?!(site|dist)-packages/(?!rclpy/))")  # files of Python's library, and of rclpy
 LONGEST = 4000  # characters of a sentence
 
 
@@ -13,9 +15,9 @@ def printable(text: str) -> str:
 
 
 def place_of(error: BaseException) -> str:
-    """Where an exception was raised, if possible not in a library: "file, line n"."""
+    """Where an exception was raised, if possible not in Python's own library or in rclpy: "file, line n"."""
     places = extract_tb(error.__traceback__)
-    place = next((place for place in reversed(places) if "/lib/python3" not in place.filename), places[-1])
+    place = next((place for place in reversed(places) if not OTHERS.search(place.filename)), places[-1])
     return f"{place.filename}, line {place.lineno}"
 
 

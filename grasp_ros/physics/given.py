@@ -7,7 +7,7 @@ not. What is not taken is refused with its name.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import timedelta
 from numbers import Integral, Real
 from typing import Any
@@ -97,7 +97,8 @@ def names(name: str, values: Any) -> tuple[str, ...]:
     Refused
         If they are none.
     """
-    found = (values,) if isinstance(values, str) or not isinstance(values, Iterable) else tuple(values)
+    several = isinstance(values, Iterable) and not isinstance(values, (str, Mapping))
+    found = tuple(values) if several else (values,)
     if not all(isinstance(entry, str) for entry in found):
         raise Refused(f"{name}: {values!r} is not allowed; allowed: a list of texts")
     return tuple(map(str, found))
@@ -164,9 +165,9 @@ def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDA
     within = not len(found) or (found.item(0) >= 0.0 and found.item(-1) <= end)  # of floats: a short run feels arrays
     if not (within and (len(found) < 2 or after(found[1:], found[:-1]).all())):
         place = int(np.argmin(np.append(found[:1] >= 0.0, after(found[1:], found[:-1])) & (found <= end)))
-        behind = f" behind {float(found[place - 1])!r}" if place else ""
+        late = f" after {float(found[place - 1])!r}" if place else ""
         once = ", each once" if strictly else ""
-        raise Refused(f"{name}: {float(found[place])!r}{behind} is not allowed; allowed: ascending from 0 to {end!r} s"
+        raise Refused(f"{name}: {float(found[place])!r}{late} is not allowed; allowed: ascending from 0 to {end!r} s"
                       + once)
     return found
 

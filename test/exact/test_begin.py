@@ -230,6 +230,19 @@ def test_what_a_pair_leaves_out_is_below_the_rounding_of_its_motion(
 
 
 @SIDES
+@pytest.mark.parametrize("push", [-0.0625, -0.06, -1e-3])
+@pytest.mark.parametrize("hertzian", [1e-14, 1e-9, 1.0])
+def test_a_pair_that_turns_back_leaves_out_no_contact(side: Body, hertzian: float, push: float) -> None:
+    b = bench(side, 0.0, 1.0, Pair.BEGINNING, push=push)
+    b.plant.pairs[side] = hertzian, 0.0
+    t = force_free_time(np.zeros(HIGHEST + 1), b.plant, b.state, side)
+    for part in np.linspace(0.0, 1.0, 101)[1:]:
+        u, rate = part * t + 0.5 * push * (part * t) ** 2, 1.0 + push * part * t
+        assert rate > 0.0
+        assert leaves_force_out(b.plant, side, u, rate, 1.0)
+
+
+@SIDES
 def test_nothing_moves_a_pair_that_only_another_one_will_press(side: Body) -> None:
     assert force_free_time(np.zeros(HIGHEST + 1), *bench(side, 0.0, 0.0, Pair.BEGINNING)[:2], side) == math.inf
     assert force_free_time(np.zeros(HIGHEST + 1), *bench(side, 0.0, 0.3, Pair.CONTACT)[:2], side) == math.inf

@@ -229,7 +229,7 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     (ROWS.replace("-0.298,", "north,"), ("--scene", "case_01", "--free", P_LEFT), "line 4: could not convert"),
     (ROWS.replace("-0.298,", ""), ("--scene", "case_01", "--free", P_LEFT), "line 4: 2 entries; allowed: 3"),
     (ROWS.replace("0.02,", "0.2,"), ("--scene", "case_01", "--free", P_LEFT),
-     "t_s: 0.03 behind 0.2 is not allowed; allowed: ascending from 0 to 20.0 s, each once"),
+     "t_s: 0.03 after 0.2 is not allowed; allowed: ascending from 0 to 20.0 s, each once"),
     ("\n".join(ROWS.splitlines()[:10]), ("--scene", "case_01", "--free", P_LEFT), "samples; allowed: at least 10"),
     ("", ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),
     (ROWS.replace("x_object_m", "x_objekt_m"), ("--scene", "case_01", "--free", P_LEFT),

@@ -35,18 +35,19 @@ def must_begin(state: State, side: Body) -> bool:
 def force_free_time(f: Array, plant: Plant, state: State, side: Body) -> float:
     """Time in s, a power of two, for which a pair at u = 0 that begins may fly without its force.
 
-    From near the begin on, because what it has come back from is no longer seen; inf where nothing moves it. Its series
-    is written to f.
+    It grows from near the begin on, as long as the pair has not turned back, so that its end has the largest force; inf
+    where nothing moves it. Its series is written to f.
     """
     y = state.y
     if state.mode[side] != Pair.BEGINNING or not write_own_series(plant, y, side, f):
         return math.inf
     longest, speed = min(short_time(plant, side), LONGEST), speed_of_pair(y, side)
     time = power_of_two(exponent(longest) - MOST_HALVINGS)
+    closes = value_and_rate(f, HIGHEST, time)[1] > 0.0
     for stride in (2.0**16, 2.0):
         while stride * time <= longest:
             u, d, _ = value_and_rate(f, HIGHEST, stride * time)
-            if u < 0.0 or not leaves_force_out(plant, side, u, d, speed):
+            if u < 0.0 or (d > 0.0) != closes or not leaves_force_out(plant, side, u, d, speed):
                 break
             time *= stride
     return time

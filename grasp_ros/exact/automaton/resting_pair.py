@@ -148,7 +148,7 @@ def short_time(plant: Plant, side: Body) -> float:
 def parting_time(f: Array, plant: Plant, state: State, side: Body, work: Integers) -> float:
     """How long, in s, a pair at rest keeps the sign of u in a short flight; inf where nothing moves it.
 
-    It is half of what the series say that is written to f: higher orders are left out.
+    Half of what its series up to the order HIGHEST, which is written to f, gives: that leaves room for what follows.
     """
     if not write_own_series(plant, state.y, side, f):
         return math.inf

@@ -122,11 +122,11 @@ class Monitor(PeerNode):
         if self._plant and not self.finished and (other := self.heartbeats.successor(self._plant)):
             self.fail(f"{JOINT_STATES.name}: another {other} has taken the place of the one that is recorded")
 
-    def fail(self, reason: str) -> None:
+    def fail(self, reason: str, status: int = 1) -> None:
         """End with a sentence that says how far the bag reaches."""
         said = self._recorder is None or str(self._path) in reason  # by the recorder itself
         ticks = "" if said else f"; the bag has {self.counters['ticks']} ticks"
-        super().fail(f"{reason}{ticks}")
+        super().fail(f"{reason}{ticks}", status)
 
     def _on_run(self, text: str) -> None:
         if self._running is None:

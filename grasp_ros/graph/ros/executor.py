@@ -18,7 +18,7 @@ from rclpy.signals import SignalHandlerOptions
 from grasp_ros.graph.parameters import TOOLS
 from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, note_signals, tell_parent
-from grasp_ros.physics.errors import Refused, place_of
+from grasp_ros.physics.errors import Refused, described
 
 OF_ROS = ("ROS_", "RMW_", "RCUTILS_", "FAST")  # how variables begin that rcl and the middleware read
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
@@ -31,9 +31,9 @@ INTERRUPTED = 130  # of a tool that a signal ends before it is through; nodes of
 def run(makes: Mapping[str, Callable[..., GraspNode]], received: list[int]) -> int:
     """Run nodes in this process until they have finished or a signal has been received; returns the exit status.
 
-    0 after a finished run or a signal, which interrupts a tool (130); 2 if a node refuses its parameters, otherwise the
-    first status of a node that is not 0. The signal handlers are ours, see `start`: those of rclpy invalidate the
-    context under a callback, which then raises.
+    0 after a finished run or a signal, which interrupts a tool (130); 2 if ROS does not start or a node refuses its
+    parameters, otherwise the first status of a node that is not 0. The signal handlers are ours, see `main`: those of
+    rclpy invalidate the context under a callback, which then raises.
     """
     nodes: list[GraspNode] = []
     context = Context()  # not the default one, which is that of a user's law: to begin, and to shut down
@@ -59,7 +59,8 @@ def _live(
             rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
         except RuntimeError as error:  # the base of what rcl raises
             given = " ".join(f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS))
-            raise Refused(f"ROS does not start: {' '.join(str(error).split())}; environment: {given}") from None
+            words = " ".join([*sys.argv[1:], given])
+            raise Refused(f"ROS does not start: {' '.join(str(error).split())}; it was given {words}") from None
         try:
             for names, make in makes.items():  # noqa: B007 - which one is refused
                 nodes.append(make(context=context))
@@ -74,13 +75,13 @@ def _live(
             for node in nodes:
                 node.guarded(node.close)
     except Refused as error:
-        tell_parent(names, str(error))
+        tell_parent(names, str(error), 2)
         with suppress(OSError):  # nobody reads it
             print(error, file=sys.stderr)
         return 2
     except Exception as error:  # in one line, and where
         whose = "PYTHONWARNINGS makes it an error" if isinstance(error, Warning) else "a fault of this package"
-        words = f"{whose}: {type(error).__name__}: {error}, in {place_of(error)}"
+        words = f"{whose}: {described(error)}"
         tell_parent(names, words)
         with suppress(OSError):
             print(f"{names}: {words}", file=sys.stderr)

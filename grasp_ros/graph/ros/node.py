@@ -103,8 +103,7 @@ class GraspNode(ParameterNode):
         try:
             action(*words)
         except Refused as error:
-            self.fail(str(error))
-            self.exit_code = 1 if self.begun else 2
+            self.fail(str(error), 1 if self.begun else 2)
 
     def sources(self, topic: Topic) -> list[str]:
         """Full names of the nodes that publish on a topic, as far as discovery has them."""
@@ -206,12 +205,12 @@ class GraspNode(ParameterNode):
         message.header.stamp = self.get_clock().now().to_msg()
         self._diagnostics.publish(message)
 
-    def fail(self, reason: str) -> None:
-        """End with a sentence, and with the exit status 1."""
+    def fail(self, reason: str, status: int = 1) -> None:
+        """End with a sentence, and with an exit status: 2 of what is refused before it has begun."""
         self.phase, self.words = Phase.FAILED, reason
-        tell_parent(self.get_name(), reason)
+        tell_parent(self.get_name(), reason, status)
         self.get_logger().fatal(reason)
-        self.exit_code = 1
+        self.exit_code = status
         self.finished = True
 
     def waiting(self, subscription: Subscription) -> Iterator[Any]:

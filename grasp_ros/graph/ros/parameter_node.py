@@ -6,6 +6,7 @@ import sys
 from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
@@ -20,6 +21,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.suggestion import allowed
 
+FILE = "--params-file"
 RCLError = rclpy_implementation.RCLError
 
 
@@ -32,7 +34,7 @@ class ParameterNode(Node):
         self._in_words = PARAMETERS.get(name, {})
         with _refusing():
             super().__init__(name, **options)
-        if "--params-file" in sys.argv and not self._parameter_overrides:  # one of a file for many, or a wrong name
+        if FILE in sys.argv and not self._parameter_overrides:  # one of a file for many, or a wrong name
             self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
 
     def read_only(self, name: str, default: Any) -> Any:
@@ -73,7 +75,8 @@ class ParameterNode(Node):
     def refuse_unknown(self, numbers: bool = True) -> None:
         """Refuse what the start has given and nobody has declared; numbers of a scene too, if it is known by now."""
         given = [name for name in self._parameter_overrides if numbers or "." not in name]
-        unknown = [name for name in given if not self.has_parameter(name)]
+        others = {*chain(*PARAMETERS.values())} if FILE in sys.argv else set()  # a file may be for all nodes
+        unknown = [name for name in given if not self.has_parameter(name) and name not in others]
         if unknown:  # rclpy itself would not say a word
             name, free = unknown[0], self._parameters.get("free_running")
             missed = free is not None and not free.value and name in FREE
