@@ -45,8 +45,8 @@ class Failed(Refused):
 class Remote(GraspNode):
     """Node `remote`; parameter words, a JSON list: what to ask; empty: what the lines of the standard input say."""
 
-    def __init__(self) -> None:
-        super().__init__("remote")
+    def __init__(self, **options: Any) -> None:
+        super().__init__("remote", **options)
         self._wanted: list[str] = json.loads(self.read_only("words", "[]"))
         self._received: list[int] = []
         self._known: dict[str, Any] = {}
