@@ -63,7 +63,8 @@ def check_changes(scene: Scene, held: bool, changes: Changes, by_user: Iterable[
     for tick, numbers in changes.items():
         at = plain(tick)
         is_tick = at is not None and 0 <= at <= scene.ticks and at == int(at)
-        for name in names(f"changes: at tick {tick}", mapping(f"changes: at tick {tick}", numbers)):
+        where = f"changes: at tick {tick}"
+        for name in names(where, [*mapping(where, numbers)]):
             if name.startswith(replaced):
                 raise Refused(f"changes: {name} at tick {tick}: another controller acts in place of this feedback")
             if name not in live or not is_tick:
