@@ -48,7 +48,8 @@ def run(parser: Callable[[], argparse.ArgumentParser], words: Sequence[str]) -> 
             os.set_inheritable(stream.fileno(), True)  # the number that was free: for the nodes that we start as well
             setattr(sys, name, stream)
     if isinstance(getattr(sys.stdout, "buffer", None), io.FileIO):  # unbuffered: drops what cannot be written at once
-        sys.stdout = open(sys.stdout.fileno(), "w", 1, sys.stdout.encoding, closefd=False)  # noqa: SIM115 - likewise
+        own = sys.stdout
+        sys.stdout = open(own.fileno(), "w", 1, own.encoding, own.errors, closefd=False)  # noqa: SIM115 - likewise
     try:
         status = _status(parser, words)
         sys.stdout.flush()  # here, where it can still be said that it failed

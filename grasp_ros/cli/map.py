@@ -126,8 +126,9 @@ def reasons(data: Any, plan: Plan) -> Iterator[str]:
     """Why the first run of each status did not reach its end: it is made again, because a map keeps no sentences."""
     codes, firsts = np.unique(data["status"].values, return_index=True)
     for code, first in zip(codes.tolist(), firsts.tolist(), strict=True):
-        for why in compute(plan.variants(first, first + 1), plan.setup).stops.values() if code > 0 else ():
-            yield f"first run with {STATUSES[code]}: {why}"
+        if code > DONE:
+            stops = compute(plan.variants(first, first + 1), plan.setup).stops.values()
+            yield from (f"first run with {STATUSES[code]}: {why}" for why in stops)
 
 
 def report(found: dict[str, Any]) -> str:

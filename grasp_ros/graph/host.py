@@ -84,8 +84,12 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     if reach not in RANGES and not (alone and reach == OFF):
         why = ", no node would find another" if reach == OFF else ""
         raise Refused(f"{RANGE}: {reach!r} is not allowed{why}; allowed: {', '.join(RANGES[1:])}")
+    if middleware and middleware not in (installed := _installed(given)):  # ROS's library would end the process
+        raise Refused(f"{MIDDLEWARE}: {middleware!r} is not allowed; allowed here: {', '.join(installed)}")
+
+
+def _installed(given: Mapping[str, str]) -> list[str]:
+    """Names of the middlewares of this installation."""
     roots = [sys.prefix, *filter(None, given.get("AMENT_PREFIX_PATH", "").split(os.pathsep))]
     names = (file.name for root in roots for file in Path(root, INDEX).glob("rmw_*"))
-    installed = sorted({OURS, *names} - {"rmw_implementation"})
-    if middleware and middleware not in installed:  # with which ROS's library would end the process
-        raise Refused(f"{MIDDLEWARE}: {middleware!r} is not allowed; allowed here: {', '.join(installed)}")
+    return sorted({OURS, *names} - {"rmw_implementation"})

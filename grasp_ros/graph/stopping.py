@@ -32,7 +32,7 @@ def note_signals(received: list[int]) -> None:
     on_signals(lambda number, _: received.append(number))
 
 
-def on_signals(react: Callable[[int, Any], object]) -> None:
+def on_signals(react: Callable[[int, Any], object] | signal.Handlers) -> None:
     """React to the signals that end a process; a SIGHUP that is ignored, as `nohup` does it, stays ignored."""
     for number in STOP_SIGNALS:
         if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:

@@ -139,7 +139,7 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
         finish(m)
         return 0
     segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
-    if not math.isfinite(segment.m.y.sum() + t):
+    if not math.isfinite(m.y.sum() + t):
         return 0
     bound = wanted & (Wanted.SETTLING.value | Wanted.BOUND.value)
     if bound or wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value):

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import rclpy
 from graphs import recordings_of
+from processes import end
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
@@ -112,7 +113,6 @@ def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_d
         result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
         assert result.reason == f"{gain}: another controller acts in place of this feedback"
         assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
-        controller.close()
-        controller.destroy_node()
+        end(controller)
     finally:
         context.shutdown()

@@ -35,11 +35,11 @@ def must_begin(state: State, side: Body) -> bool:
 def force_free_time(f: Array, plant: Plant, state: State, side: Body) -> float:
     """Time in s, a power of two, for which a pair at u = 0 that begins may fly without its force.
 
-    It grows from near the begin on, as long as the pair has not turned back, so that its end has the largest force; inf
-    where nothing moves it. Its series is written to f.
+    It is looked for from near the begin on, up to where the pair turns back, so that its end has the largest force; inf
+    where nothing moves the pair. The series of u is written to f.
     """
     y = state.y
-    if state.mode[side] != Pair.BEGINNING or not write_own_series(plant, y, side, f):
+    if state.mode[side] != Pair.BEGINNING or write_own_series(plant, y, side, f) == 0.0:
         return math.inf
     longest, speed = min(short_time(plant, side), LONGEST), speed_of_pair(y, side)
     time = power_of_two(exponent(longest) - MOST_HALVINGS)

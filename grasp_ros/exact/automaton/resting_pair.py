@@ -94,16 +94,20 @@ def difference(plant: Plant, y: Array, side: Body, order: int) -> tuple[float, f
 
 
 @kernel
-def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> bool:
-    """Write the series of u of arm and object by themselves, up to the order HIGHEST; whether it differs from 0."""
+def write_own_series(plant: Plant, y: Array, side: Body, f: Array) -> float:
+    """Write the series of u of arm and object by themselves, up to the order HIGHEST; its first number that is not 0.
+
+    0 where nothing moves the pair.
+    """
     f[0], f[1], factorial = y[U.L + side], approach(y, side), 1.0
-    moves = f[0] != 0.0 or f[1] != 0.0
     for order in range(LOWEST, HIGHEST + 1):
         factorial *= order
         value, size = difference(plant, y, side, order)
         f[order] = value / factorial if abs(value) > DERIVATIVE * size else 0.0
-        moves = moves or f[order] != 0.0
-    return moves
+    for k in range(HIGHEST + 1):
+        if f[k] != 0.0:
+            return f[k]
+    return 0.0
 
 
 @kernel
@@ -150,9 +154,10 @@ def parting_time(f: Array, plant: Plant, state: State, side: Body, work: Integer
 
     Half of what its series up to the order HIGHEST, which is written to f, gives: that leaves room for what follows.
     """
-    if not write_own_series(plant, state.y, side, f):
+    first = write_own_series(plant, state.y, side, f)
+    if first == 0.0:
         return math.inf
-    if own_difference(plant, state.y, side).value > 0.0:
+    if first > 0.0:
         for k in range(HIGHEST + 1):
             f[k] = -f[k]
     longest = short_time(plant, side)

@@ -78,7 +78,7 @@ def _process(number: str) -> tuple[str, str]:
 
 
 class Heartbeats:
-    """Those of a node, and those that it hears."""
+    """The heartbeats of a node, and those that it hears."""
 
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
         self._heard = heard  # called after each one of another node
@@ -112,7 +112,7 @@ class Heartbeats:
         self.publisher.wait_for_all_acked(Duration(seconds=ACKNOWLEDGE_SECONDS))
 
     def end(self, words: str) -> None:
-        """The last one."""
+        """The last heartbeat."""
         self._stop.set()
         for thread in self._threads:
             thread.join()
@@ -136,11 +136,11 @@ class Heartbeats:
         self._heard()
 
     def of(self, names: Sequence[str]) -> list[Heartbeat]:
-        """Those of some nodes, the last one last."""
+        """The heartbeats of some nodes, the last one last."""
         return [beat for beat in self._beats.values() if beat.node in names]
 
     def quiet(self, names: Sequence[str], limit: float) -> list[str]:
-        """Those of some nodes that were heard once, but not since a wall time, without last words."""
+        """Which of these nodes were heard once, but not since a wall time, and had no last words."""
         heard = {beat.node: beat.heard for beat in self.of(names) if not beat.ended}
         return [name for name in dict.fromkeys(names) if heard.get(name, limit) < limit]
 

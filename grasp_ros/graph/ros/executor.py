@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from grasp_ros.graph.parameters import TOOLS
 from grasp_ros.graph.ros.node import GraspNode
-from grasp_ros.graph.stopping import STOP_SIGNALS, end_by_force, note_signals, tell_parent
+from grasp_ros.graph.stopping import end_by_force, note_signals, on_signals, tell_parent
 from grasp_ros.physics.errors import Refused, described
 
 OF_ROS = ("ROS_", "RMW_", "RCUTILS_", "FAST")  # how variables begin that rcl and the middleware read
@@ -40,8 +40,7 @@ def run(makes: Mapping[str, Callable[..., GraspNode]], received: list[int]) -> i
     status = _live(context, makes, nodes, received)
     if received and not status and TOOLS.keys() & makes.keys():
         status = INTERRUPTED
-    for number in STOP_SIGNALS:  # a second Ctrl-C must not hit the end of the interpreter
-        signal.signal(number, signal.SIG_IGN)
+    on_signals(signal.SIG_IGN)  # a second Ctrl-C must not hit the end of the interpreter
     end_by_force(", ".join(makes), status)  # the end of DDS can hang, and a thread of a law keeps the interpreter
     for node in nodes:
         node.destroy_node()
@@ -55,12 +54,7 @@ def _live(
     """Make the nodes, run them until there is nothing left to do, and close them; returns the exit status."""
     names = together = ", ".join(makes)
     try:
-        try:
-            rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-        except RuntimeError as error:  # the base of what rcl raises
-            given = " ".join(f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS))
-            words = " ".join([*sys.argv[1:], given])
-            raise Refused(f"ROS does not start: {' '.join(str(error).split())}; it was given {words}") from None
+        _start(context)
         try:
             for names, make in makes.items():  # noqa: B007 - which one is refused
                 nodes.append(make(context=context))
@@ -87,6 +81,16 @@ def _live(
             print(f"{names}: {words}", file=sys.stderr)
         return 1
     return next((node.exit_code for node in nodes if node.exit_code), 0)
+
+
+def _start(context: Context) -> None:
+    """Let ROS begin, without signal handlers of its own."""
+    try:
+        rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:  # the base of what rcl raises
+        variables = [f"{name}={value}" for name, value in sorted(os.environ.items()) if name.startswith(OF_ROS)]
+        words = " ".join([*sys.argv[1:], *variables])
+        raise Refused(f"ROS does not start: {' '.join(str(error).split())}; it was given {words}") from None
 
 
 def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> None:

@@ -55,7 +55,7 @@ class GraspNode(ParameterNode):
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, **options)
-        self.begun = False  # whether the peers it waited for at first have come
+        self.begun = False  # whether the peers it waited for have come: what is refused before is what it was given
         self.finished = False  # whether there is nothing left to do
         self.exit_code = 0  # 1 after a failure, 2 after a refusal before it has begun
         self.counters: dict[str, int | float | str] = {}  # the values of its /diagnostics

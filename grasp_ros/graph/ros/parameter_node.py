@@ -34,7 +34,7 @@ class ParameterNode(Node):
         self._in_words = PARAMETERS.get(name, {})
         with _refusing():
             super().__init__(name, **options)
-        if FILE in sys.argv and not self._parameter_overrides:  # one of a file for many, or a wrong name
+        if FILE in sys.argv and not self._parameter_overrides:  # the file may be for others, or the name is wrong
             self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
 
     def read_only(self, name: str, default: Any) -> Any:
