@@ -19,7 +19,7 @@ def wait_for(condition: Callable[[], bool], what: str) -> None:
         time.sleep(0.01)
 
 
-def end(*nodes: Any) -> None:
+def end_nodes(*nodes: Any) -> None:
     """End nodes of this process, as their own process would."""
     for node in nodes:
         node.close()

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from processes import DEADLINE, START, children, end, wait_for
+from processes import DEADLINE, START, children, end_nodes, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
@@ -199,7 +199,7 @@ def test_what_the_executor_was_not_told_of_is_found(node: tuple[Any, SingleThrea
 
     wait_for(found, "both")
     assert heard == ["text"]
-    end(waiting)
+    end_nodes(waiting)
 
 
 BUSY = """
@@ -235,11 +235,11 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not() -> None:
     while time.monotonic() < end:
         executor.spin_once(timeout_sec=0.1)
     assert not controller.finished
-    end(other)
+    end_nodes(other)
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or controller.finished, "its end")
     assert "nobody has come for 1.6 s" in controller.words
     executor.shutdown()
-    end(controller)
+    end_nodes(controller)
     context.shutdown()
 
 
@@ -304,4 +304,4 @@ def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[A
     heartbeats._on_beat(String(data=json.dumps([*sign[:4], "ended", *sign[5:]])))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
     heartbeats.end("")
-    end(waiting)
+    end_nodes(waiting)

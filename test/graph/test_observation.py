@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import rclpy
 from graphs import recordings_of
-from processes import end
+from processes import end_nodes
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
@@ -113,6 +113,6 @@ def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_d
         result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
         assert result.reason == f"{gain}: another controller acts in place of this feedback"
         assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
-        end(controller)
+        end_nodes(controller)
     finally:
         context.shutdown()

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from processes import DEADLINE, START, end, wait_for
+from processes import DEADLINE, START, end_nodes, wait_for
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -48,7 +48,7 @@ def loop() -> Iterator[tuple[Plant, Controller, SingleThreadedExecutor]]:
     wait_for(lambda: executor.spin_once(timeout_sec=0.1) or plant.tick > 10, "some ticks")
     yield plant, controller, executor
     executor.shutdown()
-    end(plant, controller)
+    end_nodes(plant, controller)
     context.shutdown()
 
 
@@ -105,7 +105,7 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: 
         loop.spin_once(timeout_sec=0.1)
     wait_for(lambda: [executor.spin_once(timeout_sec=0.001) for executor in (loop, behind)] and monitor.finished, "end")
     for node in (plant, controller, monitor):
-        end(node)
+        end_nodes(node)
     context.shutdown()
     recording = bag.read(tmp_path / "bag")
     assert len(recording.changes) > 400
