@@ -156,7 +156,8 @@ class FreeRunning:
         if self._plant.finished:
             return
         if self._plant.tick + 1 == self._plant.scene.ticks:
-            self.report()  # before the last state, with which a monitor closes its bag
+            self.report()
+            self._plant.flush(self._quality)  # before the last state, with which a monitor closes its bag
         self._plant.step(forces)
 
     def _time_out(self, side: str) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from rclpy.serialization import deserialize_message
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
@@ -74,6 +75,7 @@ class Monitor(PeerNode):
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
+        self._others: list[Subscription] = []  # of what does not come with every state
         self._published = b""  # of the last tick
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
@@ -170,7 +172,7 @@ class Monitor(PeerNode):
             if topic in COMMANDS.values():
                 self._sources[topic] = Sources(subscription, UNCERTAIN_SECONDS)
         for topic in (*beside, DIAGNOSTICS):
-            self.subscribe(topic, partial(self._record, topic), raw=True)
+            self._others.append(self.subscribe(topic, partial(self._record, topic), raw=True))
 
     def _record(self, topic: Topic, cdr: bytes) -> None:
         """Keep what does not come with every state, at the time of the last one, as long as it is not too much."""
@@ -280,6 +282,7 @@ class Monitor(PeerNode):
         if self._recorder is not None:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
                 self._complete()
+                self.take_waiting(self._others)  # what came with the last state
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")
         if self.finished:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from enum import Enum
 from functools import partial
@@ -222,15 +222,19 @@ class GraspNode(ParameterNode):
                 return
             yield found[0]
 
-    def sweep(self) -> None:
-        """Take what the executor has not been told of.
+    def take_waiting(self, subscriptions: Iterable[Subscription]) -> None:
+        """Take the messages that the executor has not been told of.
 
         Between looking for messages and listening for them, rmw_fastrtps is deaf for a moment: the first message of a
         topic can lie there until the second comes.
         """
-        for subscription in tuple(self.subscriptions):
+        for subscription in tuple(subscriptions):
             for message in islice(self.waiting(subscription), SWEEP):
                 subscription.callback(message)
+
+    def sweep(self) -> None:
+        """Take messages and requests that the executor has not been told of."""
+        self.take_waiting(self.subscriptions)
         for service in tuple(self.services):
             with service.handle:
                 request, header = service.handle.service_take_request(service.srv_type.Request)
