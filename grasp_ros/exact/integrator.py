@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from enum import Enum
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -15,7 +16,7 @@ from grasp_ros.exact.driver.outputs import SPARE
 from grasp_ros.exact.driver.rest import SINCE
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.events import Event, to_events
-from grasp_ros.exact.records import COULOMB, Integers, Loop, Tables, new_place, new_run
+from grasp_ros.exact.records import BODY_NUMBERS, Integers, Loop, Plant, Tables, new_state, one_interval, plant_of
 from grasp_ros.physics import given
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
@@ -79,8 +80,8 @@ class Integrator:
     observer : Observer or None
     system, continuous : System and bool
         As given.
-    plant, records : Plant and State
-        What the kernels work on.
+    records : State
+        Where it stands, as the kernels see it.
 
     Raises
     ------
@@ -103,18 +104,19 @@ class Integrator:
         # Kernels are compiled once: for floats, and for arrays in C order that may be written to.
         self.system, self.continuous = system, continuous
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
-        self._plant_block, self._state_block, self._mode, self.plant, self.records = new_run()
         bodies = system.closed_loop if continuous else system.bodies
-        self.plant.given[:] = bodies  # `bodies` follow from it
-        for body in system.absent:  # what is not there rests at 0 without any force
-            self.plant.given[body, Of.MASS] = 1.0
-        self.plant.pairs[:], self._plant_block[COULOMB] = system.pairs, system.coulomb
-        self.plant.own[:] = bodies[:, Of.FORCE]
+        self._plant_block = _block_of(bodies, system.pairs, system.coulomb)
+        self._state_block, self._mode, self.records = new_state()
         self.records.y[:] = *state, state[X.L] - state[X.O], state[X.O] - state[X.R]
         self.records.rest[SINCE] = math.inf
         self._events: list[Array] = []
         self._event_count = 0
         self.observer: Observer | None = None
+
+    @cached_property
+    def plant(self) -> Plant:
+        """What the kernels simulate."""
+        return plant_of(self._plant_block)
 
     @property
     def state(self) -> Array:
@@ -197,8 +199,7 @@ class Integrator:
         if not (math.isfinite(duration) and duration >= 0.0):
             raise Refused(f"duration: {duration!r} is not a finite number of seconds >= 0")
         times = _NO_TIMES if grid is None else given.times("grid", grid)
-        loop = Loop(np.array([duration]), np.array([start]), np.array([0, len(times)]), new_place())
-        return self.run(loop, times)
+        return self.run(one_interval(duration, start, len(times)), times)
 
     def run(self, loop: Loop, grid: Array, rows: Array | None = None) -> Array:
         """Integrate over the intervals of a loop.
@@ -226,7 +227,7 @@ class Integrator:
                 most = min(self._spent + BREATH, self._max_work)
                 outcome = advance(
                     block, order, self._plant_block, self._state_block, self._mode, self._accuracy, most, grid, out,
-                    allowed, filled, self.work, observer, loop)
+                    allowed, filled, self.work, observer, tuple(loop))
                 if count := int(filled[_EVENTS]):
                     self._events.append(event_rows[:count].copy())
                     self._event_count += count
@@ -247,6 +248,13 @@ class Integrator:
             return False
         self.status = Status[Outcome(outcome).name]
         return True
+
+
+def _block_of(bodies: Array, pairs: Array, coulomb: float) -> Array:
+    """Numbers of a plant, see `plant_of`; a body that is not there has a mass, and rests at 0 without any force."""
+    given = bodies.ravel().tolist()
+    given[::4] = [mass or 1.0 for mass in given[::4]]
+    return np.array([*given, *[0.0] * BODY_NUMBERS, *pairs.ravel().tolist(), coulomb, *given[3::4]])
 
 
 @compiling

@@ -1,7 +1,7 @@
 """The records that the kernels hand to each other: what a plant is, where it stands, what a run writes.
 
-An array that crosses from Python costs some 60 ns, and a record of arrays a microsecond, so that `driver.advance` takes
-few of them: plant and state cross as one block of numbers each, of which the arrays of their records are parts.
+An array that crosses from Python costs some 60 ns, so that `driver.advance` takes few of them: plant and state cross as
+one block of numbers each, of which the arrays of their records are parts.
 """
 
 from __future__ import annotations
@@ -33,9 +33,7 @@ class Plant(NamedTuple):
 
 BODY_NUMBERS, PAIR_NUMBERS = 12, 4
 COULOMB = 2 * BODY_NUMBERS + PAIR_NUMBERS  # its place in the block of a plant
-PLANT_NUMBERS = COULOMB + 4
-STATE_NUMBERS = 20
-_UNKNOWN = [int(Pair.UNKNOWN)] * 3
+PLANT_NUMBERS, STATE_NUMBERS = COULOMB + 4, 20
 
 
 def plant_of(block: Array) -> Plant:
@@ -60,10 +58,16 @@ def state_of(block: Array, mode: Integers) -> State:
     return State(block[:8], mode, block[8:14], block[14:17], block[17:])
 
 
+def new_state() -> tuple[Array, Integers, State]:
+    """Where a run begins: a block of numbers, modes that are not known yet, and the record of both."""
+    block, mode = np.zeros(STATE_NUMBERS), np.array([Pair.UNKNOWN.value] * 3)
+    return block, mode, state_of(block, mode)
+
+
 def new_run() -> tuple[Array, Array, Integers, Plant, State]:
     """What a run works on: blocks of plant and state, modes that are not known yet, and the records of these."""
-    plant, state, mode = np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS), np.array(_UNKNOWN)
-    return plant, state, mode, plant_of(plant), state_of(state, mode)
+    plant, (state, mode, record) = np.zeros(PLANT_NUMBERS), new_state()
+    return plant, state, mode, plant_of(plant), record
 
 
 class Order(NamedTuple):
@@ -119,6 +123,11 @@ def new_place(tick: int = 0) -> Integers:
     if tick:
         place[Place.TICK] = tick
     return place
+
+
+def one_interval(length: float, begin: float, outputs: int) -> Loop:
+    """An interval of `length` from `begin` on, in s, with so many output times."""
+    return Loop(np.array([length]), np.array([begin]), np.array([0, outputs]), new_place())
 
 
 FACTORS = 32  # numbers of one order in the table of factors

@@ -28,8 +28,8 @@ from grasp_ros.exact.records import (
     Loop,
     Plant,
     State,
-    new_place,
     new_run,
+    one_interval,
 )
 from grasp_ros.observe.observe import BEGIN, FINISH
 from grasp_ros.observe.observer import RunObserver
@@ -142,28 +142,30 @@ def count_events(rows: Rows, i: int, room: Room) -> int:
 
 
 @kernel
-def run_row(door: Any, loop: Loop, rows: Rows, i: int, room: Room, limits: Limits) -> int:
+def run_row(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, limits: Limits) -> int:
     """Integrate a row over the interval of the loop; why it ended."""
-    loop.place[Place.INTERVAL] = loop.place[Place.BEGUN] = 0
+    place = Loop(*driven).place
+    place[Place.INTERVAL] = place[Place.BEGUN] = 0
     outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
     while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
         outcome = door(
             room.block, room.order, room.plant_block, room.state_block, room.mode, limits.tolerance, limits.max_work,
-            room.times, room.rows, room.events, room.filled, room.work, room.observer, loop)
+            room.times, room.rows, room.events, room.filled, room.work, room.observer, driven)
         events += count_events(rows, i, room)
     return int(outcome if events <= limits.max_events else Outcome.EVENTS_FULL.value)
 
 
 @kernel
-def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, memory: Memory, limits: Limits) -> int:
+def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, memory: Memory, limits: Limits) -> int:
     """Go on with a row as `observer.settle` does, until V_c decides; why it ended."""
     seen, switches, outcome, done = memory.seen, memory.switches, Outcome.DONE.value, 1
+    loop = Loop(*driven)
     wanted, losses = switches[Switch.WANTED], switches[Switch.LOSSES]
     switches[Switch.WANTED], switches[Switch.LOSSES] = Wanted.SETTLING.value, 0
     left, right = rows.touches[i, 0], rows.touches[i, 1]
     while seen[Seen.SETTLED] == UNDECIDED and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
-        outcome = run_row(door, loop, rows, i, room, limits)
+        outcome = run_row(door, driven, rows, i, room, limits)
         call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
         done += 1
     loop.begins[0] = 0.0
@@ -176,7 +178,7 @@ def go_on(door: Any, loop: Loop, rows: Rows, i: int, room: Room, memory: Memory,
 
 
 @machine_door
-def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, memory: Memory, limits: Limits) -> int:
+def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory: Memory, limits: Limits) -> int:
     """Integrate the rows; returns how many, fewer only if a stop was asked for."""
     n = rows.state.shape[0]
     for i in range(n):
@@ -185,7 +187,7 @@ def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, memory: Memory, limi
         load_row(rows, i, room, memory)
         if room.observer[ADDRESS] != 0:
             call(room.observer[ADDRESS], room.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0)
-        outcome = run_row(door, loop, rows, i, room, limits)
+        outcome = run_row(door, driven, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
         if room.observer[ADDRESS] != 0:
@@ -193,7 +195,7 @@ def run_rows(door: Any, loop: Loop, rows: Rows, room: Room, memory: Memory, limi
             for place in range(memory.seen.shape[0]):
                 rows.seen[i, place] = memory.seen[place]
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
-                outcome = go_on(door, loop, rows, i, room, memory, limits)
+                outcome = go_on(door, driven, rows, i, room, memory, limits)
         rows.outcome[i] = outcome
     return n
 
@@ -213,12 +215,12 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
     """
     run = new_run()
     run_observer = RunObserver(*run[3:], wanted)
-    loop = Loop(np.array([duration]), np.zeros(1), np.zeros(2, dtype=np.int64), new_place())
+    driven = tuple(one_interval(duration, 0.0, 0))
     run_observer.memory.switches[Switch.CERTAIN] = 1
     limits = limits._replace(max_work=min(limits.max_work, BREATH))
     with workspace(limits.tolerance) as (block, order, tables, events):
         observer = run_observer.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
         room = Room(block, order, *run, np.zeros(0), np.zeros((0, 6)), events,
                     np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)
-        done = run_rows(door(), loop, rows, room, run_observer.memory, limits)
+        done = run_rows(door(), driven, rows, room, run_observer.memory, limits)
     return int(done)

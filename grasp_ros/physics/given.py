@@ -125,7 +125,10 @@ def column(name: str, values: Any) -> NDArray[np.float64]:
     Refused
         If there are none, in another shape, or some are missing.
     """
-    array = _array(name, values)
+    return _row(name, _array(name, values))
+
+
+def _row(name: str, array: NDArray[Any]) -> NDArray[np.float64]:
     if array.ndim != 1:
         raise Refused(f"{name}: shape {array.shape} is not allowed; allowed: (n,)")
     if array.dtype.kind not in "fiu":
@@ -148,7 +151,7 @@ def times(name: str, values: Any, several: bool = False) -> NDArray[np.float64]:
         array = array.astype("timedelta64[us]")
     if array.dtype.kind == "m":
         array = array / SECOND
-    found = column(name, array.ravel() if several or array.ndim == 0 else array)
+    found = _row(name, array.ravel() if several or array.ndim == 0 else array)
     return found.reshape(array.shape) if several else found
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from grasp_ros.exact.driver.user_controller import UserController
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Loop as KernelLoop
-from grasp_ros.exact.records import new_place
+from grasp_ros.exact.records import new_place, one_interval
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.control import ControlLaw, Law
@@ -166,7 +166,7 @@ def drive(
         return drive_sampled(scene, grid, loop or new_loop(len(grid)), changes, by_user, progress, integrator)
     if scene.system.external:
         return drive_external(scene, grid, integrator)
-    return integrator.advance(scene.duration, grid)
+    return integrator.run(one_interval(scene.duration, 0.0, len(grid)), grid)
 
 
 def solve(

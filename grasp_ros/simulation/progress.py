@@ -5,26 +5,27 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 Told = Callable[[float], object]
 DELAY_S = 0.5  # a computation that is over by then needs no bar
 
 
-@contextmanager
-def showing(progress: Told | bool | None, total: float | None, unit: str, name: str) -> Iterator[Told | None]:
+def showing(progress: Told | bool | None, total: float | None, unit: str, name: str
+            ) -> AbstractContextManager[Told | None]:
     """What is to be told how far a computation is: what a caller gave, a bar in place of True, or nothing.
 
     `total` is what the last call says, where it is known; the name stands in front of the bar.
     """
     if not isinstance(progress, bool):
-        yield progress
-        return
+        return nullcontext(progress)
     moves = os.environ.get("TERM", "") != "dumb" and "NO_COLOR" not in os.environ  # it may move the cursor
     looked_at = "ipykernel" in sys.modules or (sys.stderr.isatty() and moves)  # in a notebook, or on a terminal
-    if not (progress and looked_at):
-        yield None
-        return
+    return _bar(total, unit, name) if progress and looked_at else nullcontext()
+
+
+@contextmanager
+def _bar(total: float | None, unit: str, name: str) -> Iterator[Told]:
     from tqdm.auto import tqdm
 
     with tqdm(total=total, unit=unit, desc=name, delay=DELAY_S, smoothing=0.05) as bar:
