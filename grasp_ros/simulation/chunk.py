@@ -7,6 +7,7 @@ plain one that stops, is driven as `simulate` drives a scene. Both give the same
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,6 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.places import check_scene
 from grasp_ros.simulation.closed_loop import drive
-from grasp_ros.simulation.lyapunov import exponent
 from grasp_ros.simulation.outcomes import LAST, LYAPUNOV, Outcome, Runs, find, wanted_by
 from grasp_ros.simulation.variants import Variants
 
@@ -160,7 +160,10 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: 
     runs.state[i], runs.touches[i] = run.state, [(touched == side).sum() for side in (LEFT, RIGHT)]
     done = run.status is Status.DONE
     if done and any(column.name == LYAPUNOV for column in columns):
-        runs.growth[i] = exponent(system, scene.duration, setup.accuracy)
+        from grasp_ros.sensitivity.spectrum import spectrum  # whose kernels no other run loads
+
+        with suppress(Refused):  # a run in pieces of time may stop where this one did not
+            runs.growth[i] = spectrum(scene, accuracy=setup.accuracy)[0]
     if run_observer is not None:
         run_observer.finish()
         seen[:] = run_observer.seen

@@ -112,7 +112,6 @@ def test_nobody_makes_a_scene_around_the_checks() -> None:
         "scene/scene.py"
     ]
     assert [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.rglob("*.py")) if "replace" in called(path)] == [
-        "simulation/lyapunov.py",  # of a system
         "simulation/repeat.py",  # of a run
         "simulation/simulate.py",  # of a run
     ]
