@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
-from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Transition, Work
+from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Of, Transition, Work
 from grasp_ros.physics.model import penetration
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
@@ -88,7 +88,9 @@ def _end(run: Trajectory, product: Product) -> Check:
     error = float(run.status in (Status.STALLED, Status.ENERGY_RISES, Status.ENERGY_FALLS, Status.PENETRATES))
     if run.status is Status.STALLED:
         error = float(_smallest_at_stall(run, product) > DIED_OUT)
-    driven = run.sampled or bool(run.scene.system.external)  # held commands and external forces do any work
+    system = run.scene.system
+    pushed = (system.closed_loop[:, Of.FORCE] != 0.0) & (system.closed_loop[:, Of.STIFFNESS] == 0.0)
+    driven = run.sampled or bool(system.external) or pushed.any()  # any work: held commands, and steady forces
     if run.status is Status.NOT_FINITE or (run.status is Status.OUTSIDE and not driven):
         error = 1.0
     return Check(f"ends {run.status.name}", error, 0.0)
