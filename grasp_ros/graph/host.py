@@ -10,6 +10,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
+import resource
 import socket
 import sys
 from collections.abc import Mapping
@@ -26,6 +27,7 @@ PROFILES = "FASTRTPS_DEFAULT_PROFILES_FILE"
 PROFILE = CONFIG / "this_host.xml"
 OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
 MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
+LEAST_BYTES = 2**31  # that a node can address: with its libraries and threads it takes up to 1.8e9
 INDEX = "share/ament_index/resource_index/rmw_typesupport"  # where an installation of ROS lists those that it has
 
 
@@ -74,10 +76,14 @@ def hold(given: Mapping[str, str], namespace: str) -> socket.socket:
 
 
 def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
-    """Refuse variables with which a graph would be nowhere, somewhere else, or where its nodes do not find each other.
+    """Refuse a host where a graph would be nowhere, somewhere else, or without memory, or its nodes without each other.
 
     If all are alone in one process, they need not.
     """
+    memory, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if 0 <= memory < LEAST_BYTES:  # too little has as many words as libraries
+        allowed = f"at least {LEAST_BYTES >> 10}, or unlimited"
+        raise Refused(f"memory (`ulimit -v`): {memory >> 10} kB is not allowed; allowed: {allowed}")
     domain, reach, middleware = (given.get(name, "") for name in (DOMAIN, RANGE, MIDDLEWARE))
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):
         raise Refused(f"{DOMAIN}: {domain!r} is not allowed; allowed: 0 to {MOST_DOMAIN}")

@@ -49,8 +49,9 @@ def end_late_by_force(name: str) -> None:
     signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)  # written to at once, whatever the process does
 
     def watch() -> None:  # without end: what is closed would give its number to the next file, which Python writes to
-        while reader.recv(1) and writer:
-            end_by_force(name)
+        while (number := reader.recv(1)) and writer:
+            if number[0] in STOP_SIGNALS:  # a law may react to others
+                end_by_force(name)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()
 

@@ -233,7 +233,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
         return parse(read_text(path, SceneError), path.stem, str(path), settings)
     if reference not in names():
         known = allowed(reference, names(), "a path that ends in .yaml, or one of ")
-        raise SceneError(f"{reference}: no such scene; {known}")
+        raise SceneError(f"{reference or repr(reference)}: no such scene; {known}")
     return parse(text_of(reference), reference, reference, settings)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import subprocess
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -25,12 +26,17 @@ def _kernels() -> None:
 def launch() -> Iterator[Callable[..., subprocess.Popen[str]]]:
     """Starts processes, and ends those that a failed test leaves behind: they would answer the next graph."""
     started: list[subprocess.Popen[str]] = []
+    late: list[threading.Timer] = []
 
     def call(*command: str, **options: Any) -> subprocess.Popen[str]:
         started.append(subprocess.Popen(command, text=True, **options))
+        late.append(threading.Timer(2 * DEADLINE, started[-1].kill))  # whoever reads its output waits for no end
+        late[-1].start()
         return started[-1]
 
     yield call
+    for timer in late:
+        timer.cancel()
     for process in started:
         process.terminate()  # a clean end at first: what follows must not meet the processes of `grasp run`
         process.send_signal(signal.SIGCONT)

@@ -199,6 +199,14 @@ def test_a_run_whose_nodes_refuse_what_they_are_given_is_refused(tmp_path: Path,
     assert "Traceback" not in found.stderr
 
 
+@pytest.mark.parametrize("words", [[*START, "plant"], [sys.executable, "-m", "grasp_ros.cli", "run", "case_01"]])
+def test_a_limit_of_memory_in_which_no_node_has_room_is_named(tmp_path: Path, words: list[str]) -> None:
+    found = subprocess.run(["sh", "-c", 'ulimit -v 1000000; exec "$@"', "sh", *words], capture_output=True, text=True,
+                           timeout=DEADLINE, check=False, cwd=tmp_path)
+    assert (found.returncode, len(found.stderr.splitlines())) == (2, 1)
+    assert "memory (`ulimit -v`): 1000000 kB is not allowed; allowed: at least 2097152, or unlimited" in found.stderr
+
+
 def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
     environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
     run = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process"]

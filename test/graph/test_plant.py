@@ -35,7 +35,10 @@ REFUSED = [
     ("plant", "-p scene:=missing.yaml", "missing.yaml: no such file"),
     ("plant", "-p accuracy:=1.0", "accuracy: 1.0 is not allowed; allowed: 1e-16 to 0.001"),
     ("plant", "-p accuracy:=1", "accuracy: 1.0 is not allowed; allowed: 1e-16 to 0.001"),
-    ("plant", "-p scene:=1", "scene"),
+    ("plant", "-p scene:=1", "scene: 1 is not allowed; allowed: a text"),
+    ("plant", "-p scene:=''", "'': no such scene; allowed: a path that ends in .yaml, or one of "),
+    ("plant", "-p paused:=1", "paused: 1 is not allowed; allowed: true or false"),
+    ("left_controller", "-p real_time_priority:=1.5", "real_time_priority: 1.5 is not allowed; allowed: a whole"),
     ("plant", "-p object.mas_kg:=4.0", "object.mas_kg: no such parameter"),
     ("plant", "-p tilt.angle_rad:=0.3", "tilt.angle_rad: no such parameter"),
     ("plant", "-p object.mass_kg:=-4.0", "object.mass_kg"),
@@ -57,7 +60,8 @@ REFUSED = [
 
 ONE_BY_ONE = """
 import json, sys
-from grasp_ros.graph import __main__ as start
+from grasp_ros.graph import __main__ as start, stopping
+stopping.GRACE_SECONDS = 1e4  # which count from the end of the first
 for name, arguments in json.loads(sys.argv[1]):
     sys.argv[1:] = ["--ros-args", *arguments.split()]
     status = start.main(name)

@@ -185,6 +185,26 @@ os._exit(len(received))
     assert [path.stat().st_size for path in tmp_path.iterdir()] == [0] * 8
 
 
+def test_a_signal_of_a_law_ends_no_node() -> None:
+    """Such as that of a timer; Python tells of all."""
+    script = """
+import signal
+from grasp_ros.graph import stopping
+ends = []
+stopping.end_by_force = ends.append
+stopping.note_signals([])
+stopping.end_late_by_force("node")
+signal.signal(signal.SIGALRM, lambda *_: None)
+for number in (signal.SIGALRM, signal.SIGINT):
+    signal.raise_signal(number)
+while not ends:
+    pass
+print(ends)
+"""
+    found = subprocess.run([sys.executable, "-c", script], stdout=-1, text=True, timeout=DEADLINE, check=False)
+    assert found.stdout == "['node']\n"
+
+
 def test_a_thread_that_a_law_has_left_keeps_no_node() -> None:
     words = "import sys, threading; from grasp_ros.graph import __main__, stopping; stopping.GRACE_SECONDS = 0.5;" \
         "threading.Thread(target=threading.Event().wait).start(); sys.exit(__main__.start())"
@@ -234,10 +254,14 @@ def test_a_law_that_ends_its_process_has_ended_no_run(
 
 
 @pytest.mark.parametrize("options", [[], ["--one-process"]])
-def test_a_law_that_is_a_node_itself_disturbs_no_end(launch: Any, tmp_path: Path, options: list[str]) -> None:
+@pytest.mark.parametrize("tick", [-1, 0], ids=["import", "first answer"])
+def test_a_law_that_is_a_node_itself_disturbs_no_end(
+    launch: Any, tmp_path: Path, options: list[str], tick: int
+) -> None:
     """`rclpy.init` sets signal handlers that would end all contexts of the process."""
-    (tmp_path / "mine.py").write_text("import rclpy\nrclpy.init()\nnode = rclpy.create_node('mine')\n"
-                                      "def law(tick, t, x, v):\n    return -5.0 * x - 0.5 * v\n")
+    begin = "node = rclpy.init() or rclpy.create_node('mine')"
+    (tmp_path / "mine.py").write_text(f"import rclpy\ndef law(tick, t, x, v):\n    if tick == {tick}: {begin}\n"
+                                      "    return -5.0 * x - 0.5 * v\nlaw(-1, 0.0, 0.0, 0.0)\n")
     command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=mine:law", "-o", "run"]
     process = launch(*command, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     recorded = tmp_path / "run" / "bag" / "bag.mcap"
@@ -248,13 +272,22 @@ def test_a_law_that_is_a_node_itself_disturbs_no_end(launch: Any, tmp_path: Path
     assert "interrupted" in out
 
 
+def test_a_monitor_without_a_plant_leaves_nothing(tmp_path: Path) -> None:
+    """It has looked whether its bag can be written; `grasp run` would take a directory for the begin of the bag."""
+    numbers = {"bag": "new/bag", "peer_timeout_s": "0.1", "start_timeout_s": "0.1", "on_silence": "end"}
+    words = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
+    found = subprocess.run([*START, "monitor", "--ros-args", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+                           timeout=DEADLINE, check=False)
+    assert "nobody has come for 0.1 s" in found.stderr
+    assert not [*tmp_path.iterdir()]
+
+
 def test_a_bag_that_cannot_be_closed_is_a_sentence(launch: Any, tmp_path: Path) -> None:
     """No tick comes that would say it earlier."""
     names = {"monitor": ["bag:=bag"], "plant": ["scene:=arm_alone", "-p", "paused:=true"]}
     nodes = [launch(*START, name, "--ros-args", "-p", *words, cwd=tmp_path, stderr=subprocess.PIPE)
              for name, words in names.items()]
-    while "recording" not in nodes[0].stderr.readline():
-        pass
+    assert any("recording" in line for line in nodes[0].stderr)
     shutil.rmtree(tmp_path / "bag")
     for node in nodes:
         node.send_signal(signal.SIGINT)

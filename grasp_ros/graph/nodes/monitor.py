@@ -9,6 +9,7 @@ from contextlib import suppress
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from rclpy.serialization import deserialize_message
@@ -69,8 +70,11 @@ class Monitor(PeerNode):
         default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
         self._path = Path(self.read_only("bag", default))
         with writing(f"bag: {self._path}"):  # now, and not when a plant comes
-            self._path.mkdir(parents=True)
-            self._path.rmdir()
+            with suppress(FileNotFoundError):
+                self._path.lstat()
+                raise FileExistsError
+            there = next(parent for parent in self._path.absolute().parents if parent.exists())
+            TemporaryDirectory(dir=there).cleanup()
         self._running: Running | None = None
         self._scene: Scene | None = None
         self._recorder: Recorder | None = None

@@ -25,6 +25,7 @@ BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before 
 # A spin without a time limit burns a core and can hang; one until a future is complete, which does not return between
 # messages, takes less time, and has corrupted the heap of a process.
 POLL_SECONDS = 0.2
+NOT_OURS = {Warning: "PYTHONWARNINGS makes it an error", MemoryError: "there is not enough memory"}
 INTERRUPTED = 130  # of a tool that a signal ends before it is through; nodes of a graph are meant to end by one
 
 
@@ -37,6 +38,7 @@ def run(makes: Mapping[str, Callable[..., GraspNode]], received: list[int]) -> i
     """
     nodes: list[GraspNode] = []
     context = Context()  # not the default one, which is that of a user's law: to begin, and to shut down
+    rclpy.install_signal_handlers = lambda _: None  # of a law's `rclpy.init`: a signal would shut down this one as well
     status = _live(context, makes, nodes, received)
     if received and not status and TOOLS.keys() & makes.keys():
         status = INTERRUPTED
@@ -59,7 +61,7 @@ def _live(
             for names, make in makes.items():  # noqa: B007 - which one is refused
                 nodes.append(make(context=context))
                 nodes[-1].refuse_unknown(numbers=False)
-            note_signals(received)  # again: a law may have put its own reactions in their place, as `rclpy.init` does
+            note_signals(received)  # again: a law may have put its own reactions in their place
             names = together
             gc.freeze()  # what is there now stays; to look through it again and again costs a tick 0.1 s now and then
             gc.enable()
@@ -74,7 +76,7 @@ def _live(
             print(error, file=sys.stderr)
         return 2
     except Exception as error:  # in one line, and where
-        whose = "PYTHONWARNINGS makes it an error" if isinstance(error, Warning) else "a fault of this package"
+        whose = next((text for kind, text in NOT_OURS.items() if isinstance(error, kind)), "a fault of this package")
         words = f"{whose}: {described(error)}"
         tell_parent(names, words)
         with suppress(OSError):

@@ -22,6 +22,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.suggestion import allowed
 
 FILE = "--params-file"
+KINDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}  # of parameters
 RCLError = rclpy_implementation.RCLError
 
 
@@ -39,14 +40,13 @@ class ParameterNode(Node):
 
     def read_only(self, name: str, default: Any) -> Any:
         """Declare a parameter that is set at start only, and return its value."""
-        number = isinstance(default, float)  # for which an integer will do as well
-        descriptor = ParameterDescriptor(description=self._in_words[name], read_only=True, dynamic_typing=number)
-        value = self.declare(name, default, descriptor)
-        if not number:
-            return value
-        if not isinstance(value, (float, int)) or isinstance(value, bool):
-            raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
-        return float(value)
+        descriptor = ParameterDescriptor(description=self._in_words[name], read_only=True, dynamic_typing=True)
+        value, kind = self.declare(name, default, descriptor), type(default)
+        if kind is float and type(value) is int:
+            return float(value)
+        if type(value) is not kind:
+            raise Refused(f"{name}: {value!r} is not allowed; allowed: {KINDS[kind]}")
+        return value
 
     def declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
         """The value that the start has given, or the default."""
