@@ -41,7 +41,7 @@ def main(name: str, child: bool = False) -> int:
         return 2
     received: list[int] = []
     note_signals(received)
-    end_late_by_force(name)
+    end_late_by_force(name, received)
     gc.disable()  # until the nodes are there: imports make little garbage and much to look through
     if child:
         end_with_parent(received, name)

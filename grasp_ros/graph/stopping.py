@@ -39,10 +39,10 @@ def on_signals(react: Callable[[int, Any], object] | signal.Handlers) -> None:
             signal.signal(number, react)
 
 
-def end_late_by_force(name: str) -> None:
-    """Let a process that is still there GRACE_SECONDS after a noted signal end by force.
+def end_late_by_force(name: str, received: list[int]) -> None:
+    """Note signals also where a law has other reactions; if still there GRACE_SECONDS after one, end by force.
 
-    A law that does not return, or a call of DDS that waits for a lock, would keep it for ever.
+    A law that does not return, or a call of DDS that waits for a lock, would keep a process for ever.
     """
     reader, writer = socket.socketpair()
     writer.setblocking(False)
@@ -51,6 +51,7 @@ def end_late_by_force(name: str) -> None:
     def watch() -> None:  # without end: what is closed would give its number to the next file, which Python writes to
         while (number := reader.recv(1)) and writer:
             if number[0] in STOP_SIGNALS:  # a law may react to others
+                received.append(number[0])
                 end_by_force(name)
 
     threading.Thread(target=watch, name="signals", daemon=True).start()

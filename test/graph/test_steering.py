@@ -145,13 +145,15 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     assert "One arm by itself" in ask("echo scene 1")  # said before this reader came
     refused = ["set plant steps 0", f"set plant steps {10 ** 20}", f"set plant steps [{10 ** 20}]",
                "set plant steps [1,a]", "step",  # while it is there
-               "pause now", "echo nothing", "nonsense", "step x", "step 0", "get nobody steps",
+               f"step {10 ** 20 - 1}", "echo a//b", "get a!b", "pause now", "echo nothing", "nonsense",
+               "step x", "step 0", "get nobody steps",
                "set left_controller law x", f"set left_controller {gain} -100",
                "set left_controller left_feedback.position_gain 9"]
     _, err = shell.communicate("\n".join(refused), timeout=DEADLINE)
     for words in ("steps", "not paused; allowed: step", "pause now: not allowed; allowed: pause, resume, step [N]",
                   "nobody publishes /nothing", "nonsense: not allowed", "x: not allowed; allowed: a whole number >= 1",
                   "0: not allowed; allowed: a whole number >= 1", "law: set at the start only",
+                  f"steps: {10 ** 20 - 1} is not allowed", "must not contain repeated", "Invalid service name",
                   f"steps: {10 ** 20} is not allowed", "steps: [1, 'a'] is not allowed",
                   f"steps: [{10 ** 20}] is not allowed",
                   "no nobody answers in ROS domain", "allowed: a sum >= 0",

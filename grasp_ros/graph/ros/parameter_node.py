@@ -10,7 +10,7 @@ from itertools import chain
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
@@ -33,7 +33,7 @@ class ParameterNode(Node):
 
     def __init__(self, name: str, **options: Any) -> None:
         self._in_words = PARAMETERS.get(name, {})
-        with _refusing():
+        with refusing():
             super().__init__(name, **options)
         if FILE in sys.argv and not self._parameter_overrides:  # the file may be for others, or the name is wrong
             self.get_logger().info(f"no parameter file has anything for {self.get_fully_qualified_name()}")
@@ -50,7 +50,7 @@ class ParameterNode(Node):
 
     def declare(self, name: str, default: Any, descriptor: ParameterDescriptor) -> Any:
         """The value that the start has given, or the default."""
-        with _refusing():
+        with refusing():
             return _plain(self.declare_parameter(name, default, descriptor).value)
 
     def declare_scene(self, scene: Scene, executable: str) -> dict[str, Any]:
@@ -116,9 +116,9 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def _refusing() -> Iterator[None]:
-    """Refuse what rclpy refuses of the parameters that the start has given, and what DDS cannot be, secure for one."""
+def refusing() -> Iterator[None]:
+    """Refuse what rclpy refuses of parameters and names that are given, and what DDS cannot be, secure for one."""
     try:
         yield
-    except (ParameterException, RCLError) as error:
+    except (ParameterException, NameValidationException, RCLError) as error:
         raise Refused(" ".join(str(error).split())) from None

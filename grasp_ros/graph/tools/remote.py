@@ -22,6 +22,7 @@ from std_srvs.srv import Trigger
 from grasp_ros.graph.host import place
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
+from grasp_ros.graph.ros.parameter_node import refusing
 from grasp_ros.graph.stopping import note_signals, on_signals
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import strict_yaml
@@ -101,7 +102,8 @@ class Remote(GraspNode):
             signature(action).bind(*words[1:])
         except TypeError:
             raise Refused(wrong) from None
-        return action(*words[1:])
+        with refusing():
+            return action(*words[1:])
 
     def step(self, number: str = "1") -> str:
         """Let a paused plant do some periods."""
@@ -154,7 +156,7 @@ class Remote(GraspNode):
     def _set(self, node: str, name: str, value: Any) -> None:
         try:
             request = SetParameters.Request(parameters=[Parameter(name, value=value).to_parameter_msg()])
-        except (TypeError, OverflowError, AssertionError):  # of the library for what no message holds
+        except (TypeError, OverflowError, AssertionError, SystemError):  # of the library for what no message holds
             raise Refused(f"{name}: {value} is not allowed; allowed: what a parameter of ROS can be") from None
         [result] = self._ask(SetParameters, f"{node}/set_parameters", request).results
         if not result.successful:
