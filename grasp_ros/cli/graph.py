@@ -124,11 +124,12 @@ def _run(options: argparse.Namespace) -> int:
     )
     try:
         stopped = _live(graph, spent)
+        begun = not stopped or _has_ticks(graph.bag)
     except GraphError as error:
         there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
         print(f"grasp: {error}{there}", file=sys.stderr)
         return 1
-    if stopped and not _has_ticks(graph.bag):
+    if not begun:
         print("grasp: interrupted before the first tick", file=sys.stderr)
         return 130
     return _report(graph, stopped, spent, options)
@@ -138,8 +139,10 @@ def _has_ticks(path: Path) -> bool:
     """Whether there is a bag with a state; with one that comes from elsewhere a run waits with a bag that has none."""
     from grasp_ros.graph.opening import Opened
 
-    closed = (path / "metadata.yaml").exists()
-    return closed and any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in Opened(path).messages)
+    if path.exists() and not (path / "metadata.yaml").exists():  # the monitor has said why, or was killed
+        raise GraphError(f"{path}: was not closed")
+    messages = Opened(path).messages if path.exists() else ()
+    return any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in messages)
 
 
 def _in_words(spent: Sequence[tuple[float, str]]) -> str:

@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -313,13 +314,22 @@ def test_what_was_written_is_on_the_disk_soon_without_more_of_it(tmp_path: Path,
     recorder.close()
 
 
-def test_a_bag_that_was_deleted_meanwhile_is_refused(tmp_path: Path, run: Trajectory) -> None:
+@pytest.mark.parametrize(
+    ("harm", "words"),
+    [
+        (shutil.rmtree, "was deleted during the recording"),
+        (lambda path: os.truncate(path / "bag.mcap", 100), "was cut off by another program during the recording"),
+    ],
+)
+def test_a_bag_that_was_harmed_meanwhile_is_refused(
+    tmp_path: Path, run: Trajectory, harm: Callable[[Path], None], words: str
+) -> None:
     recorder, ticks = Recorder(tmp_path / "bag", run.scene, {}), study.ticks_of(run)
-    shutil.rmtree(tmp_path / "bag")
+    harm(tmp_path / "bag")
     wait_for(lambda: bool(recorder._error), "the recorder to see it")
-    with pytest.raises(bag.BagError, match="was deleted during the recording"):
+    with pytest.raises(bag.BagError, match=words):
         recorder.write_tick(*next(ticks))
-    with pytest.raises(bag.BagError, match="was deleted during the recording"):
+    with pytest.raises(bag.BagError, match=words):
         recorder.close()
 
 
@@ -378,6 +388,7 @@ def test_a_limit_of_the_file_size_ends_the_bag_while_there_is_room(tmp_path: Pat
 FULL = """
 import sys
 import tracemalloc
+from collections.abc import Callable
 from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag

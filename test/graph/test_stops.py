@@ -281,6 +281,19 @@ def test_a_monitor_without_a_plant_leaves_nothing(tmp_path: Path) -> None:
     assert not [*tmp_path.iterdir()]
 
 
+def test_an_interrupted_run_whose_bag_cannot_be_closed_says_so(launch: Any, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "-o", "run"]
+    process = launch(*command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    recorded = tmp_path / "run" / "bag" / "bag.mcap"
+    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 20_000, "a bag that grows")
+    (recorded.parent / "metadata.part").mkdir()  # where its metadata are written first
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=DEADLINE)
+    assert (process.returncode, out) == (1, "")
+    assert re.search(r"\[monitor\]: .*run/bag: cannot be written: Is a directory\n", err)
+    assert err.endswith("grasp: run/bag: was not closed; run/bag has what was recorded\n")
+
+
 def test_a_bag_that_cannot_be_closed_is_a_sentence(launch: Any, tmp_path: Path) -> None:
     """No tick comes that would say it earlier."""
     names = {"monitor": ["bag:=bag"], "plant": ["scene:=arm_alone", "-p", "paused:=true"]}
