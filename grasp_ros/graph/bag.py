@@ -26,16 +26,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
-from grasp_ros.scene.topics import (
-    CHANGES,
-    FORCE,
-    JOINT_STATES,
-    LYAPUNOV,
-    TIMING,
-    Numbers,
-    Topic,
-    state_of,
-)
+from grasp_ros.scene.topics import CHANGES, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic, state_of
 
 __all__ = ["BagError", "Recorder", "Recording", "read"]
 MOST_NS = 2**63 - 1

@@ -82,8 +82,7 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     """
     memory, _ = resource.getrlimit(resource.RLIMIT_AS)
     if 0 <= memory < LEAST_BYTES:  # too little has as many words as libraries
-        allowed = f"at least {LEAST_BYTES >> 10}, or unlimited"
-        raise Refused(f"memory (`ulimit -v`): {memory >> 10} kB is not allowed; allowed: {allowed}")
+        raise Refused(f"memory (`ulimit -v`): {memory >> 10} kB is not allowed; allowed: {LEAST_BYTES >> 10} or more")
     domain, reach, middleware = (given.get(name, "") for name in (DOMAIN, RANGE, MIDDLEWARE))
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):
         raise Refused(f"{DOMAIN}: {domain!r} is not allowed; allowed: 0 to {MOST_DOMAIN}")

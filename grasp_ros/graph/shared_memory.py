@@ -18,10 +18,8 @@ LOCK, PREFIX, PORT = "_el", "fastrtps_", "fastrtps_port"
 
 def segments() -> set[str]:
     """Names of the segments that are there, used or not."""
-    with suppress(OSError):
-        found = {path.name.removesuffix(LOCK) for path in DIRECTORY.glob(f"{PREFIX}*{LOCK}")}
-        return {name for name in found if not name.startswith(PORT)}
-    return set()
+    found = {path.name.removesuffix(LOCK) for path in DIRECTORY.glob(f"{PREFIX}*{LOCK}")}
+    return {name for name in found if not name.startswith(PORT)}
 
 
 def remove_unused(names: set[str]) -> list[str]:

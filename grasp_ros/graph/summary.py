@@ -47,8 +47,7 @@ def summary(recording: Recording) -> dict[str, Any]:
 
 def _levels(recording: Recording) -> dict[str, Any]:
     """Contacts, energies and their balance."""
-    named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
-    level = recording.energy
+    named, level = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True)), recording.energy
     return {
         "contacts": {"left": _beginnings(named["mode"], Mode.LEFT), "right": _beginnings(named["mode"], Mode.RIGHT)},
         "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(),
