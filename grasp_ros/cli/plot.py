@@ -69,7 +69,7 @@ def _plot(options: argparse.Namespace) -> int:
     panels = [plots.PANELS[name] for name in options.panels or plots.PANELS]
     if isinstance(motions[0], Trajectory) and motions[0].sensitivity is not None:
         panels += sensitivity_panels(motions[0].sensitivity)
-    figure = plots.compose(motions, [*map(plots.caption_of, motions)], width_mm=options.width, span=span, panels=panels)
+    figure = plots.compose(motions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
 

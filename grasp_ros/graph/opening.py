@@ -15,6 +15,7 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.recorder import OWN_RECORD, VERSION
 from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
 from grasp_ros.graph.storage import Storage, Stored
+from grasp_ros.physics import given
 from grasp_ros.scene.files import decoding
 from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
 
@@ -53,7 +54,7 @@ class Opened:
     """
 
     def __init__(self, path: str | os.PathLike[str], salvage: bool = False) -> None:
-        self.path = path = Path(path)
+        self.path = path = given.path("path", path)
         self.storage = open_storage(path, salvage)
         with decoding_bag(path):
             messages, records = self.storage.messages(), self.storage.records

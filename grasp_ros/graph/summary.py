@@ -8,6 +8,7 @@ import numpy as np
 
 from grasp_ros.graph.recording import Recording
 from grasp_ros.graph.verify import Answers, Verification
+from grasp_ros.physics.given import instance
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
@@ -18,7 +19,8 @@ def summary(recording: Recording) -> dict[str, Any]:
     V is twice the energy. `topics` are those that have a message; their rates are means over the bag's time. `contacts`
     is how often a pair began to touch, as far as the ticks show it.
     """
-    scene, running, rates = recording.scene, recording.running, recording.rates
+    scene = instance("recording", recording, Recording, "a Recording").scene
+    running, rates = recording.running, recording.rates
     found: dict[str, Any] = {
         "bag": str(recording.path), "size_bytes": recording.size, "title": scene.title, "watch": scene.watch,
         "warnings": list(scene.warnings), "feedback": scene.feedback_in_words(sampled=True),

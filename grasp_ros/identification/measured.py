@@ -71,9 +71,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         If the source cannot be read, holds too little, or holds what is no number.
     """
     if not isinstance(source, (Recording, Trajectory)):
-        if not isinstance(source, (str, os.PathLike)):
-            raise Refused(f"data: {type(source).__name__} is not allowed; allowed: a path, a Recording or a Trajectory")
-        path = Path(source)
+        path = Path(given.instance("data", source, (str, os.PathLike), "a path, a Recording or a Trajectory"))
         with reading(path):
             directory = path.is_dir()
         source = bag.read(path) if directory or path.suffix.lower() == ".mcap" else path

@@ -12,7 +12,7 @@ from grasp_ros.methods.equations import Work
 from grasp_ros.physics import layout
 from grasp_ros.physics.accuracy import ACCURACY, COARSEST, FINEST
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import number
+from grasp_ros.physics.given import number, text
 from grasp_ros.scene import PAPER, Scene
 from grasp_ros.scene.suggestion import allowed
 
@@ -86,7 +86,7 @@ METHODS: dict[str, Method] = {
 
 def find(name: str) -> Method:
     """A method by its name."""
-    if name not in METHODS:
+    if text("method", name) not in METHODS:
         raise Refused(f"method {name!r} is not allowed; {allowed(name, METHODS)}")
     return METHODS[name]
 

@@ -16,11 +16,12 @@ from grasp_ros.maps.plan import Axis
 from grasp_ros.optimization.problem import Bound, Problem
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import mapping, number, whole
+from grasp_ros.physics.given import mapping, number, text, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import needing
 from grasp_ros.simulation.chunk import Setup
+from grasp_ros.simulation.progress import Told, showing
 
 MEMBERS, GENERATIONS = 16, 500  # members of a population for each free number; generations at most
 AGREE = 1e-14  # standard deviation of what a population reaches, relative, at which a search ends
@@ -52,7 +53,7 @@ class Design(Frozen):
 
 def design(
     scene: Scene, free: Mapping[str, tuple[float, float]], minimise: str, subject_to: Mapping[str, float] | None = None,
-    *, setup: Setup | None = None, seed: int = 0, progress: Callable[[int], object] | None = None,
+    *, setup: Setup | None = None, seed: int = 0, progress: Told | bool | None = None,
 ) -> Design:
     """Choose numbers of a scene so that an outcome is small.
 
@@ -67,8 +68,10 @@ def design(
         Largest values of outcomes.
     setup : Setup, optional
         How each choice is simulated.
-    seed, progress
+    seed
         See `search`.
+    progress
+        As in `ensemble`, but a callable is told the number of simulations so far.
 
     Raises
     ------
@@ -82,8 +85,11 @@ def design(
         except (TypeError, ValueError):
             raise Refused(f"{name}: {ends!r} is not allowed; allowed: two numbers, low and high") from None
         axes.append(Axis(name, low, high))
-    bounds = [Bound(name, number(name, most)) for name, most in mapping("subject_to", subject_to or {}).items()]
-    return search(Problem(scene, axes, [minimise], bounds, setup), seed, progress)
+    most = mapping("subject_to", {} if subject_to is None else subject_to)
+    bounds = [Bound(name, number(name, value)) for name, value in most.items()]
+    problem = Problem(scene, axes, [text("minimise", minimise)], bounds, setup)
+    with showing(progress, None, "run", scene.name) as told:
+        return search(problem, seed, told)
 
 
 def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | None = None) -> Design:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from grasp_ros.physics import given
 from grasp_ros.physics.body_energy import body_energy
 from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Law, Of
@@ -53,8 +54,9 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     feedback : bool
         False: of the plant alone, without the terms of the controllers.
     """
-    state = np.asarray(state, dtype=float)
-    bodies = system.closed_loop if feedback else system.bodies
+    state = given.rows("state", state, 6)
+    external = None if external is None else given.rows("external", external, 3)
+    bodies = given.instance("system", system, System, "a System").closed_loop if feedback else system.bodies
     V = _mechanical(system, bodies, state)
     V_c = V
     V_rate = _power(system, bodies, state, external)
@@ -98,7 +100,9 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     its constant forces and the contacts. It holds for any delay, saturation or jitter of the commands, because the
     work of a held force needs no more than both ends.
     """
-    levels = []
+    before, after = given.rows("before", before, 6), given.rows("after", after, 6)
+    forces, levels = given.rows("forces", forces, 3), []
+    given.instance("system", system, System, "a System")
     rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):
         level, size = _own_energy(system, state)

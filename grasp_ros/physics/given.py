@@ -7,9 +7,11 @@ not. What is not taken is refused with its name.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import timedelta
 from numbers import Integral, Real
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -104,6 +106,29 @@ def names(name: str, values: Any) -> tuple[str, ...]:
     return tuple(map(str, found))
 
 
+def instance(name: str, value: Any, kinds: type | tuple[type, ...], what: str) -> Any:
+    """What is of some type.
+
+    Raises
+    ------
+    Refused
+        If it is not.
+    """
+    if not isinstance(value, kinds):
+        raise Refused(f"{name}: {type(value).__name__} is not allowed; allowed: {what}")
+    return value
+
+
+def text(name: str, value: Any) -> str:
+    """A text, see `instance`."""
+    return str(instance(name, value, str, "a text"))
+
+
+def path(name: str, value: Any) -> Path:
+    """A path, see `instance`."""
+    return Path(instance(name, value, (str, os.PathLike), "a path"))
+
+
 def mapping(name: str, values: Any) -> dict[Any, Any]:
     """What a dict, or a table of columns, maps.
 
@@ -187,6 +212,20 @@ def forces(name: str, values: Any) -> NDArray[np.float64]:
     if array.shape != (3,) or not np.isfinite(array).all():
         raise Refused(f"{name}: {values!r} is not allowed; allowed: three finite numbers, N by body")
     return array
+
+
+def rows(name: str, values: Any, width: int) -> NDArray[np.float64]:
+    """Numbers (..., width).
+
+    Raises
+    ------
+    Refused
+        If there are none, or in another shape.
+    """
+    array = _array(name, values)
+    if array.dtype.kind not in "fiu" or array.shape[-1:] != (width,):
+        raise Refused(f"{name}: {array.dtype}, shape {array.shape}, is not allowed; allowed: numbers (..., {width})")
+    return array.astype(np.float64, copy=False)
 
 
 def _array(name: str, values: Any) -> NDArray[Any]:

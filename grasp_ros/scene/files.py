@@ -10,9 +10,10 @@ from collections.abc import Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from pathlib import Path
 from tokenize import TokenError
-from typing import BinaryIO
+from typing import BinaryIO, cast
 from zipfile import BadZipFile
 
+from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 
 YAML = (".yaml", ".yml")  # endings of scenes
@@ -71,7 +72,7 @@ def writing(path: object, refusal: type[Refused] = Refused) -> Iterator[None]:
 
 def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
     """The ending of a file that is to be written, in small letters: it decides the format."""
-    ending = Path(path).suffix.lower()
+    ending = given.path("path", path).suffix.lower()
     if ending not in allowed:
         wrong = f"{ending} is not allowed; allowed: " if ending else "needs an ending, one of "
         raise Refused(f"{path}: {wrong}{', '.join(allowed)}")
@@ -79,9 +80,9 @@ def format_of(path: str | os.PathLike[str], allowed: Collection[str]) -> str:
 
 
 @contextmanager
-def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def replacing(path: object) -> Iterator[BinaryIO]:
     """A file to write that takes the place of what was there only when it is whole."""
-    path = Path(path)
+    path = given.path("path", path)
     with writing(path):
         if path.exists() and not path.is_file():  # a device, a pipe; a directory refuses by itself
             with path.open("wb") as file:
@@ -108,7 +109,7 @@ def replaced(path: Path) -> Iterator[Path]:
 
 def opened(target: str | os.PathLike[str] | BinaryIO) -> AbstractContextManager[BinaryIO]:
     """A file to write, see `replacing`, or one that is open already and stays so."""
-    return replacing(target) if isinstance(target, (str, os.PathLike)) else nullcontext(target)
+    return nullcontext(cast(BinaryIO, target)) if hasattr(target, "write") else replacing(target)
 
 
 @contextmanager

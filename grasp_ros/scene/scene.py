@@ -224,8 +224,8 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
     SceneError
         If there is no such scene, or if it cannot be run as written.
     """
-    reference, settings = os.fspath(reference), given.names("settings", settings)
-    path = Path(reference)
+    given.instance("reference", reference, (str, os.PathLike), "a name or a path")
+    reference, path = os.fspath(reference), Path(reference)
     if path.suffix.lower() in YAML:
         with reading(reference, SceneError):
             if not path.is_file():
@@ -245,6 +245,7 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     SceneError
         If the text is not a scene that can be run as written.
     """
+    text, settings = given.text("text", text), given.names("settings", settings)
     try:
         document = load_yaml(text)
     except Refused as error:

@@ -21,7 +21,7 @@ from grasp_ros.observe.record import SEEN, Seen, Wanted
 from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import names, number, truth, whole
+from grasp_ros.physics.given import instance, names, number, truth, whole
 from grasp_ros.physics.layout import LEFT, RIGHT, Entry, Transition
 from grasp_ros.physics.layout import Outcome as Ended
 from grasp_ros.physics.model import Array
@@ -79,9 +79,7 @@ class Chunk(NamedTuple):
 
 def checked(setup: Setup | None, outcomes: Sequence[str] | None = None) -> Setup:
     """A setup with numbers of Python's own, by default that without arguments; other outcomes take the place of its."""
-    setup = Setup() if setup is None else setup
-    if not isinstance(setup, Setup):
-        raise Refused(f"setup: {setup!r} is not allowed; allowed: a Setup of grasp_ros.simulation")
+    setup = Setup() if setup is None else instance("setup", setup, Setup, "a Setup of grasp_ros.simulation")
     return Setup(
         names("outcomes", setup.outcomes if outcomes is None else outcomes), check_accuracy(setup.accuracy),
         truth("sampled", setup.sampled), number("settled", setup.settled),

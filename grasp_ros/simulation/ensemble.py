@@ -145,17 +145,15 @@ def ensemble(
         return compute(variants.part(*span), setup, stop)
 
     reached = 0
-    with showing(progress if isinstance(progress, bool) else None, variants.rows, "run", scene.name) as bar:
+    with showing(progress, variants.rows, "run", scene.name) as told:
         for (first, last), chunk in in_threads(work, spans, threads):
             for name, values in chunk.columns.items():
                 found[name][first:last] = values
             status[first:last] = chunk.status
             stops.update({first + i: stop for i, stop in chunk.stops.items()})
             reached += last - first
-            if bar is not None:
-                bar(reached)
-            elif callable(progress):
-                progress(last - first)
+            if told is not None:
+                told(reached if progress is True else last - first)
     return Table(scene, setup, variants.changes, found, status, stops)
 
 

@@ -17,7 +17,7 @@ from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import as_row
 from grasp_ros.simulation.repeat import at_every_tick
-from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 
 class Losses(NamedTuple):
@@ -58,7 +58,7 @@ def losses(run: Trajectory) -> Losses:
     Refused
         If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
-    row = None if run.sampled and run.scene.system.external else as_row(run, "energy")
+    row = None if check_run(run).sampled and run.scene.system.external else as_row(run, "energy")
     return losses_by_ticks(at_every_tick(run)) if row is None else losses_in(run, row)
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import os
 import textwrap
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import instance, names, number, rows
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -20,7 +20,7 @@ from grasp_ros.scene.files import format_of, replacing
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
 from grasp_ros.simulation.quantities import contact_intervals
-from grasp_ros.simulation.tables import Motion
+from grasp_ros.simulation.tables import A_MOTION, Motion, Tabular
 from grasp_ros.simulation.trajectory import Trajectory
 
 LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR = "#0072b2", "#333333", "#d55e00"  # distinguishable for colour-blind readers
@@ -62,7 +62,7 @@ def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = Non
     Refused
         If the motion is empty, matplotlib does not know the format, or the file cannot be written.
     """
-    draw_several([motion], [caption_of(motion) if caption is None else caption], Path(path))
+    draw_several([motion], None if caption is None else [caption], path)
 
 
 def caption_of(motion: Motion) -> str:
@@ -71,8 +71,8 @@ def caption_of(motion: Motion) -> str:
 
 
 def draw_several(
-    motions: Sequence[Motion], captions: Sequence[str], path: str | os.PathLike[str], *, width_mm: float | None = None,
-    span: tuple[float, float] | None = None,
+    motions: Sequence[Motion], captions: Sequence[str] | None, path: str | os.PathLike[str], *,
+    width_mm: float | None = None, span: tuple[float, float] | None = None,
 ) -> None:
     """Draw motions side by side into an image file, with common axes; see `compose`.
 
@@ -86,19 +86,25 @@ def draw_several(
 
 
 def compose(
-    motions: Sequence[Motion], captions: Sequence[str], *, width_mm: float | None = None,
+    motions: Sequence[Motion], captions: Sequence[str] | None = None, *, width_mm: float | None = None,
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
     """A figure of motions side by side, with common axes; captions are second lines of their titles.
 
-    By default it is 230 mm wide, or 150 mm for each of several motions, and has the whole motions and all of PANELS.
+    By default these are the feedback in words, and it is 230 mm wide, or 150 mm for each of several motions, and has
+    the whole motions and all of PANELS.
     """
-    for motion in motions:
-        if not len(motion.t) or motion.t[0] == motion.t[-1]:
+    for motion in instance("motions", motions, Sequence, "a list of motions"):
+        if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
-    width = width_mm or (WIDTH_MM if len(motions) == 1 else 150.0 * len(motions))
-    if width_mm is not None and not NARROWEST_MM <= width_mm <= WIDEST_MM:
-        raise Refused(f"--width {width_mm!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
+    captions = [*map(caption_of, motions)] if captions is None else names("captions", captions)
+    if not 0 < len(motions) == len(captions):
+        raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
+    usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
+    width = usual if width_mm is None else number("--width", width_mm)
+    first_last = None if span is None else rows("span", span, 2)
+    if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
+        raise Refused(f"--width {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
     panels = [*PANELS.values()] if panels is None else panels
     shares = [panel.share for panel in panels]
@@ -115,7 +121,7 @@ def compose(
                 panel.draw(axes, motion)
                 shade_contacts(axes, motion)
                 axes.grid(alpha=0.3)
-                axes.set_xlim(*(span or (motion.t[0], motion.t[-1])))
+                axes.set_xlim(*(motion.t[[0, -1]] if first_last is None else first_last))
                 if column == 0:
                     axes.set_ylabel(panel.label)
             grid[-1, column].set_xlabel("time, s")

@@ -6,8 +6,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import Any
 
-Told = Callable[[float], object]
+from grasp_ros.physics.errors import Refused
+
+Told = Callable[[Any], object]  # of a number
 DELAY_S = 0.5  # a computation that is over by then needs no bar
 
 
@@ -18,6 +21,8 @@ def showing(progress: Told | bool | None, total: float | None, unit: str, name: 
     `total` is what the last call says, where it is known; the name stands in front of the bar.
     """
     if not isinstance(progress, bool):
+        if not (progress is None or callable(progress)):
+            raise Refused(f"progress: {progress!r} is not allowed; allowed: True, False, or what can be called")
         return nullcontext(progress)
     moves = os.environ.get("TERM", "") != "dumb" and "NO_COLOR" not in os.environ  # it may move the cursor
     looked_at = "ipykernel" in sys.modules or (sys.stderr.isatty() and moves)  # in a notebook, or on a terminal

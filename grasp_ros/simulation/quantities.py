@@ -13,6 +13,9 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import whole
+from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -21,7 +24,7 @@ from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
 from grasp_ros.simulation.contacts import intervals
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.repeat import UNLIMITED
-from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.trajectory import Trajectory, check_run
 from grasp_ros.simulation.variants import Variants
 
 
@@ -71,9 +74,9 @@ def settling_times(run: Trajectory, horizons: int = HORIZONS) -> Array:
     Infinite: V_c does not prove it within so many horizons, for which an exact run goes on, or within the output times
     of any other. nan: V_c proves nothing, because it can rise here, or bounds no mass that is not driven to 0.
     """
-    if not may_settle(run):
+    if not may_settle(check_run(run)):
         return np.full(3, np.nan)
-    if (row := as_row(run, "settling_times", horizons=horizons)) is not None:
+    if (row := as_row(run, "settling_times", horizons=whole("horizons", horizons, 1))) is not None:
         return settled_in(run, row)
     system, distance = run.scene.system, settled_distance(run.scene)
     ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
@@ -100,4 +103,6 @@ def may_settle(run: Trajectory) -> bool:
 
 def contact_intervals(run: Trajectory, side: int) -> Array:
     """Begin and end of every stretch with u > 0 of one side, (n, 2) in s."""
-    return intervals(run.event_table, side, float(run.t[-1]) if len(run.t) else 0.0)[:, :2]
+    if side not in (LEFT, RIGHT):
+        raise Refused(f"side {side!r} is not allowed; allowed: {LEFT:d} or {RIGHT:d}, left or right")
+    return intervals(check_run(run).event_table, side, float(run.t[-1]) if len(run.t) else 0.0)[:, :2]

@@ -71,6 +71,8 @@ class SampledPlant:
         self.tick = 0
         self.effort: Array = np.zeros(3)
         self.inputs: Array = np.zeros(3)
+        given.instance("system", system, System, "a System")
+        period_ns = given.number("period_ns", period_ns)
         self._system, self._period_ns, self._period = system, period_ns, float(period_ns / NANOSECONDS)
         self._integrator = Integrator(system, continuous=False) if integrator is None else integrator
         self._waiting = np.zeros((system.delay, 3))  # until the first command arrives nothing acts
@@ -151,9 +153,10 @@ class SampledPlant:
         array (m, 6)
             States at the output times; only those reached, if `status` is not DONE afterwards.
         """
+        answers = given.rows("answers", answers, 3)
         count = len(answers)
         outputs = outputs or Outputs(np.zeros(count), np.arange(count + 1))
-        return self._go(outputs, np.array(answers, dtype=float, order="C")).states
+        return self._go(outputs, np.array(answers, order="C")).states
 
     def run(
         self, laws: Mapping[int, ControlLaw], outputs: Outputs, by_user: Mapping[int, UserController] | None = None,

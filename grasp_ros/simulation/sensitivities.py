@@ -15,6 +15,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import names, truth
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.differentiate import Sensitivity
 from grasp_ros.simulation.ensemble import chunks, in_threads
@@ -88,8 +89,9 @@ def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None,
     Refused
         If a number has no derivative, a sensor measures in steps, or the run does not reach its end.
     """
+    check_scene(scene)
     grid = np.array([scene.duration]) if times is None else times
-    found = simulate(scene, grid=grid, sampled=sampled, accuracy=accuracy, sensitivity=keys).sensitivity
+    found = simulate(scene, grid=grid, sampled=sampled, accuracy=accuracy, sensitivity=names("keys", keys)).sensitivity
     assert found is not None
     return found
 
@@ -115,8 +117,8 @@ def ensemble_sensitivities(
     Refused
         If a key is not known, or a number has no derivative.
     """
-    keys = names("keys", keys)
-    check_keys(scene, keys, truth("sampled", sampled) or scene.sampled)  # what is refused of all rows
+    keys, sampled = names("keys", keys), truth("sampled", sampled)
+    check_keys(scene, keys, sampled)  # what is refused of all rows
     variants = Variants(scene, changes)
 
     def row(i: int) -> Sensitivity | str:

@@ -26,7 +26,7 @@ from grasp_ros.simulation.quantities import (
     settling_times,
 )
 from grasp_ros.simulation.repeat import at_every_tick
-from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
 MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
@@ -43,7 +43,7 @@ def summary(run: Trajectory) -> dict[str, Any]:
     rise, `last_outside_s` has the last times outside the same bound, at output times and control periods, in its place.
     `touches` is left out for methods that do not look for them. V_c is twice the energy.
     """
-    scene, method = run.scene, METHODS[run.method]
+    scene, method = check_run(run).scene, METHODS[run.method]
     found: dict[str, Any] = {
         "scene": scene.name, "title": scene.title, "watch": scene.watch, "warnings": list(scene.warnings),
         "feedback": scene.feedback_in_words(run.sampled, bool(run.controllers)), "controllers": dict(run.controllers),

@@ -18,6 +18,7 @@ from grasp_ros.scene.parameter import UNITS as KEYS
 if TYPE_CHECKING:
     from grasp_ros.scene import Scene
 
+A_MOTION = "a Trajectory or a Recording"
 _ENDINGS = {unit: ending for ending, unit in reversed(KEYS.items())} | {"J": "_J", "W": "_W", "1": ""}
 
 

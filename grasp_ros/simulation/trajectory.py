@@ -18,7 +18,7 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import number, times
+from grasp_ros.physics.given import instance, number, text, times
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array, Contact, impact_force
@@ -203,7 +203,7 @@ class Trajectory(Tabular, Frozen):
         Refused
             If there is no such side, or the run cannot be repeated, see `at`.
         """
-        if side not in SIDES:
+        if text("side", side) not in SIDES:
             raise Refused(f"side {side!r} is not allowed; allowed: {' or '.join(SIDES)}")
         return contact_table(self.scene.system, self.event_table, SIDES[side], breaks_of(self), self.at)
 
@@ -273,3 +273,8 @@ class Trajectory(Tabular, Frozen):
                 controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
                 at_rest=np.inf if self.at_rest is None else self.at_rest,
             )))
+
+
+def check_run(run: object) -> Trajectory:
+    """Refuse what is no run."""
+    return instance("run", run, Trajectory, "a Trajectory")  # type: ignore[no-any-return]

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 
 import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import find
+from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import ascending
 from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.lyapunov import Parts
 from grasp_ros.physics.system import COLUMN
@@ -41,7 +40,7 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     Refused
         If the file is not such a file.
     """
-    path = Path(path)
+    path = given.path("path", path)
     with decoding(path, "a file of `grasp simulate`"), reading(path):
         data = read_npz(path, FIELDS)
         words = {name: str(data[name]) for name in _WORDS}
@@ -70,8 +69,8 @@ def _check(found: Trajectory) -> None:
     gone = found.scene.system.absent_columns
     there, absent = np.delete(found.state, gone, axis=1), found.state[:, gone]
     acted = found.scene.ticks if found.sampled else 0
-    ascending("t", found.t, end)
-    ascending("events", events[:, Entry.TIME], end)
+    given.ascending("t", found.t, end)
+    given.ascending("events", events[:, Entry.TIME], end)
     for name, good, allowed in (
         ("state", not done or np.isfinite(there).all(), "finite numbers"),
         ("state", np.isnan(absent).all(), "NaN for a body that is not there"),

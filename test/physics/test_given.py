@@ -17,16 +17,21 @@ import pandas
 import pytest
 import xarray
 
+from grasp_ros import design, draw, ensemble_sensitivities, read_bag, sensitivities, simulation
 from grasp_ros import scene as scenes
-from grasp_ros import simulation
 from grasp_ros.exact import Integrator
+from grasp_ros.graph.summary import summary as bag_summary
+from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.identification.fit import fit
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.run import run as run_map
+from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import compose
 from grasp_ros.sensitivity.spectrum import spectrum
-from grasp_ros.simulation import Setup, ensemble, load, simulate
+from grasp_ros.simulation import SampledPlant, Setup, ensemble, load, simulate, summary
+from grasp_ros.simulation.losses import losses
+from grasp_ros.simulation.quantities import contact_intervals, settling_times
 
 GAIN = "left_feedback.position_gain_N_per_m"
 CASE = scenes.load("case_01", "time.duration_s=1")
@@ -127,7 +132,7 @@ def test_settings_that_are_none(settings: dict[str, Any], words: str) -> None:
 
 NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda changes: ensemble(CASE, changes), [1], "changes: [1]"),
-    (lambda setup: ensemble(CASE, {}, setup=setup), {}, "setup: {}"),
+    (lambda setup: ensemble(CASE, {}, setup=setup), {}, "setup: dict"),
     (lambda outcomes: ensemble(CASE, {}, outcomes), 3, "outcomes: 3"),
     (lambda sampled: ensemble(CASE, {}, setup=Setup(sampled=sampled)), "no", "sampled: 'no'"),
     (lambda quasi: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0),), 9, quasi=quasi), "no", "quasi: 'no'"),
@@ -144,6 +149,31 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda settings: scenes.load("case_01", settings), 3, "settings: 3"),
     (lambda level: simulate(CASE).section([1, 0, 0, 0, 0, 0], level), "a", "level: 'a'"),
     (lambda scene: spectrum(scene), "case_01", "scene: str"),
+    (lambda scene: sensitivities(scene, [GAIN]), None, "scene: NoneType"),
+    (lambda scene: ensemble_sensitivities(scene, {}, [GAIN]), None, "scene: NoneType"),
+    (lambda keys: sensitivities(CASE, keys), None, "keys: None"),
+    (lambda method: simulate(CASE, method=method), [], "method: list"),
+    (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),
+    (lambda progress: ensemble(CASE, {}, progress=progress), "yes", "progress: 'yes'"),
+    (lambda progress: design(CASE, {GAIN: (1, 2)}, "touches", progress=progress), [], "progress: []"),
+    (lambda minimise: design(CASE, {GAIN: (1, 2)}, minimise), ["touches"], "minimise: list"),
+    (lambda bounds: design(CASE, {GAIN: (1, 2)}, "touches", bounds), 0, "subject_to: 0"),
+    (lambda side: simulate(CASE).contacts(side), ["left"], "side: list"),
+    (lambda side: contact_intervals(simulate(CASE), side), "left", "side 'left'"),
+    (lambda weights: simulate(CASE).section(weights), {}, "function: object, shape (),"),
+    (scenes.load, None, "reference: NoneType"), (load, 1, "path: int"), (read_bag, [], "path: list"),
+    (lambda path: simulate(CASE).save(path), None, "path: NoneType"),
+    (lambda path: simulate(CASE).to_csv(path), 1, "path: int"),
+    (lambda text: scenes.parse(text, "case", "case"), None, "text: NoneType"),
+    (lambda settings: scenes.parse("", "case", "case", settings), None, "settings: None"),
+    (lambda motion: draw(motion, "case.png"), "a", "motion: str"),
+    (lambda caption: draw(simulate(CASE), "case.png", caption), 1, "captions: [1]"),
+    (lambda path: draw(simulate(CASE), path), None, "path: NoneType"),
+    *((door, None, "run: NoneType") for door in (summary, settling_times, losses)),
+    *((door, None, "recording: NoneType") for door in (verify, laws_of, bag_summary)),
+    (lambda system: energy(system, CASE.initial_state), None, "system: NoneType"),
+    (lambda state: energy(CASE.system, state), [1.0], "state: float64, shape (1,),"),
+    (lambda system: SampledPlant(system, 1e6), None, "system: NoneType"),
 ]
 
 
