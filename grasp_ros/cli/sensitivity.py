@@ -38,9 +38,13 @@ def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
 
 
 def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
-    """Derivatives at the last time as data, number by number: of the state (6,), and of V_c."""
+    """Derivatives as data, number by number: at the last time of the state (6,) and V_c, and of the times of events."""
     return {
-        key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": found.V_c_rates[-1, place]}
+        key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": found.V_c_rates[-1, place],
+              "corner": found.corner, "events": [
+                  {"time_s": event[Entry.TIME], "kind": Transition(int(event[Entry.KIND])).name,
+                   "body": Body(int(event[Entry.BODY])).name, "rate": rate}
+                  for event, rate in zip(found.event_table, found.event_rates[:, place], strict=True)]}
         for place, key in enumerate(found.keys)
     }
 

@@ -116,14 +116,17 @@ def identifiability_of(slopes: Array, residuals: Array, n: int) -> tuple[Array, 
     Their covariance (n, n), NaN for what is not identifiable; half of their confidence intervals (n,), inf for that;
     and places of the numbers of each direction that is not seen, whose standard deviation is not below 1.
     """
-    from scipy import stats
+    from scipy import linalg, stats
 
     _, singular, directions = np.linalg.svd(slopes, full_matrices=False)
     free = len(residuals) - n
     variance = max(float(residuals @ residuals) / free, 1.0)  # less is rounding: data without noise
     blind = singular <= BLIND * singular[0]
-    unseen = [np.flatnonzero(np.abs(direction) > PART).tolist()
-              for direction in directions[blind | (singular < math.sqrt(variance))]]
+    lost_directions = directions[blind | (singular < math.sqrt(variance))]
+    if len(lost_directions) > 1:  # of their combinations those of few numbers: each has one that no other has
+        places = linalg.qr(lost_directions, mode="r", pivoting=True)[1][: len(lost_directions)]
+        lost_directions = np.linalg.solve(lost_directions[:, np.sort(places)], lost_directions)
+    unseen = sorted(np.flatnonzero(np.abs(direction) > PART).tolist() for direction in lost_directions)
     scaled = directions[~blind] / singular[~blind, None]
     covariance = variance * scaled.T @ scaled
     lost = sorted({place for places in unseen for place in places})

@@ -7,7 +7,7 @@ each generation is one ensemble.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,7 @@ from grasp_ros.maps.plan import Axis
 from grasp_ros.optimization.problem import Bound, Problem
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import mapping, number, text, whole
+from grasp_ros.physics.given import mapping, number, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import needing
@@ -87,12 +87,12 @@ def design(
         axes.append(Axis(name, low, high))
     most = mapping("subject_to", {} if subject_to is None else subject_to)
     bounds = [Bound(name, number(name, value)) for name, value in most.items()]
-    problem = Problem(scene, axes, [text("minimise", minimise)], bounds, setup)
+    problem = Problem(scene, axes, [minimise], bounds, setup)
     with showing(progress, None, "run", scene.name) as told:
         return search(problem, seed, told)
 
 
-def search(problem: Problem, seed: int = 0, progress: Callable[[int], object] | None = None) -> Design:
+def search(problem: Problem, seed: int = 0, progress: Told | None = None) -> Design:
     """Find the choice whose first outcome is smallest within the bounds.
 
     Parameters
@@ -140,8 +140,7 @@ def costs(problem: Problem, parts: Array) -> Array:
     return np.where(found.excess > 0.0, np.minimum(BROKEN * (1.0 + found.excess), NOTHING), outcome)
 
 
-def front(problem: Problem, seed: int = 0, points: int = FRONT, progress: Callable[[int], object] | None = None
-          ) -> list[Design]:
+def front(problem: Problem, seed: int = 0, progress: Told | None = None) -> list[Design]:
     """Choices none of which is better than another in both outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. Of
@@ -153,8 +152,6 @@ def front(problem: Problem, seed: int = 0, points: int = FRONT, progress: Callab
         With two outcomes to make small.
     seed : int
         Of every search.
-    points : int
-        At least 2.
     progress : callable, optional
         Called with the number of simulations so far.
 
@@ -176,7 +173,7 @@ def front(problem: Problem, seed: int = 0, points: int = FRONT, progress: Callab
         return choices[-1]
 
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
-    for level in np.linspace(most, least, points)[1:]:
+    for level in np.linspace(most, least, FRONT)[1:]:
         add(first, (*problem.bounds, Bound(second, max(float(level), least))))
     return sorted(_undominated(choices, first, second), key=lambda own: own.outcomes[first])
 

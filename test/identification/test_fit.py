@@ -104,6 +104,9 @@ def test_what_the_data_do_not_show_is_named(command: Any) -> None:
     assert data["numbers"][P_LEFT]["low"] < 0.1 < data["numbers"][P_LEFT]["high"]
     assert data["numbers"][gain]["high"] is None
     assert f"{fit('run.csv', [stiffness, gain, P_LEFT], load('case_01'))}\n" == result.stdout
+    dampers = "left_arm.damping_Ns_per_m", "left_feedback.velocity_gain_Ns_per_m"
+    pairs = fit("run.csv", [stiffness, dampers[0], gain, dampers[1]], load("case_01")).not_identifiable
+    assert pairs == ((stiffness, gain), dampers)
 
 
 def test_a_sensor_that_stands_still_beside_others_is_no_fault(tmp_path: Path, command: Any) -> None:

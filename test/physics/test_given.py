@@ -156,7 +156,6 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),
     (lambda progress: ensemble(CASE, {}, progress=progress), "yes", "progress: 'yes'"),
     (lambda progress: design(CASE, {GAIN: (1, 2)}, "touches", progress=progress), [], "progress: []"),
-    (lambda minimise: design(CASE, {GAIN: (1, 2)}, minimise), ["touches"], "minimise: list"),
     (lambda bounds: design(CASE, {GAIN: (1, 2)}, "touches", bounds), 0, "subject_to: 0"),
     (lambda side: simulate(CASE).contacts(side), ["left"], "side: list"),
     (lambda side: contact_intervals(simulate(CASE), side), "left", "side 'left'"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -195,7 +197,7 @@ def test_what_has_no_derivative_is_refused(name: str, key: str, word: str) -> No
         sensitivities(scenes.load(name), [key])
 
 
-def test_an_object_that_could_as_well_stay_is_flagged() -> None:
+def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Path) -> None:
     scene = compose("corner", {
         "time": {"duration_s": 0.1, "control_period_s": 0.001},
         "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
@@ -204,6 +206,18 @@ def test_an_object_that_could_as_well_stay_is_flagged() -> None:
     })
     assert sensitivities(scene, ["object.velocity_m_per_s"]).corner == 0.0
     assert sensitivities(scene, ["object_friction.coulomb_N"]).corner is None
+    (tmp_path / "corner.yaml").write_text(scene.to_yaml(), "utf-8")
+    key = "object.velocity_m_per_s"
+    found = json.loads(command("simulate", "corner.yaml", "--sensitivity", key, "--json").stdout)["sensitivity"][key]
+    assert (found["corner"], found["events"]) == (0.0, [])
+
+
+def test_what_is_printed_as_data_are_the_derivatives(command: Any) -> None:
+    words = "simulate", "case_01", "--set", "time.duration_s=1", "--sensitivity", P, "--json"
+    printed, found = json.loads(command(*words).stdout)["sensitivity"][P], sensitivities(short("case_01", 1.0), [P])
+    assert (printed["state"], printed["corner"]) == (found.state_rates[-1, :, 0].tolist(), None)
+    assert [event["rate"] for event in printed["events"]] == found.event_rates[:, 0].tolist()
+    assert {event["kind"] for event in printed["events"]} == {"TOUCH", "RELEASE"}
 
 
 @pytest.mark.parametrize(("stiffness", "corner"), [(0.0, 0.0), (1.0, None)])
