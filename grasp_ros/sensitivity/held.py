@@ -29,34 +29,39 @@ def act(mode: Integers, rates: Rates, inputs: Inputs) -> None:
 
 
 @kernel
-def answer(inputs: Inputs, before: Array, moved: Array, side: Body, tick: int, j: int) -> float:
+def answer(inputs: Inputs, before: Array, moved: Array, side: Body, tick: int, j: int) -> tuple[float, bool]:
     """Derivative of what a sampled controller answers to the state of a tick, N by the unit of a direction.
 
-    An actuator at its limit answers that: it hands on nothing of the state.
+    Beyond its limit an actuator hands on nothing of the state. Just at it one-sided derivatives differ: the second
+    answer.
     """
     row, rates, lane = inputs.control[side], inputs.control_rates[side], velocity_lane(side)
     first, second = inputs.normals[min(tick, inputs.normals.shape[0] - 1), side]
     x = before[lane - 1] + row[Column.POSITION_NOISE] * first
     v = before[lane] + row[Column.VELOCITY_NOISE] * second
     force = feedback(row, x, v)
-    if abs(force) > row[Column.LIMIT]:
-        return math.copysign(1.0, force) * rates[Column.LIMIT, j]
+    limited = math.copysign(1.0, force) * rates[Column.LIMIT, j]
+    if abs(force) > row[Column.LIMIT] or row[Column.LIMIT] == 0.0:
+        return limited, False
     away = moved[lane - 1, j] + rates[Column.POSITION_NOISE, j] * first - rates[Column.SET_POINT, j]
     faster = moved[lane, j] + rates[Column.VELOCITY_NOISE, j] * second
-    return (rates[Column.FEED_FORWARD, j] - row[Column.POSITION_GAIN] * away - row[Column.VELOCITY_GAIN] * faster
+    free = (rates[Column.FEED_FORWARD, j] - row[Column.POSITION_GAIN] * away - row[Column.VELOCITY_GAIN] * faster
             - rates[Column.POSITION_GAIN, j] * (x - row[Column.SET_POINT]) - rates[Column.VELOCITY_GAIN, j] * v)
+    return free, abs(force) == row[Column.LIMIT] and free != limited
 
 
 @kernel
-def enter_tick(inputs: Inputs, before: Array, moved: Array, tick: int) -> None:
-    """Let the inputs of a control period act: the answers that arrive, and the external forces."""
-    delay = inputs.waiting.shape[0]
+def enter_tick(inputs: Inputs, before: Array, moved: Array, tick: int) -> bool:
+    """Let the inputs of a control period act, answers that arrive and external forces; whether one is at its limit."""
+    corner, delay = False, inputs.waiting.shape[0]
     slot = tick % delay if delay > 0 else 0
     for body in (LEFT, RIGHT, OBJECT):
         for j in range(inputs.force.shape[1]):
-            force = answer(inputs, before, moved, body, tick, j) if body != OBJECT else 0.0
+            force, edge = answer(inputs, before, moved, body, tick, j) if body != OBJECT else (0.0, False)
+            corner = corner or edge
             if delay > 0 and body != OBJECT:
                 force, inputs.waiting[slot, body, j] = inputs.waiting[slot, body, j], force
             if tick < inputs.external.shape[0]:
                 force += inputs.external[tick, body, j]
             inputs.force[body, j] = force
+    return corner

@@ -159,7 +159,8 @@ def arrive(t: Tangents, interval: float, time: float) -> None:
         if not ticks:
             return
         counts[Count.TICK] += 1
-        enter_tick(t.inputs, t.motion.before, t.rates.x, counts[Count.TICK])
+        if enter_tick(t.inputs, t.motion.before, t.rates.x, counts[Count.TICK]):
+            t.outputs.numbers[Number.CORNER] = min(t.outputs.numbers[Number.CORNER], counts[Count.TICK] * period)
 
 
 @kernel

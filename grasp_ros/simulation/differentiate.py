@@ -47,7 +47,8 @@ class Sensitivity(Frozen):
         the event.
     corner : float or None
         Time in s from which on one-sided derivatives differ, because an object under dry friction turns where it could
-        as well stay, or because a pair begins at u' = -1/p and nothing moves it off; None: nowhere.
+        as well stay, a pair begins at u' = -1/p and nothing moves it off, or a command is just at its limit; None:
+        nowhere.
     """
 
     scene: Scene

@@ -212,6 +212,13 @@ def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Pa
     assert (found["corner"], found["events"]) == (0.0, [])
 
 
+@pytest.mark.parametrize(("limit", "corner"), [(1.5, 0.0), (1.4, None), (1.6, None)])
+def test_a_command_just_at_its_limit_is_flagged(limit: float, corner: float | None) -> None:
+    scene = scenes.load("case_01", ["time.duration_s=0.01", "loop={}", f"left_actuator.limit_N={limit}"])
+    assert scene.system.laws[LEFT].command(0, scene.initial_state[0], 0.0) == min(limit, 1.5)
+    assert sensitivities(scene, ["left_arm.position_m"]).corner == corner
+
+
 def test_what_is_printed_as_data_are_the_derivatives(command: Any) -> None:
     words = "simulate", "case_01", "--set", "time.duration_s=1", "--sensitivity", P, "--json"
     printed, found = json.loads(command(*words).stdout)["sensitivity"][P], sensitivities(short("case_01", 1.0), [P])
