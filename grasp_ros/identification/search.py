@@ -161,11 +161,6 @@ def first_noise(data: Measured) -> Array:
     return _at_least(np.median(away, axis=0) / 0.6745, data)  # of a normal distribution
 
 
-def residual_noise(data: Measured, fitted: Array) -> Array:
-    """Noise (6,) of each channel after a fit: the root mean square of its residuals."""
-    return _at_least(np.sqrt(np.mean((fitted - data.state) ** 2, axis=0)), data)
-
-
 def _at_least(noise: Array, data: Measured) -> Array:
     spread = np.ptp(data.state, axis=0)
     others = np.tile(np.fmax.reduce(spread.reshape(3, 2)), 3)
@@ -184,5 +179,6 @@ def fitted(problem: Problem) -> tuple[Problem, Array]:
     rows = len(problem.data.t)
     for _ in range(2):  # the weights of the channels, and the minimum that belongs to them
         y = refine(problem, y, rows)
-        problem = problem._replace(noise=residual_noise(problem.data, problem.predict(y, rows)[0]))
+        residuals = problem.predict(y, rows)[0] - problem.data.state
+        problem = problem._replace(noise=_at_least(np.sqrt(np.mean(residuals**2, axis=0)), problem.data))
     return problem, refine(problem, y, rows)

@@ -65,11 +65,6 @@ def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = Non
     draw_several([motion], None if caption is None else [caption], path)
 
 
-def caption_of(motion: Motion) -> str:
-    """The feedback of its scene, in words."""
-    return motion.scene.feedback_in_words(getattr(motion, "sampled", True))  # a recording is
-
-
 def draw_several(
     motions: Sequence[Motion], captions: Sequence[str] | None, path: str | os.PathLike[str], *,
     width_mm: float | None = None, span: tuple[float, float] | None = None,
@@ -97,7 +92,8 @@ def compose(
     for motion in instance("motions", motions, Sequence, "a list of motions"):
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
-    captions = [*map(caption_of, motions)] if captions is None else names("captions", captions)
+    captions = names("captions", captions if captions is not None else [
+        motion.scene.feedback_in_words(getattr(motion, "sampled", True)) for motion in motions])  # a recording is
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
