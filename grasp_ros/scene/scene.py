@@ -245,15 +245,14 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     SceneError
         If the text is not a scene that can be run as written.
     """
-    text, settings = given.text("text", text), given.names("settings", settings)
     try:
-        document = load_yaml(text)
+        document = load_yaml(given.text("text", text))
     except Refused as error:
         raise SceneError(f"{source}: {error}") from None
     if not isinstance(document, dict):
         raise SceneError(f"{source}: not a mapping; allowed: the keys {', '.join((*TEXTS, *BY_SECTION))}")
     before: Mapping[str, Any] | None = None
-    if settings:
+    if settings := given.names("settings", settings):
         with suppress(SceneError):  # what is wrong without settings may be right with them
             before = read_sections(source, document)
     for setting in settings:
