@@ -52,7 +52,8 @@ def _levels(recording: Recording) -> dict[str, Any]:
     named, level = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True)), recording.energy
     return {
         "contacts": {"left": _beginnings(named["mode"], Mode.LEFT), "right": _beginnings(named["mode"], Mode.RIGHT)},
-        "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(), "V_c_J": level.V_c[[0, -1]].tolist(),
+        "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(),
+        "V_c_J": level.V_c[[0, -1]].tolist(),
         "work_J": 0.5 * float(np.nansum(named["work"])), "alarms": recording.alarms,
     }
 

@@ -154,37 +154,6 @@ def test_a_second_plant_on_the_same_topics_is_refused(launch: Any) -> None:
     assert "Traceback" not in "".join(errors)
 
 
-LATE_PLANT = """
-import sys, time
-from pathlib import Path
-from grasp_ros.graph import __main__ as start
-from grasp_ros.graph.nodes import plant
-def wait():
-    Path("here").touch()
-    while Path("here").exists():
-        time.sleep(0.01)
-plant.compile_kernels = wait
-sys.exit(start.main("plant"))
-"""
-
-
-def test_a_graph_that_runs_goes_on_beside_a_plant_that_comes(launch: Any, tmp_path: Path) -> None:
-    """It beats while it loads its kernels, and its scene is another one; it gives way when it looks."""
-    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=5", "-o", "run"]
-    run = launch(*command, "--paused", "--no-figure", cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    wait_for(lambda: (tmp_path / "run" / "bag").exists(), "a graph")
-    late = launch(sys.executable, "-c", LATE_PLANT, cwd=tmp_path, stderr=subprocess.PIPE)
-    wait_for(lambda: (tmp_path / "here").exists(), "a plant that comes")
-    ctl = [sys.executable, "-m", "grasp_ros.cli", "ctl", "resume"]
-    subprocess.run(ctl, cwd=tmp_path, timeout=DEADLINE, check=True, stdout=subprocess.DEVNULL)
-    out, err = run.communicate(timeout=DEADLINE)
-    (tmp_path / "here").unlink()
-    late.terminate()
-    late.communicate(timeout=DEADLINE)
-    assert run.returncode == 0, err
-    assert re.search(r"left controller +the scene's law\n", out)
-
-
 def test_plant_drops_what_is_stale_repeated_or_not_finite(
     launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
 ) -> None:

@@ -166,14 +166,12 @@ class Heartbeats:
 
     def successor(self, identity: str) -> str:
         """Name of the node in another process that has begun to say texts, while this one is silent; or nothing."""
-        if self.lives(identity):
+        limit = time.monotonic() - MISSED * HEARTBEAT_SECONDS
+        own = self._beats.get(identity)
+        if own is not None and not own.ended and own.heard >= limit:
             return ""
-        return next((beat.node for beat in self._beats.values() if beat.texts and self.lives(beat.identity)), "")
-
-    def lives(self, identity: str) -> bool:
-        """Whether a process was heard lately, and had no last words."""
-        beat, limit = self._beats.get(identity), time.monotonic() - MISSED * HEARTBEAT_SECONDS
-        return beat is not None and not beat.ended and beat.heard >= limit
+        others = (beat for beat in self._beats.values() if beat.identity != identity)
+        return next((beat.node for beat in others if beat.texts and not beat.ended and beat.heard >= limit), "")
 
     def speakers(self) -> bool:
         """Whether anybody is there who says texts."""

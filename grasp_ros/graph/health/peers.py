@@ -246,9 +246,8 @@ class PeerNode(GraspNode):
             for entry in tuple(texts):
                 when, text = entry
                 name = digest(text)
-                beat, (_, taken) = self.heartbeats.vouched(name), self._taken.get(topic, ("", ""))
-                # Of another one beside the one that it works for, which lives: that may give way.
-                if self.heartbeats.lives(taken) and beat.identity != taken if beat else now - when < self.patience:
+                beat = self.heartbeats.vouched(name)
+                if beat is None and now - when < self.patience:
                     continue
                 texts.remove(entry)
                 if beat is None and (self.heartbeats.speakers() or not self._is_plant(self.sources(topic))):

@@ -26,7 +26,8 @@ class Timing:
         self._clear()
 
     def _clear(self) -> None:
-        self._intervals, self._lateness = list[float](), list[float]()
+        self._intervals: list[float] = []
+        self._lateness: list[float] = []
         self._ages: dict[str, list[int]] = {side: [] for side in self._sides}
 
     def period(self, now: float, late: float) -> None:

@@ -147,11 +147,12 @@ class Plant(PeerNode):
             self.loop.ask_again(time.monotonic())
 
     def _insist(self) -> list[str]:
-        """Fail if there is another plant, unless it is about to give way; before the start, names: they may be dead."""
+        """Fail if there is another plant; before the start, names of those that are silent: they may be dead."""
         names = self.sources(JOINT_STATES)
-        ready = [beat.ready for beat in self.heartbeats.of(names) if self.heartbeats.lives(beat.identity)]
+        limit = time.monotonic() - self.patience
+        alive = any(not beat.ended and beat.heard >= limit for beat in self.heartbeats.of(names))
         strange = self.living(JOINT_STATES) if len(names) > 1 else []
-        if any(ready) or (self.begun and len(strange) > 1 + len(ready)):
+        if alive or (self.begun and len(strange) > 1):
             topic = self._states.topic_name
             self.fail(f"{topic}: another plant publishes here, sources {', '.join(names)};"
                       " use another ROS_DOMAIN_ID or namespace")
