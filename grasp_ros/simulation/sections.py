@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import rows
+from grasp_ros.physics.given import column
 from grasp_ros.physics.layout import EPS
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation.smooth import Pieces, States, expand, real_roots
@@ -32,8 +32,8 @@ def as_function(section: Function | ArrayLike, level: float) -> Function:
     """A function whose zeros are wanted, of weights (6,) of the state or of a callable."""
     if callable(section):
         return lambda t, state: np.asarray(section(t, state), dtype=float) - level
-    weights = rows("function", section, 6)
-    if weights.ndim != 1 or not np.isfinite(weights).all() or not weights.any():
+    weights = column("function", section)
+    if weights.shape != (6,) or not np.isfinite(weights).all() or not weights.any():
         raise Refused(f"section: {section!r} is not allowed; allowed: six weights of the state, not all 0, or a"
                       " callable of times (n,) and states (n, 6)")
     used = np.flatnonzero(weights)

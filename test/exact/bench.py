@@ -18,12 +18,11 @@ from grasp_ros.exact.records import (
     PLANT_NUMBERS,
     STATE_NUMBERS,
     Array,
-    Loop,
     Output,
     Plant,
     Settings,
     State,
-    new_place,
+    one_interval,
     plant_of,
     state_of,
 )
@@ -120,7 +119,7 @@ def bench(
 
 def drive(b: Bench, duration: float, grid: Sequence[float] = ()) -> Array:
     """Integrate for a time in s without any tick; the states at the grid."""
-    loop = Loop(np.array([duration]), np.zeros(1), np.array([0, len(grid)]), new_place())
+    loop = one_interval(duration, 0.0, len(grid))
     rows, memory, plant_block, state_block = (
         np.full((len(grid), 6), np.nan), new_workspace(ORDER), np.zeros(PLANT_NUMBERS), np.zeros(STATE_NUMBERS))
     plant, state, plant_block[COULOMB] = plant_of(plant_block), state_of(state_block, b.state.mode), b.plant.coulomb
@@ -129,7 +128,7 @@ def drive(b: Bench, duration: float, grid: Sequence[float] = ()) -> Array:
     state.y[:] = b.state.y
     outcome = advance(
         memory.block, memory.order, plant_block, state_block, b.state.mode, TOLERANCE, 10**6,
-        np.array(grid, dtype=float), rows, b.out.events, b.out.filled, b.out.work, b.out.observer, loop)
+        np.array(grid, dtype=float), rows, b.out.events, b.out.filled, b.out.work, b.out.observer, tuple(loop))
     b.state.y[:], b.state.low[:], b.state.clock[:] = state.y, state.low, state.clock
     assert outcome == Outcome.DONE
     return rows
