@@ -18,6 +18,7 @@ from grasp_ros.physics.control import Law
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
+from grasp_ros.physics.given import instance
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
@@ -245,6 +246,11 @@ class Recording(Tabular, Frozen):
         every_tick = [topic.name for topic in self.scene.topics if topic not in held]
         left_out = {NOT_RECORDED: number} if (number := int(self.lost.get(NOT_RECORDED, 0))) else {}
         return {**{name: ticks - self.counts[name] for name in every_tick}, **self.unheard, **left_out}
+
+
+def check_recording(recording: object) -> Recording:
+    """Refuse what is no recording."""
+    return instance("recording", recording, Recording, "a Recording")  # type: ignore[no-any-return]
 
 
 def acted_from(ticks: np.ndarray, effort: Array) -> Array:

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.recording import Recording, check_recording
 from grasp_ros.graph.verify import Answers, Verification
-from grasp_ros.physics.given import instance
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
@@ -19,8 +18,7 @@ def summary(recording: Recording) -> dict[str, Any]:
     V is twice the energy. `topics` are those that have a message; their rates are means over the bag's time. `contacts`
     is how often a pair began to touch, as far as the ticks show it.
     """
-    scene = instance("recording", recording, Recording, "a Recording").scene
-    running, rates = recording.running, recording.rates
+    scene, running, rates = check_recording(recording).scene, recording.running, recording.rates
     found: dict[str, Any] = {
         "bag": str(recording.path), "size_bytes": recording.size, "title": scene.title, "watch": scene.watch,
         "warnings": list(scene.warnings), "feedback": scene.feedback_in_words(sampled=True),
@@ -49,7 +47,8 @@ def summary(recording: Recording) -> dict[str, Any]:
 
 def _levels(recording: Recording) -> dict[str, Any]:
     """Contacts, energies and their balance."""
-    named, level = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True)), recording.energy
+    named = dict(zip(LYAPUNOV_NAMES, recording.lyapunov.T, strict=True))
+    level = recording.energy
     return {
         "contacts": {"left": _beginnings(named["mode"], Mode.LEFT), "right": _beginnings(named["mode"], Mode.RIGHT)},
         "energy_of": recording.energy_of, "V_J": level.V[[0, -1]].tolist(),

@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.recording import Recording, check_recording
 from grasp_ros.physics.energy import energy
-from grasp_ros.physics.given import instance
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -71,7 +70,7 @@ _Column = tuple[str, str, Array, Array]  # topic, name, what was recorded, and w
 def verify(recording: Recording) -> Verification:
     """Simulate the scene of a bag with its recorded inputs, and compare every number that follows from them."""
     ticks, first = 0, None
-    problem = _gap(instance("recording", recording, Recording, "a Recording"))
+    problem = _gap(check_recording(recording))
     for rows in _episodes(recording):
         states, stop = _simulate(recording, rows)
         ticks += len(states)
@@ -111,7 +110,7 @@ class Answers(NamedTuple):
 def answers_of(recording: Recording) -> dict[str, Answers]:
     """Whose law gave the commands, by side: compared with the law that the scene or an announcement names."""
     found = {}
-    for name, topic in instance("recording", recording, Recording, "a Recording").scene.controllers.items():
+    for name, topic in check_recording(recording).scene.controllers.items():
         side = name.removesuffix("_controller")
         if not recording.running.lockstep:
             found[side] = Answers(recording.counts[topic.name], None, 0, topic.name)

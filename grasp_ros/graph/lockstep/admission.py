@@ -30,7 +30,8 @@ class Limits:
     """
 
     def __init__(self, node: GraspNode, scene: Scene) -> None:
-        self._node, self._limits = node, dict[Topic, float]()
+        self._node = node
+        self._limits: dict[Topic, float] = {}
         for side, topic in COMMANDS.items():
             numbers = scene.values.get(f"{side}_actuator", {})
             if "limit_N" in numbers and topic in scene.controllers.values():

@@ -56,7 +56,8 @@ class Steering:
 
     def reset_done(self) -> None:
         """Put the plant back; called by its loop when the current state has been answered."""
-        self.reset_due, self.steps = False, 0
+        self.reset_due = False
+        self.steps = 0
         self._plant.restart()
 
     def _pause(self, paused: bool, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

@@ -70,7 +70,7 @@ class Monitor(PeerNode):
         default = f"grasp_{datetime.now():%Y_%m_%d-%H_%M_%S}"
         self._path = Path(self.read_only("bag", default))
         with writing(f"bag: {self._path}"):  # now, and not when a plant comes
-            with suppress(FileNotFoundError):
+            with suppress(FileNotFoundError):  # what else is wrong with the path is told
                 self._path.lstat()
                 raise FileExistsError
             there = next(parent for parent in self._path.absolute().parents if parent.exists())

@@ -50,7 +50,8 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
     forces = {side: published[topic] for side, topic in CONTACTS.items() if topic in published}
     touching = {side for side, force in forces.items() if force > 0.0}
     for body in system.present:
-        name, x, shown = NAMES[body], float(state[COLUMN[body]]), ASIDE[NAMES[body]]
+        name, x = NAMES[body], float(state[COLUMN[body]])
+        shown = ASIDE[name]
         pressed = name in touching or (body == OBJECT and touching)
         box = _marker(body, "masses", Marker.CUBE, time_ns, TOUCHING if pressed else COLORS[name])
         box.pose.position.x = x + shown
@@ -69,7 +70,8 @@ def markers(scene: Scene, time_ns: int, state: Array) -> MarkerArray:
 
 def _marker(number: int, group: str, kind: int, time_ns: int, color: Iterable[float]) -> Marker:
     marker = Marker(ns=group, id=number, type=kind, action=Marker.ADD)
-    marker.header.frame_id, marker.header.stamp = FRAME, messages.to_time(time_ns)
+    marker.header.frame_id = FRAME
+    marker.header.stamp = messages.to_time(time_ns)
     red, green, blue = color
     marker.color = ColorRGBA(r=red, g=green, b=blue, a=1.0)
     marker.pose.orientation.w = 1.0
@@ -91,7 +93,8 @@ class Picture:
 
     def __init__(self, node: GraspNode, scene: Scene) -> None:
         self._scene, self._next = scene, 0.0
-        self._markers, self._description = node.publisher(MARKERS), node.publisher(ROBOT_DESCRIPTION)
+        self._markers = node.publisher(MARKERS)
+        self._description = node.publisher(ROBOT_DESCRIPTION)
         self._description.publish(messages.text(robot_description(scene)))
 
     def show(self, state: State) -> None:
