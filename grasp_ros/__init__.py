@@ -29,8 +29,7 @@ _PLACES = {  # module, and the name there where it is another one; their types: 
     "draw": "simulation.plots", "ensemble": "simulation.ensemble",
     "ensemble_sensitivities": "simulation.sensitivities", "fit": "identification.fit", "load": "scene.scene",
     "load_run": "simulation.trajectory_file:load", "names": "scene.library", "parse": "scene.scene",
-    "read_bag": "graph.bag:read", "sensitivities": "simulation.sensitivities", "simulate": "simulation.simulate",
-    "spectrum": "sensitivity.spectrum",
+    "read_bag": "graph.bag:read", "simulate": "simulation.simulate", "spectrum": "sensitivity.spectrum",
 }
 __all__ = sorted(_PLACES)
 

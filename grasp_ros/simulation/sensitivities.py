@@ -1,4 +1,4 @@
-"""Derivatives of a scene, and of many variants of one, each row with the same bits, on all cores."""
+"""Derivatives of many variants of a scene, on all cores; each row has the bits of a run of its own."""
 
 from __future__ import annotations
 
@@ -15,9 +15,8 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.given import names, truth
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import check_keys
-from grasp_ros.simulation.differentiate import Sensitivity
+from grasp_ros.simulation.differentiate import Sensitivity, differentiate
 from grasp_ros.simulation.ensemble import chunks, in_threads
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.simulate import simulate
@@ -70,32 +69,6 @@ class SensitivityTable(Frozen):
         return frame_of({**self.changes, **dict(zip(names, columns.T, strict=True)), **by, "corner": self.corner})
 
 
-def sensitivities(scene: Scene, keys: Sequence[str], times: Array | None = None, *, sampled: bool = False,
-                  accuracy: float = ACCURACY) -> Sensitivity:
-    """Simulate a scene with `exact`, and differentiate the motion through its impacts.
-
-    Parameters
-    ----------
-    scene : Scene
-    keys : sequence of str
-        "section.key": initial values, and any number of the scene that enters smoothly.
-    times : array (m,), s, optional
-        Ascending output times within the horizon. Default: its end.
-    sampled, accuracy
-        As in `simulate`.
-
-    Raises
-    ------
-    Refused
-        If a number has no derivative, a sensor measures in steps, or the run does not reach its end.
-    """
-    check_scene(scene)
-    grid = np.array([scene.duration]) if times is None else times
-    found = simulate(scene, grid=grid, sampled=sampled, accuracy=accuracy, sensitivity=names("keys", keys)).sensitivity
-    assert found is not None
-    return found
-
-
 def ensemble_sensitivities(
     scene: Scene, changes: Mapping[str, ArrayLike], keys: Sequence[str], *, sampled: bool = False,
     accuracy: float = ACCURACY, threads: int | None = None,
@@ -107,8 +80,10 @@ def ensemble_sensitivities(
     scene : Scene
     changes : mapping of str to array (n,)
         Numbers of the scene by "section.key", one for each row; without any there is one row, the scene itself.
-    keys, sampled, accuracy
-        As in `sensitivities`.
+    keys : sequence of str
+        "section.key": initial values, and any number of the scene that enters smoothly.
+    sampled, accuracy
+        As in `simulate`.
     threads : int, optional
         Default: one for each core. The result does not depend on it.
 
@@ -123,7 +98,9 @@ def ensemble_sensitivities(
 
     def row(i: int) -> Sensitivity | str:
         try:
-            return sensitivities(variants.row(i), keys, sampled=sampled, accuracy=accuracy)
+            own = variants.row(i)
+            run = simulate(own, grid=np.array([own.duration]), sampled=sampled, accuracy=accuracy)
+            return differentiate(run, keys)
         except Refused as refusal:
             return str(refusal)
 

@@ -17,8 +17,8 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, SceneError
 from grasp_ros.sensitivity.directions import check_key
-from grasp_ros.simulation import simulate
-from grasp_ros.simulation.sensitivities import sensitivities
+from grasp_ros.simulation import Trajectory, simulate
+from grasp_ros.simulation.differentiate import differentiate
 from lab.cases.draw import draw_ordinary, inside
 
 SEED = 1990
@@ -71,7 +71,7 @@ def judge(scene: Scene, key: str, size: float) -> Verdict:
     if simulate(scene, grid=np.zeros(1), max_work=MOST_WORK).status is Status.WORK_BUDGET:
         return Verdict(LONG)
     try:
-        found = sensitivities(scene, [key], accuracy=FINEST)
+        found = differentiate(_run(scene), [key])
         rates = found.state_rates[-1, :, 0]
         spread = _spread(scene, key, rates)
     except Refused as refusal:
@@ -96,13 +96,17 @@ def judge(scene: Scene, key: str, size: float) -> Verdict:
     return Verdict(AGREES if error <= 1.0 and decided.any() else UNDECIDED, error, text)
 
 
+def _run(scene: Scene) -> Trajectory:
+    return simulate(scene, grid=np.array([scene.duration]), accuracy=FINEST)
+
+
 def _spread(scene: Scene, key: str, rates: Array) -> Array:
     """How much the derivatives (6,) change where the places are one rounding off."""
     off, found = np.spacing(np.abs(scene.initial_state[::2]).max()), [rates]
     for way in (-off, off):
         with suppress(SceneError):
             moved = scene.changed({"object.position_m": scene.values["object"]["position_m"] + float(way)})
-            found.append(sensitivities(moved, [key], accuracy=FINEST).state_rates[-1, :, 0])
+            found.append(differentiate(_run(moved), [key]).state_rates[-1, :, 0])
     return np.asarray(np.max(np.abs(np.array(found) - rates), axis=0))
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
-from grasp_ros.simulation.sensitivities import sensitivities
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.differentiate import differentiate
 from lab.oracles.differences import VERDICTS, WRONG, judge_draw
 from lab.reference.derivative import difference
 from lab.studies import derivative_cost, pages, peer_derivatives
@@ -74,7 +75,7 @@ def _rows(scene: Scene, key: str, times: Array, expected: Array) -> list[Row]:
 
 def _derivative(scene: Scene, key: str, times: Array) -> Array:
     """Derivatives (m, 6) of the states by one number."""
-    return np.asarray(sensitivities(scene, [key], times).state_rates[..., 0])
+    return np.asarray(differentiate(simulate(scene, grid=times), [key]).state_rates[..., 0])
 
 
 def _off(scene: Scene, signs: Array) -> Scene:

@@ -20,7 +20,8 @@ import numpy as np
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import compose
-from grasp_ros.simulation.sensitivities import sensitivities
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.differentiate import differentiate
 from lab.studies import pages
 
 PACKAGES = "diffrax", "jax", "mujoco", "optimistix", "torch", "torchdiffeq"  # the extra `peers`
@@ -101,7 +102,7 @@ def _ours() -> Iterator[Row]:
     keys = ["left_contact.dissipation_s_per_m", "left_arm.velocity_m_per_s", "left_contact.hertz_N_per_m1_5"]
 
     def solve() -> tuple[float, Array]:
-        found = sensitivities(scene, keys)
+        found = differentiate(simulate(scene, grid=np.array([SPAN])), keys)
         return found.state[-1, 3] - found.state[-1, 1], found.state_rates[-1, 3] - found.state_rates[-1, 1]
 
     yield _measure("exact", "default", solve)

@@ -17,7 +17,7 @@ import pandas
 import pytest
 import xarray
 
-from grasp_ros import design, draw, ensemble_sensitivities, read_bag, sensitivities, simulation
+from grasp_ros import design, draw, ensemble_sensitivities, read_bag, simulation
 from grasp_ros import scene as scenes
 from grasp_ros.exact import Integrator
 from grasp_ros.graph.summary import summary as bag_summary
@@ -149,9 +149,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda settings: scenes.load("case_01", settings), 3, "settings: 3"),
     (lambda level: simulate(CASE).section([1, 0, 0, 0, 0, 0], level), "a", "level: 'a'"),
     (lambda scene: spectrum(scene), "case_01", "scene: str"),
-    (lambda scene: sensitivities(scene, [GAIN]), None, "scene: NoneType"),
     (lambda scene: ensemble_sensitivities(scene, {}, [GAIN]), None, "scene: NoneType"),
-    (lambda keys: sensitivities(CASE, keys), None, "keys: None"),
     (lambda method: simulate(CASE, method=method), [], "method: list"),
     (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),
     (lambda progress: ensemble(CASE, {}, progress=progress), "yes", "progress: 'yes'"),

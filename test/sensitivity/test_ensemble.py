@@ -1,4 +1,4 @@
-"""Derivatives of many variants: each row is one of `sensitivities`."""
+"""Derivatives of many variants: each row has those of its run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.simulation.sensitivities import ensemble_sensitivities, sensitivities
+from grasp_ros.simulation import simulate
+from grasp_ros.simulation.sensitivities import ensemble_sensitivities
 
 P, GAIN = "left_contact.dissipation_s_per_m", "left_feedback.position_gain_N_per_m"
 
@@ -20,8 +21,8 @@ def test_rows_are_sensitivities_to_the_last_bit(name: str, sampled: bool) -> Non
     alone = ensemble_sensitivities(scene, changes, keys, sampled=sampled, threads=1)
     assert found.state_rates.tobytes() == alone.state_rates.tobytes()
     for i in range(6):
-        row = sensitivities(scene.changed({key: float(values[i]) for key, values in changes.items()}), keys,
-                            sampled=sampled)
+        own = scene.changed({key: float(values[i]) for key, values in changes.items()})
+        row = simulate(own, grid=[1.0], sampled=sampled, sensitivity=keys).sensitivity
         assert found.state[i].tobytes() == row.state[-1].tobytes()
         assert found.state_rates[i].tobytes() == row.state_rates[-1].tobytes()
         assert found.V_c_rates[i].tobytes() == row.V_c_rates[-1].tobytes()

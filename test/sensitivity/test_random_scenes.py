@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.simulation.sensitivities import sensitivities
+from grasp_ros.simulation.differentiate import Sensitivity, differentiate
 from lab.oracles import differences
 from lab.oracles.differences import AGREES, WRONG, judge, judge_draw
 
@@ -26,13 +26,13 @@ def test_derivatives_of_random_scenes_are_right_or_refused() -> None:
 
 @pytest.mark.parametrize("off", [1e-6, np.nan])
 def test_a_wrong_derivative_is_noticed(monkeypatch: pytest.MonkeyPatch, off: float) -> None:
-    def wrong(*given: Any, **settings: Any) -> Any:
-        found = sensitivities(*given, **settings)
+    def wrong(*given: Any) -> Sensitivity:
+        found = differentiate(*given)
         rates = found.state_rates.copy()
         rates[:, 2] *= 1.0 + off
         return replace(found, state_rates=rates)
 
     scene, key = scenes.load("case_01", ["time.duration_s=2.0"]), "left_contact.dissipation_s_per_m"
     assert judge(scene, key, 0.1).word == AGREES
-    monkeypatch.setattr(differences, "sensitivities", wrong)
+    monkeypatch.setattr(differences, "differentiate", wrong)
     assert judge(scene, key, 0.1).word == WRONG

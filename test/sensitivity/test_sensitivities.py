@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +16,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.differentiate import differentiate
-from grasp_ros.simulation.sensitivities import sensitivities
+from grasp_ros.simulation.differentiate import Sensitivity, differentiate
 from lab.reference.derivative import difference
 
 P = "left_contact.dissipation_s_per_m"
@@ -42,6 +42,11 @@ def short(name: str, seconds: float) -> Scene:
     return scenes.load(name).changed({"time.duration_s": seconds})
 
 
+def derivatives(scene: Scene, *keys: str) -> Sensitivity:
+    """Of a run with its last state alone."""
+    return differentiate(simulate(scene, grid=[scene.duration]), keys)
+
+
 def differences(scene: Scene, key: str, width: float, **settings: Any) -> np.ndarray:
     """Derivative of the last state by a central difference of runs in double precision, for what has no reference."""
     section, _, name = key.partition(".")
@@ -56,7 +61,7 @@ def differences(scene: Scene, key: str, width: float, **settings: Any) -> np.nda
 def test_derivatives_are_those_of_the_reference(
     name: str, key: str, seconds: float, tolerance: float, expected: list[float]
 ) -> None:
-    found = sensitivities(short(name, seconds), [key]).state_rates[-1, :, 0]
+    found = derivatives(short(name, seconds), key).state_rates[-1, :, 0]
     assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
 
 
@@ -69,7 +74,7 @@ def test_derivatives_are_those_of_the_reference(
 def test_every_kind_of_number_through_a_joint_touch(key: str) -> None:
     scene = short("case_01", 1.2)
     expected = difference(scene, key, [scene.duration])
-    found = sensitivities(scene, [key])
+    found = derivatives(scene, key)
     assert np.abs(found.state_rates[..., 0] - expected.state).max() <= 1e-10 * np.abs(expected.state).max()
     for kind, times in ((Transition.TOUCH, expected.touches), (Transition.RELEASE, expected.releases)):
         for side in (LEFT, RIGHT):
@@ -87,7 +92,7 @@ def test_restitution_of_two_free_bodies(z: float) -> None:
         "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
         "left_contact": {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.3},
     })
-    found = sensitivities(scene, ["left_arm.velocity_m_per_s", P])
+    found = derivatives(scene, "left_arm.velocity_m_per_s", P)
     w = 0.3 * (found.state[-1, 3] - found.state[-1, 1])
     slope = z * (1.0 - w) / (w * (1.0 + z))  # dw/dz, of the line above
     apart = found.state_rates[-1, 3] - found.state_rates[-1, 1]
@@ -115,7 +120,7 @@ def test_inputs_friction_and_rest(name: str, key: str, width: float) -> None:
         scene = scenes.load(name)
         scene = scene.changed({"time.duration_s": min(scene.duration, 4.0)})
     expected = differences(scene, key, width)
-    found = sensitivities(scene, [key]).state_rates[-1, :, 0]
+    found = derivatives(scene, key).state_rates[-1, :, 0]
     assert np.nanmax(np.abs(found - expected)) <= 3e-5 * np.nanmax(np.abs(expected))
 
 
@@ -132,7 +137,7 @@ def test_the_motion_is_that_of_a_plain_run(name: str) -> None:
     scene = short(name, 2.0)
     grid = np.linspace(0.0, 2.0, 37)
     plain = simulate(scene, grid=grid)
-    found = sensitivities(scene, [P if name != "sine" else "object.mass_kg"], grid)
+    found = differentiate(plain, [P if name != "sine" else "object.mass_kg"])
     assert found.state.tobytes() == plain.state.tobytes()
     assert found.event_table.tobytes() == plain.event_table.tobytes()
 
@@ -143,7 +148,7 @@ def test_a_run_that_is_asked_has_its_derivatives(sampled: bool) -> None:
     assert simulate(scene, grid=grid, sampled=sampled).sensitivity is None
     run = simulate(scene, grid=grid, sampled=sampled, sensitivity=[P])
     assert run.sensitivity is not None
-    found = sensitivities(scene, [P], grid, sampled=sampled)
+    found = differentiate(replace(run, sensitivity=None), [P])
     assert run.sensitivity.state_rates.tobytes() == found.state_rates.tobytes()
     assert run.state.tobytes() == run.sensitivity.state.tobytes()
 
@@ -169,9 +174,9 @@ def test_a_run_of_something_else_has_no_derivatives() -> None:
 def test_directions_do_not_touch_each_other() -> None:
     scene = short("case_01", 3.0)
     keys = ["left_arm.mass_kg", P, "object.position_m", "right_arm.stiffness_N_per_m", "object.mass_kg"]
-    several = sensitivities(scene, keys)
+    several = derivatives(scene, *keys)
     for place, key in enumerate(keys):
-        alone = sensitivities(scene, [key])
+        alone = derivatives(scene, key)
         np.testing.assert_allclose(several.state_rates[..., place], alone.state_rates[..., 0], rtol=1e-13, atol=0.0)
 
 
@@ -183,7 +188,7 @@ def test_rates_of_the_energy() -> None:
         value = scene.values[section][name]
         low, high = (simulate(scene.changed({key: at}), grid=[0.8]).energy.V_c[-1]
                      for at in (value - width, value + width))
-        found = sensitivities(scene, [key])
+        found = derivatives(scene, key)
         np.testing.assert_allclose(found.V_c_rates[-1, 0], (high - low) / (2.0 * width), rtol=1e-5, atol=1e-9)
 
 
@@ -194,7 +199,7 @@ def test_rates_of_the_energy() -> None:
 ])
 def test_what_has_no_derivative_is_refused(name: str, key: str, word: str) -> None:
     with pytest.raises(Refused, match=word):
-        sensitivities(scenes.load(name), [key])
+        derivatives(scenes.load(name), key)
 
 
 def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Path) -> None:
@@ -204,8 +209,8 @@ def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Pa
         "left_arm": {"mass_kg": 1.0, "position_m": -1.0, "velocity_m_per_s": 0.0},
         "object_friction": {"coulomb_N": 0.2}, "tilt": {"angle_rad": 0.1, "gravity_m_per_s2": 9.81},
     })
-    assert sensitivities(scene, ["object.velocity_m_per_s"]).corner == 0.0
-    assert sensitivities(scene, ["object_friction.coulomb_N"]).corner is None
+    assert derivatives(scene, "object.velocity_m_per_s").corner == 0.0
+    assert derivatives(scene, "object_friction.coulomb_N").corner is None
     (tmp_path / "corner.yaml").write_text(scene.to_yaml(), "utf-8")
     key = "object.velocity_m_per_s"
     found = json.loads(command("simulate", "corner.yaml", "--sensitivity", key, "--json").stdout)["sensitivity"][key]
@@ -216,12 +221,12 @@ def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Pa
 def test_a_command_just_at_its_limit_is_flagged(limit: float, corner: float | None) -> None:
     scene = scenes.load("case_01", ["time.duration_s=0.01", "loop={}", f"left_actuator.limit_N={limit}"])
     assert scene.system.laws[LEFT].command(0, scene.initial_state[0], 0.0) == min(limit, 1.5)
-    assert sensitivities(scene, ["left_arm.position_m"]).corner == corner
+    assert derivatives(scene, "left_arm.position_m").corner == corner
 
 
 def test_what_is_printed_as_data_are_the_derivatives(command: Any) -> None:
     words = "simulate", "case_01", "--set", "time.duration_s=1", "--sensitivity", P, "--json"
-    printed, found = json.loads(command(*words).stdout)["sensitivity"][P], sensitivities(short("case_01", 1.0), [P])
+    printed, found = json.loads(command(*words).stdout)["sensitivity"][P], derivatives(short("case_01", 1.0), P)
     assert (printed["state"], printed["corner"]) == (found.state_rates[-1, :, 0].tolist(), None)
     assert [event["rate"] for event in printed["events"]] == found.event_rates[:, 0].tolist()
     assert {event["kind"] for event in printed["events"]} == {"TOUCH", "RELEASE"}
@@ -236,8 +241,8 @@ def test_a_pair_that_glides_where_its_force_ends_is_flagged(stiffness: float, co
         "left_arm": {"mass_kg": 1.0, "position_m": 0.5, "velocity_m_per_s": -4.0, "stiffness_N_per_m": stiffness},
         "left_contact": {"hertz_N_per_m1_5": 100.0, "dissipation_s_per_m": 0.25},
     })
-    assert sensitivities(scene, [P]).corner == corner
-    assert sensitivities(scene, ["left_arm.position_m"]).corner is None
+    assert derivatives(scene, P).corner == corner
+    assert derivatives(scene, "left_arm.position_m").corner is None
 
 
 def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
@@ -253,7 +258,6 @@ def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
 
 
 def test_times_of_sides_in_a_mirror() -> None:
-    found = sensitivities(short("v_jump_symmetric", 1.0), ["left_contact.dissipation_s_per_m",
-                                                             "right_contact.dissipation_s_per_m"])
+    found = derivatives(short("v_jump_symmetric", 1.0), P, P.replace("left", "right"))
     left = found.event_table[:, 1] == LEFT
     np.testing.assert_allclose(found.event_rates[left][:, 0], found.event_rates[~left][:, 1], rtol=1e-9, atol=1e-12)
