@@ -1,7 +1,7 @@
 """Arguments of callers, converted and checked once: numbers and times of Python, numpy, pandas and xarray.
 
 Whatever is a real number counts as one, whatever its type; texts, truth values and times where a number is meant do
-not. What is not taken is refused with its name.
+not. What is not taken raises `Refused`, with the name of the argument, its value and what is allowed.
 """
 
 from __future__ import annotations
@@ -38,13 +38,7 @@ def plain(value: Any) -> int | float | None:
 
 
 def number(name: str, value: Any) -> float:
-    """A number.
-
-    Raises
-    ------
-    Refused
-        If it is none.
-    """
+    """A number."""
     found = plain(value)
     if found is None:
         raise Refused(f"{name}: {value!r} is not allowed; allowed: a number")
@@ -52,26 +46,14 @@ def number(name: str, value: Any) -> float:
 
 
 def read_number(text: str) -> float:
-    """A number from a text.
-
-    Raises
-    ------
-    ValueError
-        If it is none, 1_0 among them, which Python takes.
-    """
+    """A number from a text; otherwise a ValueError, also for 1_0, which Python takes."""
     if "_" in text:
         raise Refused(f"could not convert string to float: {text!r}")
     return float(text)
 
 
 def whole(name: str, value: Any, low: int) -> int:
-    """A whole number >= low; 1e7 is one.
-
-    Raises
-    ------
-    Refused
-        If it is none.
-    """
+    """A whole number >= low; 1e7 is one."""
     found = plain(value)
     if found is None or not math.isfinite(found) or found != math.floor(found) or found < low:
         raise Refused(f"{name}: {value!r} is not allowed; allowed: a whole number >= {low}")
@@ -79,26 +61,14 @@ def whole(name: str, value: Any, low: int) -> int:
 
 
 def truth(name: str, value: Any) -> bool:
-    """True or False, 1 or 0: a text that says no would count as true.
-
-    Raises
-    ------
-    Refused
-        If it is none of them.
-    """
+    """True or False, 1 or 0: a text that says no would count as true."""
     if not isinstance(value, (bool, np.bool_)) and plain(value) not in (0, 1):
         raise Refused(f"{name}: {value!r} is not allowed; allowed: True or False")
     return bool(value)
 
 
 def names(name: str, values: Any) -> tuple[str, ...]:
-    """Texts in a row; one alone is a row of one.
-
-    Raises
-    ------
-    Refused
-        If they are none.
-    """
+    """Texts in a row; one alone is a row of one."""
     several = isinstance(values, Iterable) and not isinstance(values, (str, Mapping))
     found = tuple(values) if several else (values,)
     if not all(isinstance(entry, str) for entry in found):
@@ -107,13 +77,7 @@ def names(name: str, values: Any) -> tuple[str, ...]:
 
 
 def instance(name: str, value: Any, kinds: type | tuple[type, ...], what: str) -> Any:
-    """What is of some type.
-
-    Raises
-    ------
-    Refused
-        If it is not.
-    """
+    """What is of some type."""
     if not isinstance(value, kinds):
         raise Refused(f"{name}: {type(value).__name__} is not allowed; allowed: {what}")
     return value
@@ -130,26 +94,14 @@ def path(name: str, value: Any) -> Path:
 
 
 def mapping(name: str, values: Any) -> dict[Any, Any]:
-    """What a dict, or a table of columns, maps.
-
-    Raises
-    ------
-    Refused
-        If it maps nothing.
-    """
+    """What a dict, or a table of columns, maps."""
     if not hasattr(values, "keys"):
         raise Refused(f"{name}: {values!r} is not allowed; allowed: a dict")
     return dict(values)
 
 
 def column(name: str, values: Any) -> NDArray[np.float64]:
-    """Numbers (n,) from anything that holds them in a row, a generator as well; always a new array.
-
-    Raises
-    ------
-    Refused
-        If there are none, in another shape, or some are missing.
-    """
+    """Numbers (n,) from anything that holds them in a row, a generator as well; always a new array."""
     return _row(name, _array(name, values))
 
 
@@ -165,11 +117,6 @@ def times(name: str, values: Any, several: bool = False) -> NDArray[np.float64]:
     """Times (n,) in s from numbers, one number, or lengths of time of Python, numpy or pandas; always a new array.
 
     `several`: of any shape, that of the values.
-
-    Raises
-    ------
-    Refused
-        If there are none, or in another shape.
     """
     array = _array(name, values)
     if array.dtype.kind == "O" and array.size and all(isinstance(entry, timedelta) for entry in array.flat):
@@ -181,13 +128,7 @@ def times(name: str, values: Any, several: bool = False) -> NDArray[np.float64]:
 
 
 def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDArray[np.float64]:
-    """Times (n,) in s that ascend from 0 to an end, see `times`; strictly: each is there once.
-
-    Raises
-    ------
-    Refused
-        Names the first that does not.
-    """
+    """Times (n,) in s that ascend from 0 to an end, see `times`; strictly: each is there once."""
     found = times(name, values)
     after = np.greater if strictly else np.greater_equal
     within = not len(found) or (found.item(0) >= 0.0 and found.item(-1) <= end)  # of floats: a short run feels arrays
@@ -201,13 +142,7 @@ def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDA
 
 
 def forces(name: str, values: Any) -> NDArray[np.float64]:
-    """Forces (3,) in N, by body; always a new array.
-
-    Raises
-    ------
-    Refused
-        If they are not three finite numbers.
-    """
+    """Three finite forces (3,) in N, by body; always a new array."""
     array = column(name, values)
     if array.shape != (3,) or not np.isfinite(array).all():
         raise Refused(f"{name}: {values!r} is not allowed; allowed: three finite numbers, N by body")
@@ -215,13 +150,7 @@ def forces(name: str, values: Any) -> NDArray[np.float64]:
 
 
 def rows(name: str, values: Any, width: int) -> NDArray[np.float64]:
-    """Numbers (..., width).
-
-    Raises
-    ------
-    Refused
-        If there are none, or in another shape.
-    """
+    """Numbers (..., width)."""
     array = _array(name, values)
     if array.dtype.kind not in "fiu" or array.shape[-1:] != (width,):
         raise Refused(f"{name}: {array.dtype}, shape {array.shape}, is not allowed; allowed: numbers (..., {width})")
