@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,6 @@ from grasp_ros.scene.effects import BY_SECTION, build, named
 from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import YAML, read_text, reading
-from grasp_ros.scene.html import html_of_scene
 from grasp_ros.scene.library import names, text_of
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.settings import apply
@@ -199,8 +199,8 @@ class Scene(Frozen):
         return dump(self._document())
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return html_of_scene(self)
+        """What a notebook shows: the scene as a file has it."""
+        return f"<pre>{escape(self.to_yaml())}</pre>"
 
     def _document(self) -> dict[str, Any]:
         """What a file with this scene holds."""

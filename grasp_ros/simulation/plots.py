@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import os
 import textwrap
+from base64 import b64encode
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from html import escape
+from io import BytesIO
 from typing import BinaryIO, NamedTuple
 
 import numpy as np
@@ -225,6 +229,16 @@ def write(figure: Figure, file: BinaryIO, ending: str, dpi: int = 150) -> None:
             figure.savefig(file, format=ending[1:], dpi=dpi)
     except RuntimeError as error:  # a .pgf where there is no TeX
         raise Refused(f"{ending}: {error}") from None
+
+
+def html_of(run: Trajectory) -> str:
+    """How a run ended, and its figure if there is anything to draw."""
+    found = f"<p>{escape(f'{run.scene.name}: {run.stop or run.status.value}')}</p>"
+    with suppress(Refused):
+        picture = BytesIO()
+        write(compose([run]), picture, ".png", dpi=80)
+        found += f"<img src='data:image/png;base64,{b64encode(picture.getvalue()).decode()}'>"
+    return found
 
 
 def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:

@@ -27,7 +27,6 @@ from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.npz import signed
 from grasp_ros.simulation.contacts import contact_table
-from grasp_ros.simulation.html import html_of_run
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
@@ -234,8 +233,10 @@ class Trajectory(Tabular, Frozen):
         return crossings(as_function(function, number("level", level)), direction, breaks_of(self), self.at)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
-        return html_of_run(self)
+        """What a notebook shows: how the run ended, and its figure."""
+        from grasp_ros.simulation.plots import html_of  # it imports this file
+
+        return html_of(self)
 
     def times(self, kind: Transition, side: int) -> Array:
         """Times in s of one side's events of a kind, LEFT, RIGHT or, of friction, OBJECT.
