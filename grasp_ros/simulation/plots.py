@@ -50,30 +50,23 @@ class Panel(NamedTuple):
     share: int  # of the height
 
 
-def draw(motion: Motion, path: str | os.PathLike[str], caption: str | None = None) -> None:
-    """Draw a motion into an image file.
+def draw(
+    motions: Motion | Sequence[Motion], path: str | os.PathLike[str], captions: str | Sequence[str] | None = None, *,
+    width_mm: float | None = None, span: tuple[float, float] | None = None,
+) -> None:
+    """Draw a motion, or several side by side with common axes, into an image file.
 
     Parameters
     ----------
-    motion : Motion
+    motions : Motion, or sequence of Motion
     path : Path or str
         The ending decides the format.
-    caption : str, optional
-        Second line of the title. Default: the feedback of the scene, in words.
-
-    Raises
-    ------
-    Refused
-        If the motion is empty, matplotlib does not know the format, or the file cannot be written.
-    """
-    draw_several([motion], None if caption is None else [caption], path)
-
-
-def draw_several(
-    motions: Sequence[Motion], captions: Sequence[str] | None, path: str | os.PathLike[str], *,
-    width_mm: float | None = None, span: tuple[float, float] | None = None,
-) -> None:
-    """Draw motions side by side into an image file, with common axes; see `compose`.
+    captions : str, or sequence of str, optional
+        Second lines of the titles. Default: the feedback of the scenes, in words.
+    width_mm : float, optional
+        Default: 230 mm, or 150 mm for each of several motions.
+    span : (float, float), s, optional
+        First and last time. Default: the whole motions.
 
     Raises
     ------
@@ -81,19 +74,16 @@ def draw_several(
         If a motion is empty, the width is not allowed, matplotlib does not know the format, or the file cannot be
         written.
     """
-    save(compose(motions, captions, width_mm=width_mm, span=span), path)
+    several = motions if isinstance(motions, Sequence) else [motions]
+    save(compose(several, captions, width_mm=width_mm, span=span), path)
 
 
 def compose(
-    motions: Sequence[Motion], captions: Sequence[str] | None = None, *, width_mm: float | None = None,
+    motions: Sequence[Motion], captions: str | Sequence[str] | None = None, *, width_mm: float | None = None,
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
-    """A figure of motions side by side, with common axes; captions are second lines of their titles.
-
-    By default these are the feedback in words, and it is 230 mm wide, or 150 mm for each of several motions, and has
-    the whole motions and all of PANELS.
-    """
-    for motion in instance("motions", motions, Sequence, "a list of motions"):
+    """The figure that `draw` writes; its panels are by default all of PANELS."""
+    for motion in motions:
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
     captions = names("captions", captions if captions is not None else [

@@ -164,7 +164,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda text: scenes.parse(text, "case", "case"), None, "case: text: NoneType"),
     (lambda settings: scenes.parse(CASE.to_yaml(), "case", "case", settings), None, "settings: None"),
     (lambda motion: draw(motion, "case.png"), "a", "motion: str"),
-    (lambda caption: draw(simulate(CASE), "case.png", caption), 1, "captions: [1]"),
+    (lambda caption: draw(simulate(CASE), "case.png", caption), 1, "captions: 1"),
     (lambda path: draw(simulate(CASE), path), None, "path: NoneType"),
     *((door, None, "run: NoneType") for door in (summary, settling_times, losses)),
     *((door, None, "recording: NoneType") for door in (verify, laws_of, bag_summary)),

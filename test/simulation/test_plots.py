@@ -72,7 +72,7 @@ import sys
 from pathlib import Path
 from grasp_ros import scene
 from grasp_ros.simulation import plots, simulate
-plots.draw_several([simulate(scene.load("case_01", "time.duration_s=1"))], ["a caption"], sys.argv[1], width_mm=90.0)
+plots.draw(simulate(scene.load("case_01", "time.duration_s=1")), sys.argv[1], "a caption", width_mm=90.0)
 assert "matplotlib.pyplot" not in sys.modules
 """
 
