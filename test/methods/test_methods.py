@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any
-
 import numpy as np
 import pytest
 from documents import horizon, stalling
 from oracles import ELASTIC, STANDARD, impact, make_grasp, reduced_mass
 
-from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods import library
 from grasp_ros.methods.contract import STEP
@@ -18,7 +14,7 @@ from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.system import System
-from grasp_ros.simulation import Trajectory, load, simulate
+from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import elastic_period
 
 STEPPING = [name for name in METHODS if name != EXACT]
@@ -108,43 +104,6 @@ def test_a_step_that_is_unstable_ends_with_a_status() -> None:
     scene = horizon("case_01", 2000.0, "left_arm.damping_Ns_per_m=1e3")
     assert simulate(scene, method="rk4", setting=0.1).status is Status.NOT_FINITE
     assert simulate(scene, method="discrete_gradient", setting=0.1).status is Status.DONE
-
-
-def test_saved_with_method_setting_and_its_own_counters(tmp_path: Any) -> None:
-    motion = simulate(horizon("case_01", 1.0), method="rk4_events", setting=1e-3)
-    motion.save(tmp_path / "a.npz")
-    again = load(tmp_path / "a.npz")
-    assert (again.method, again.setting, again.counters) == ("rk4_events", 1e-3, motion.counters)
-    assert motion.counters["right hand sides"] >= 4000
-    assert np.array_equal(again.event_table, motion.event_table)
-
-
-@pytest.mark.parametrize(
-    ("options", "complaint"),
-    [
-        ({"method": "euler"}, "method 'euler' is not allowed; allowed: exact, paper, rk4"),
-        ({"method": "rk4", "setting": 0.0}, "rk4: step 0.0 is not allowed; allowed: 2e-09 to 2"),
-        ({"method": "rk4", "setting": 3.0}, "rk4: step 3.0 is not allowed"),
-        ({"method": "paper", "setting": math.nan}, "paper: step nan is not allowed"),
-        ({"method": "dop853", "setting": 1e-15}, "dop853: tolerance 1e-15 is not allowed; allowed: 2.3e-14 to 0.01"),
-        ({"method": "paper", "sampled": True}, "paper: only continuous feedback"),
-        ({"method": "exact", "setting": 1e-20}, "exact: accuracy 1e-20 is not allowed; allowed: 1e-16 to 0.001"),
-        ({"method": "rk4", "max_work": 100}, "rk4: has no budget of work; allowed with one: exact"),
-    ],
-)
-def test_what_a_method_cannot_do_is_refused(options: dict[str, Any], complaint: str) -> None:
-    with pytest.raises(ValueError, match=complaint.replace("(", r"\(")):
-        simulate(horizon("case_01", 2.0), **options)
-
-
-def test_scenes_with_more_than_the_basic_grasp_are_refused() -> None:
-    more = scenes.load("case_01", ["tilt.angle_rad=0.1", "tilt.gravity_m_per_s2=9.81"])
-    with pytest.raises(ValueError, match="rk4: case_01 has tilt; it knows the paper's grasp alone"):
-        simulate(more, method="rk4")
-    less = scenes.compose("case_01", {key: value for key, value in scenes.load("case_01").values.items()
-                                      if key not in ("object", "left_contact", "right_contact")})
-    with pytest.raises(ValueError, match="rk4: case_01 lacks left_contact, object, right_contact; it knows"):
-        simulate(less, method="rk4")
 
 
 def test_exact_is_the_default_and_its_setting_is_the_accuracy() -> None:

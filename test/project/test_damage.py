@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.graph import bag
 from grasp_ros.physics.errors import Refused
-from grasp_ros.scene.npz import signed
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
 
@@ -25,11 +23,13 @@ def recorded(path: Path) -> Path:
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Bytes cut off, cut out, or written over."""
+    """Bytes cut off, cut out, put in or written over, or one flipped bit."""
     begin, length = int(rng.integers(len(content))), int(rng.integers(1, 60))
     other = rng.integers(256, size=length).astype(np.uint8).tobytes()
+    flipped = bytes([content[begin] ^ 1 << int(rng.integers(8))])
     return (content[:begin], content[:begin] + content[begin + length :], content[:begin] + other + content[begin:],
-            content[:begin] + other + content[begin + length :])[int(rng.integers(4))]
+            content[:begin] + other + content[begin + length :],
+            content[:begin] + flipped + content[begin + 1 :])[int(rng.integers(5))]
 
 
 @pytest.mark.slow
@@ -52,32 +52,15 @@ def test_a_damaged_bag_is_refused_or_read(tmp_path: Path, seed: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
-def test_a_damaged_simulation_is_refused_or_read(tmp_path: Path, seed: int) -> None:
+def test_a_damaged_simulation_is_refused_or_what_it_was(tmp_path: Path, seed: int) -> None:
     path, rng = tmp_path / "a.npz", np.random.default_rng(seed)
-    simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
+    run = simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5))
+    run.save(path)
     whole, refused = path.read_bytes(), 0
-    for _ in range(60):
+    for _ in range(200):
         path.write_bytes(damaged(whole, rng))
         with contextlib.suppress(Refused):
-            simulation.load(path)
+            assert simulation.load(path) == run
             continue
         refused += 1
-    assert refused > 30
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(["a"] * 5)),
-        ("t", np.array(0.0)), ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))),
-        ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
-        ("scene", "title: 5"), ("setting", "fine"), ("setting", np.zeros(2)),
-    ],
-)
-def test_a_simulation_of_another_shape_is_refused(tmp_path: Path, name: str, value: Any) -> None:
-    path = tmp_path / "a.npz"
-    simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5)).save(path)
-    with np.load(path) as data:
-        np.savez(path, **signed({**data, name: value}))
-    with pytest.raises(Refused, match=r"a\.npz: "):
-        simulation.load(path)
+    assert refused > 100

@@ -150,11 +150,15 @@ def test_arrays_that_numpy_does_not_write_are_refused(
         ("t", np.array([0.0, 1.0, np.nan, 3.0, 4.0])), ("state", np.full((5, 6), np.inf)),
         ("state", np.zeros((5, 6), ">f8")), ("events", np.full((1, 5), 9.0)), ("setting", np.array(-1.0)),
         ("setting", np.array(np.nan)), ("sampled", np.array("yes")), ("work", np.full(4, -1)),
-        ("work_names", np.array(["a"] * 4)), ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)),
+        ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(0.0)),
+        ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))), ("scene", "title: 5"),
+        ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
+        ("setting", "fine"), ("setting", np.zeros(2)), ("work_names", np.array(["a"] * 4)),
+        ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)),
     ],
 )
 def test_numbers_that_no_run_has_are_refused(
-    tmp_path: Path, arrays: dict[str, np.ndarray], name: str, value: np.ndarray
+    tmp_path: Path, arrays: dict[str, np.ndarray], name: str, value: Any
 ) -> None:
     np.savez(tmp_path / "a.npz", **signed({**arrays, name: value}))
     with pytest.raises(Refused, match=r"a\.npz: "):
@@ -176,25 +180,6 @@ def test_an_encrypted_or_swollen_result_is_refused(
             archive.writestr(f"{name}.npy", bytes(2**16))
     with pytest.raises(Refused, match="bytes of numbers; allowed: at most"):
         simulation.load(tmp_path / "b.npz")
-
-
-def test_every_flipped_bit_of_numbers_is_noticed(tmp_path: Path) -> None:
-    path, rng = tmp_path / "a.npz", np.random.default_rng(0)
-    run = simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 5))
-    run.save(path)
-    whole, refused = path.read_bytes(), 0
-    for place in rng.integers(8 * len(whole), size=300).tolist():
-        content = bytearray(whole)
-        content[place // 8] ^= 1 << place % 8
-        path.write_bytes(content)
-        try:
-            found = simulation.load(path)
-        except Refused:
-            refused += 1
-            continue
-        assert found.state.tobytes() == run.state.tobytes()
-        assert (found.t.tobytes(), found.events, found.scene) == (run.t.tobytes(), run.events, run.scene)
-    assert refused > 200
 
 
 @pytest.mark.slow
