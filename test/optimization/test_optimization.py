@@ -77,13 +77,6 @@ def test_what_cannot_be_designed_is_refused(free: Any, minimise: str, bounds: An
         gr.design(gr.load("case_01"), free, minimise, bounds)
 
 
-def test_what_is_no_scene_is_refused() -> None:
-    with pytest.raises(gr.Refused, match=r"scene: str is not allowed; allowed: a Scene, see load\('case_01'\)"):
-        gr.design("case_01", {BOTH_KV: (1.0, 2.0)}, "settling_time")  # type: ignore[arg-type]
-    with pytest.raises(gr.Refused, match="scene: str is not allowed"):
-        gr.fit(gr.simulate(gr.load("case_01")), ["object.mass_kg"], "case_01")  # type: ignore[arg-type]
-
-
 def test_a_settling_time_that_nothing_proves_is_refused_with_the_reason() -> None:
     with pytest.raises(gr.Refused, match=r"V_c may rise: commands are held .* last_outside needs no proof"):
         gr.design(gr.load("case_01", ["loop={}"]), {BOTH_KV: (1.0, 2.0)}, "settling_time")

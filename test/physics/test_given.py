@@ -46,15 +46,12 @@ GRIDS = (
     np.array([250, 500, 1000], dtype="timedelta64[ms]"), [timedelta(seconds=t) for t in TIMES],
 )
 ONE = (1, 1.0, np.float64(1.0), np.array(1.0), np.timedelta64(1, "s"), timedelta(seconds=1), [1.0])
-NO_GRID = {
-    "1.0": "numbers", None: None, "columns": "shape", "names": "numbers", "truth": "numbers", "dates": "numbers",
-    "ragged": "allowed", "masked": "masked", "complex": "numbers", "never": "ascending",
-}
-NO_GRIDS: dict[str, Any] = {
-    "1.0": "1.0", "columns": np.array(TIMES)[:, None], "names": ["0.5", "1.0"], "truth": [True, False],
-    "dates": np.array(["2020-01-01"], dtype="datetime64[s]"), "ragged": [[0.5], [0.5, 1.0]],
-    "masked": np.ma.masked_array(TIMES, [False, True, False]), "complex": [0.5 + 0.0j],
-    "never": np.array(["NaT"], dtype="timedelta64[s]"),
+NO_GRIDS: dict[str, tuple[Any, str]] = {
+    "text": ("1.0", "numbers"), "columns": (np.array(TIMES)[:, None], "shape"), "names": (["0.5", "1.0"], "numbers"),
+    "truth": ([True, False], "numbers"), "dates": (np.array(["2020-01-01"], dtype="datetime64[s]"), "numbers"),
+    "ragged": ([[0.5], [0.5, 1.0]], "allowed"), "complex": ([0.5 + 0.0j], "numbers"),
+    "masked": (np.ma.masked_array(TIMES, [False, True, False]), "masked"),
+    "never": (np.array(["NaT"], dtype="timedelta64[s]"), "ascending"),
 }
 
 
@@ -96,10 +93,10 @@ def test_one_output_time(grid: Any) -> None:
     assert Integrator(CASE.system, continuous=True).advance(np.float32(1.0), grid).shape == (1, 6)
 
 
-@pytest.mark.parametrize("name", NO_GRIDS)
-def test_what_is_no_output_time_is_refused(name: str) -> None:
-    with pytest.raises(Refused, match=f"^grid: .*{NO_GRID[name]}"):
-        simulate(CASE, grid=NO_GRIDS[name])
+@pytest.mark.parametrize(("grid", "word"), NO_GRIDS.values(), ids=NO_GRIDS)
+def test_what_is_no_output_time_is_refused(grid: Any, word: str) -> None:
+    with pytest.raises(Refused, match=f"^grid: .*{word}"):
+        simulate(CASE, grid=grid)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +145,8 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (CASE.changed, [1], "numbers: [1]"), (lambda sections: compose("case", sections), [1], "sections: [1]"),
     (lambda settings: scenes.load("case_01", settings), 3, "settings: 3"),
     (lambda level: simulate(CASE).section([1, 0, 0, 0, 0, 0], level), "a", "level: 'a'"),
-    (lambda scene: spectrum(scene), "case_01", "scene: str"),
+    (spectrum, "case_01", "scene: str"), (lambda scene: fit(simulate(CASE), GAIN, scene), "case_01", "scene: str"),
+    (lambda scene: design(scene, {GAIN: (1, 2)}, "touches"), "case_01", "scene: str"),
     (lambda scene: ensemble_sensitivities(scene, {}, [GAIN]), None, "scene: NoneType"),
     (lambda method: simulate(CASE, method=method), [], "method: list"),
     (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),

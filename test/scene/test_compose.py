@@ -55,17 +55,9 @@ def test_a_scene_keeps_its_own_numbers() -> None:
     ("sections", "texts", "complaint"),
     [
         ({**OBJECT, "tilt": {"angle_rad": 9.0, "gravity_m_per_s2": 9.81}}, {}, "odd: tilt.angle_rad: 9.0 is not all"),
-        ({**OBJECT, "tilt": {"angle_rad": 0.1}}, {}, "odd: tilt.gravity_m_per_s2: missing"),
-        ({**OBJECT, "wind": {}}, {}, "odd: wind: unknown key"),
         ({**OBJECT, "title": "a text"}, {}, "odd: title: unknown key"),
-        ({**OBJECT, "left_contact": {"hertz_N_per_m1_5": 1.0}}, {}, "odd: left_contact: needs left_arm"),
         ({"object": OBJECT["object"]}, {}, "odd: time: missing"),
-        ({"time": OBJECT["time"]}, {}, "odd: no body"),
-        ({**OBJECT, "object": 5}, {}, "odd: object: 5 is not allowed; allowed: a mapping"),
-        (OBJECT, {"title": 5}, "odd: title: 5 is not allowed; allowed: a text"),
         (OBJECT, {"watch": None}, "odd: watch: None is not allowed; allowed: a text"),
-        (OBJECT, {"readings": "one"}, "odd: readings: 'one' is not allowed; allowed: a list"),
-        (OBJECT, {"readings": [1]}, "odd: readings: "),
     ],
 )
 def test_sections_are_validated_like_a_file(sections: Any, texts: dict[str, Any], complaint: str) -> None:

@@ -28,7 +28,7 @@ def test_every_effect_has_a_scene() -> None:
         assert effect.section in named or effect.section.replace("right", "left").replace("object", "left_arm") in sided
 
 
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize("name", scenes.names())
 def test_scenes_say_what_to_watch_for_and_survive_a_round_trip(name: str) -> None:
     scene = scenes.load(name)
     assert len(scene.watch) > 40

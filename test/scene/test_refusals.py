@@ -42,14 +42,8 @@ def test_every_parameter_is_refused_outside_its_range(section: str, parameter: P
     if parameter.has_smallest:
         outside += [math.nextafter(SMALLEST, 0.0), 5e-324]
     for value in outside:
-        refused(
-            document(section, parameter.key, value),
-            "dir/bad.yaml",
-            f"{section}.{parameter.key}",
-            repr(value),
-            "allowed",
-            parameter.allowed,
-        )
+        where, said = f"{section}.{parameter.key}", f"allowed: {parameter.allowed}"
+        refused(document(section, parameter.key, value), "dir/bad.yaml", where, repr(value), said)
 
 
 @pytest.mark.parametrize(("section", "parameter"), EVERY, ids=IDS)

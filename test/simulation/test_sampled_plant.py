@@ -68,9 +68,6 @@ def test_a_plant_that_stops_says_so_and_stays() -> None:
     assert len(rows) < 11
 
 
-# The inputs that acted, beside the commands that were answered.
-
-
 def test_inputs_are_the_commands_that_arrived_and_the_external_forces() -> None:
     """Delay, limits and a pulse at once, at the ticks and between them."""
     scene = scenes.load("everything", ["time.duration_s=0.5", "object_pulse.start_s=0.3", "loop.delay_ticks=3",
@@ -93,14 +90,6 @@ def test_inputs_under_continuous_feedback_are_its_force_and_the_external_ones() 
     assert not motion.sampled
     assert np.array_equal(motion.inputs[:-1, [LEFT, RIGHT]], motion.command[:-1])
     assert motion.inputs[:-1, 2].tolist() == [0.0, 0.0, force, 0.0]
-    assert np.isnan(motion.inputs[-1]).all()
-
-
-@pytest.mark.parametrize("method", ["exact", "paper"])
-def test_inputs_of_the_paper_are_4_and_5(method: str) -> None:
-    motion = simulate(case_of(), method=method)
-    assert np.array_equal(motion.inputs[:-1, :2], motion.command[:-1])
-    assert not motion.inputs[:-1, 2].any()
     assert np.isnan(motion.inputs[-1]).all()
 
 
