@@ -26,8 +26,7 @@ _PLACES = {  # module, and the name there where it is another one; their types: 
     "LEFT": "physics.layout", "OBJECT": "physics.layout", "RIGHT": "physics.layout", "Refused": "physics.errors",
     "Scene": "scene.scene", "Status": "exact.integrator", "Trajectory": "simulation.trajectory",
     "Transition": "physics.layout", "compose": "scene.scene", "design": "optimization.search",
-    "draw": "simulation.plots", "ensemble": "simulation.ensemble",
-    "ensemble_sensitivities": "simulation.sensitivities", "fit": "identification.fit", "load": "scene.scene",
+    "draw": "simulation.plots", "ensemble": "simulation.ensemble", "fit": "identification.fit", "load": "scene.scene",
     "load_run": "simulation.trajectory_file:load", "names": "scene.library", "parse": "scene.scene",
     "read_bag": "graph.bag:read", "simulate": "simulation.simulate", "spectrum": "sensitivity.spectrum",
 }

@@ -17,14 +17,13 @@ from grasp_ros.scene.scene import parse as parse
 from grasp_ros.sensitivity.spectrum import spectrum as spectrum
 from grasp_ros.simulation.ensemble import ensemble as ensemble
 from grasp_ros.simulation.plots import draw as draw
-from grasp_ros.simulation.sensitivities import ensemble_sensitivities as ensemble_sensitivities
 from grasp_ros.simulation.simulate import simulate as simulate
 from grasp_ros.simulation.trajectory import Trajectory as Trajectory
 from grasp_ros.simulation.trajectory_file import load as load_run
 
 __all__ = [
     "LEFT", "OBJECT", "RIGHT", "Refused", "Scene", "Status", "Trajectory", "Transition", "compose", "design", "draw",
-    "ensemble", "ensemble_sensitivities", "fit", "load", "load_run", "names", "parse", "read_bag", "simulate",
+    "ensemble", "fit", "load", "load_run", "names", "parse", "read_bag", "simulate",
     "spectrum",
 ]
 

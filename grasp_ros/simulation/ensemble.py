@@ -22,13 +22,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import whole
+from grasp_ros.physics.given import names, whole
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.places import parameter_of
+from grasp_ros.sensitivity.directions import check_keys
 from grasp_ros.simulation.chunk import STATUSES, Chunk, Setup, check, checked, compute, has_inputs
-from grasp_ros.simulation.outcomes import OUTCOMES
+from grasp_ros.simulation.outcomes import BY, CORNER, OUTCOMES, V_C_END
 from grasp_ros.simulation.progress import showing
 from grasp_ros.simulation.tables import frame_of, write_rows
 from grasp_ros.simulation.variants import Variants
@@ -49,11 +50,11 @@ class Table(Frozen):
     changes : dict of str to array (n,)
         Numbers by "section.key".
     columns : dict of str to array (n,)
-        Outcomes by the names of `outcomes.OUTCOMES`; nan in rows that were refused or stopped.
+        Outcomes by the names of `outcomes.OUTCOMES`, and derivatives; nan in rows that were refused or stopped.
     status : array (n,)
         Places in `STATUSES`.
     stops : dict of int to str
-        Why and where a row was refused or stopped.
+        Why and where a row was refused or stopped, or why it has no derivatives.
     """
 
     scene: Scene
@@ -77,7 +78,13 @@ class Table(Frozen):
     def units(self) -> dict[str, str]:
         """Units of the numbers and of the outcomes, by column."""
         numbers = {name: parameter_of(self.scene, name).unit for name in self.changes}
-        return {**numbers, **{name: OUTCOMES[name].unit for name in self.columns}}
+        return {**numbers, **{name: self._unit(name) for name in self.columns}}
+
+    def _unit(self, column: str) -> str:
+        """Of an outcome, or of its derivative by a number."""
+        name, _, key = column.partition(BY)
+        unit = {V_C_END: "J", CORNER: "s"}.get(name) or OUTCOMES[name].unit
+        return f"{unit} per {parameter_of(self.scene, key).unit}" if key else unit
 
     def dataframe(self) -> Any:
         """A `pandas.DataFrame`, a row for each run: numbers, outcomes and `status`; units in its `attrs["units"]`.
@@ -111,6 +118,7 @@ def ensemble(
     outcomes: Sequence[str] = Setup().outcomes,
     *,
     setup: Setup | None = None,
+    sensitivity: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Callable[[int], object] | bool | None = None,
 ) -> Table:
@@ -125,6 +133,10 @@ def ensemble(
         Columns or groups of `outcomes`.
     setup : Setup, optional
         All that the rows depend on beside; its outcomes give way to those above.
+    sensitivity : sequence of str, optional
+        Numbers, "section.key", by which the last states and V_c are differentiated through all impacts: columns such as
+        "x_left_end by KEY", each by the unit of its key. `V_c_end` is V_c there, and `corner` the time in s from which
+        on one-sided derivatives differ, see `differentiate.Sensitivity`; inf: they do not.
     threads : int, optional
         Default: one for each core. The result does not depend on it.
     progress : callable or True, optional
@@ -133,22 +145,31 @@ def ensemble(
     Raises
     ------
     Refused
-        If a key or an outcome is not known, or a setting is outside its range.
+        If a key or an outcome is not known, a number has no derivative, or a setting is outside its range.
     """
     setup = checked(setup, outcomes)
     columns, variants = check(scene, setup), Variants(scene, changes)
+    keys = None if sensitivity is None else names("sensitivity", sensitivity)
+    if keys is not None:
+        check_keys(scene, keys, setup.sampled)
     found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}
     status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()
     spans = chunks(variants.rows, chunk_rows(scene, setup))
 
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
-        return compute(variants.part(*span), setup, stop)
+        part = variants.part(*span)
+        chunk = compute(part, setup, stop)
+        if keys is None:
+            return chunk
+        from grasp_ros.simulation.sensitivities import with_derivatives  # whose kernels no other run loads
+
+        return with_derivatives(chunk, part, setup, keys, stop)
 
     reached = 0
     with showing(progress, variants.rows, "run", scene.name) as told:
         for (first, last), chunk in in_threads(work, spans, threads):
             for name, values in chunk.columns.items():
-                found[name][first:last] = values
+                found.setdefault(name, np.full(variants.rows, np.nan))[first:last] = values
             status[first:last] = chunk.status
             stops.update({first + i: stop for i, stop in chunk.stops.items()})
             reached += last - first

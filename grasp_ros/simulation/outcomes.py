@@ -110,6 +110,7 @@ GROUPS: dict[str, tuple[str, ...]] = {group: tuple(entry.name for entry in own) 
 OUTCOMES: dict[str, Outcome] = {entry.name: entry for own in _GROUPS.values() for entry in own}
 LYAPUNOV = "lyapunov"
 LAST = frozenset(GROUPS["last_state"])  # also of a run that stopped
+V_C_END, CORNER, BY = "V_c_end", "corner", " by "  # columns of derivatives, see `ensemble`: "x_left_end by KEY"
 
 
 def find(names: Iterable[str]) -> list[Outcome]:

@@ -17,7 +17,7 @@ import pandas
 import pytest
 import xarray
 
-from grasp_ros import design, draw, ensemble_sensitivities, read_bag, simulation
+from grasp_ros import design, draw, read_bag, simulation
 from grasp_ros import scene as scenes
 from grasp_ros.exact import Integrator
 from grasp_ros.graph.summary import summary as bag_summary
@@ -147,7 +147,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda level: simulate(CASE).section([1, 0, 0, 0, 0, 0], level), "a", "level: 'a'"),
     (spectrum, "case_01", "scene: str"), (lambda scene: fit(simulate(CASE), GAIN, scene), "case_01", "scene: str"),
     (lambda scene: design(scene, {GAIN: (1, 2)}, "touches"), "case_01", "scene: str"),
-    (lambda scene: ensemble_sensitivities(scene, {}, [GAIN]), None, "scene: NoneType"),
+    (lambda keys: ensemble(CASE, {}, sensitivity=keys), [3], "sensitivity: [3]"),
     (lambda method: simulate(CASE, method=method), [], "method: list"),
     (lambda progress: simulate(CASE, progress=progress), 1, "progress: 1"),
     (lambda progress: ensemble(CASE, {}, progress=progress), "yes", "progress: 'yes'"),
