@@ -17,7 +17,7 @@ from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
-from grasp_ros.simulation.animation import WRITERS, animate
+from grasp_ros.simulation.animation import FORMATS, animate
 from grasp_ros.simulation.tables import Motion
 
 Span = tuple[float, float] | None
@@ -40,7 +40,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--width", type=float, metavar="MM", help="width of the page (default 230 mm, 90 is a column)")
     add_file(sub, "FILE", "image, say .png, .svg or .pdf; - is the standard output (default: .png beside the source)")
     sub.add_argument("--animate", action="store_true",
-                     help="a moving picture of one source instead, .gif, .html or .mp4 (default: .gif beside it)")
+                     help="a moving picture of one source instead, .gif or .html (default: .gif beside it)")
     sub.add_argument("--speed", type=float, default=1.0, metavar="R", help="its seconds in a second (default 1)")
 
 
@@ -51,7 +51,7 @@ def _plot(options: argparse.Namespace) -> int:
         raise Refused("--animate: allowed: one source, and a file")
     if (options.panels and options.animate) or (options.speed != 1.0 and not options.animate):
         raise Refused("--panel: allowed: without --animate; --speed: with it")
-    check_output(output, WRITERS if options.animate else figure_endings(output), options.force, options.sources)
+    check_output(output, FORMATS if options.animate else figure_endings(output), options.force, options.sources)
     if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
         raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]

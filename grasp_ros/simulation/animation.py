@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.animation import FuncAnimation, writers
+from matplotlib.animation import FuncAnimation
 from matplotlib.patches import Rectangle
 
 from grasp_ros.physics.energy import pairs_of
@@ -22,7 +22,7 @@ from grasp_ros.simulation.plots import COLORS, MM
 from grasp_ros.simulation.tables import Motion
 
 FRONTS: dict[int, float] = {LEFT: 1.5, OBJECT: 0.5, RIGHT: -0.5}  # lengths from the begin of a body to its position
-WRITERS = {".gif": "pillow", ".html": "html", ".mp4": "ffmpeg"}
+FORMATS = (".gif", ".html")
 RATE = 25  # pictures in a second
 MOST_PICTURES = 2000
 WIDTH_MM, HEIGHT_MM, DPI = 150.0, 75.0, 96
@@ -33,20 +33,20 @@ COILS = np.array([0.0, 0.0, *([1.0, -1.0] * 5), 0.0, 0.0])
 
 def animate(motion: Motion, path: Path, *, speed: float = 1.0, span: tuple[float, float] | None = None,
             width_mm: float | None = None) -> None:
-    """Write a motion as a moving picture: .gif, .html (with its pictures inside) or .mp4.
+    """Write a motion as a moving picture: .gif, or .html with its pictures inside.
 
     Between its output times states are interpolated linearly. `speed` is in seconds of the motion in a second, `span`
     its first and last time in s; by default it is the whole motion, 150 mm wide.
     """
     times = _times(motion, speed, span)
-    writer = _writer(path)
+    ending = format_of(path, FORMATS)
     with replaced(path) as part, canvas.style():
         figure, update = _stage(motion, times, WIDTH_MM if width_mm is None else width_mm)
         animation = FuncAnimation(figure, update, frames=len(times), interval=1e3 / RATE, blit=False)
-        if writer == "html":
+        if ending == ".html":
             part.write_text(animation.to_jshtml(fps=RATE), encoding="utf-8")
         else:
-            animation.save(part, writer=writer, fps=RATE, dpi=DPI)
+            animation.save(part, writer="pillow", fps=RATE, dpi=DPI)
 
 
 def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Array:
@@ -61,14 +61,6 @@ def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Ar
         raise Refused(f"--speed {speed!r}: {count} pictures; allowed: at most {MOST_PICTURES}, with a higher --speed or"
                       " a shorter time")
     return np.minimum(first + np.arange(count) * speed / RATE, last)
-
-
-def _writer(path: Path) -> str:
-    """The writer of matplotlib for a file."""
-    name = WRITERS[format_of(path, WRITERS)]
-    if not writers.is_available(name):
-        raise Refused(f"{path}: needs the program {name}, which is not installed; allowed without: .gif, .html")
-    return name
 
 
 def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:

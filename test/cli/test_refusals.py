@@ -103,7 +103,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("design case_01 --free object.mass_kg=1:2 --minimise touches -o x.png", "x.png: .png is not allowed; allowed"),
         ("fit other.npz --free object.mass_kg -o x.txt", "x.txt: .txt is not allowed; allowed: .yaml, .yml, ."),
         ("map case_01 --x object.mass_kg=1:2:2 -o -", "-: needs an ending, one of .zarr"),
-        ("plot arm_alone --animate -o x.png", "x.png: .png is not allowed; allowed: .gif, .html, .mp4"),
+        ("plot arm_alone --animate -o x.png", "x.png: .png is not allowed; allowed: .gif, .html"),
         ("run case_01 -o -", "argument -o/--output: '-' is not allowed; allowed: a name"),
         ("recover bag -o ", "argument -o/--output: '' is not allowed; allowed: a name"),
         ("simulate case_01 -o file/x.npz", "file/x.npz: cannot be written: Not a directory"),

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from documents import scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
@@ -34,14 +33,6 @@ def test_last_time_outside_of_known_motions() -> None:
     assert found[0] == pytest.approx(np.log(10.0), abs=1e-6)
     assert found[1] == 0.0
     assert found[2] == np.inf
-
-
-def test_settling_time_of_an_arm_alone_follows_its_envelope() -> None:
-    """Between the envelope's time and half a swing before it."""
-    run = simulate(scene_of("case_01", without=("object", "left_contact", "right_contact")))
-    slowest = settling_times(run)[[0, 2]].max()
-    envelope = np.log(50.0) / 0.35
-    assert envelope - np.pi / np.sqrt(15.0 - 0.35**2) < slowest < envelope + 0.1
 
 
 @pytest.mark.parametrize("name", ["case_01", "case_02", "case_03", "case_07", "friction", "v_jump_symmetric"])
