@@ -198,9 +198,16 @@ def shift(c: Array, n: int, s: float) -> None:
 
 
 @kernel
-def variable_at(c: Array, n: int, s: float, tau: float) -> float:
-    """The s at which the time of a step is tau, which is within its length: by bisection and Newton's iteration."""
-    low, high, at = 0.0, s, 0.5 * s
+def variable_at(c: Array, n: int, s: float, total: float, tau: float) -> float:
+    """The s within a step's length at which its time is tau; `total` is the time at that length.
+
+    By Newton's iteration with bisection, from the parabola through both ends.
+    """
+    slope, low, high = c[LANES + Lane.TIME], 0.0, s
+    bend = (total - slope * s) / (s * s)
+    at = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))
+    if not at < high:
+        at = 0.5 * high
     for _ in range(MOST_HALVINGS):
         time, pace, _ = value_and_rate(c[Lane.TIME :: LANES], n, at)
         if time > tau:
@@ -208,7 +215,7 @@ def variable_at(c: Array, n: int, s: float, tau: float) -> float:
         else:
             low = at
         following = at + (tau - time) / pace if pace > 0.0 else math.inf
-        if not low < following < high:
+        if not low <= following <= high:
             following = 0.5 * (low + high)
         if abs(following - at) <= 4.0 * EPS * s:
             return following

@@ -43,28 +43,37 @@ def product_2x3(a: Array, b: Array, out: Array, steady: float) -> None:
 
 
 @kernel
+def write_map(out: Array, x: tuple[float, float, float], v: tuple[float, float, float]) -> None:
+    """Write the rows of an affine map of the plane."""
+    for j in range(3):
+        out[0, j], out[1, j] = x[j], v[j]
+
+
+@kernel
 def flow_of_body(stiffness: float, damping: float, t: float, m: Array) -> None:
-    """Write the flow of a body over t s and its derivatives by K and C to the matrices (5, 6, 6), (2, 3) of each."""
+    """Write the flow of a body over t s and its derivatives by K and C to the matrices (5, 6, 6), (2, 3) of each.
+
+    All of it follows from the answer q(t) to an acceleration of 1, q'' = 1 - K q - C q', and its derivatives.
+    """
     times = halvings(max(math.sqrt(stiffness), abs(damping)), t)
     h = t / 2.0**times
-    m[:, :2, :3] = 0.0
-    m[FLOW, 0, 0] = m[FLOW, 1, 1] = m[NEXT, 0, 0] = m[NEXT, 1, 1] = 1.0
-    term, by_k, by_c = m[NEXT], m[SPARE], m[SPARE, 2:]  # (2, 3) each
-    by_c[:2, :3] = 0.0
+    x = v = x_k = v_k = x_c = v_c = 0.0  # terms of q and q'
+    q = s = q_k = s_k = q_c = s_c = 0.0  # their sums
+    push = 1.0
     for k in range(1, SERIES):
         share = h / k
-        for j in range(3):
-            x, v, x_k, v_k, x_c, v_c = term[0, j], term[1, j], by_k[0, j], by_k[1, j], by_c[0, j], by_c[1, j]
-            steady = 1.0 if k == 1 and j == STEADY else 0.0
-            term[0, j], term[1, j] = share * v, share * (steady - stiffness * x - damping * v)
-            by_k[0, j], by_k[1, j] = share * v_k, share * (-x - stiffness * x_k - damping * v_k)
-            by_c[0, j], by_c[1, j] = share * v_c, share * (-v - stiffness * x_c - damping * v_c)
-            for i in range(2):
-                m[FLOW, i, j] += term[i, j]
-                m[BY_STIFFNESS, i, j] += by_k[i, j]
-                m[BY_DAMPING, i, j] += by_c[i, j]
-        if abs(term[0, 1]) <= SMALL * h and abs(term[1, 1]) <= SMALL and k > 4:
+        x_k, v_k = share * v_k, share * (-x - stiffness * x_k - damping * v_k)
+        x_c, v_c = share * v_c, share * (-v - stiffness * x_c - damping * v_c)
+        x, v = share * v, share * (push - stiffness * x - damping * v)
+        q, s, q_k, s_k, q_c, s_c = q + x, s + v, q_k + x_k, s_k + v_k, q_c + x_c, s_c + v_c
+        push = 0.0
+        if abs(v) <= SMALL * h and abs(x) <= SMALL * h * h and k > 4:
             break
+    bend = stiffness * q + damping * s
+    bend_k, bend_c = q + stiffness * q_k + damping * s_k, s + stiffness * q_c + damping * s_c
+    write_map(m[FLOW], (1.0 - stiffness * q, s, q), (-stiffness * s, 1.0 - bend, s))
+    write_map(m[BY_STIFFNESS], (-q - stiffness * q_k, s_k, q_k), (-s - stiffness * s_k, -bend_k, s_k))
+    write_map(m[BY_DAMPING], (-stiffness * q_c, s_c, q_c), (-stiffness * s_c, -bend_c, s_c))
     for _ in range(times):
         for which in (BY_DAMPING, BY_STIFFNESS, FLOW):
             m[NEXT, :2, :3] = 0.0

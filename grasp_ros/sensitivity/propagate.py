@@ -213,7 +213,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         while next_output(t.outputs) < (t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)
-            step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, tau))
+            step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, reached, tau))
             write_output(motion, t.outputs, rates)
         if ends:
             fly_free(t, True, span)
