@@ -37,12 +37,11 @@ from lab.paper.equations import equations
 from lab.paper.judgement import statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import SHORT
-from lab.paper.page import Image, Picture, Report, agreement, summary
+from lab.paper.page import Picture, Report, agreement, summary
 from lab.paper.prints import compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import replay
 from lab.paper.results import Beyond, results
-from lab.paper.svg import short_svg
 
 DPI = 220
 COLORS = 256  # of a PNG file
@@ -93,45 +92,34 @@ def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
     ]
 
 
-def image(drawing: Any) -> Image:
-    """A figure as SVG and as PNG."""
-    files = []
-    for kind in ("svg", "png"):
-        file = io.BytesIO()
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        with canvas.style(figures.style()):
-            drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
-        drawing.set_layout_engine("none")  # what the first has laid out stays
-        files.append(file)
-    return Image(short_svg(files[0].getvalue()), _few_colors(files[1]))
-
-
-def _few_colors(png: io.BytesIO) -> bytes:
-    """A PNG file with a palette, which is a third as large."""
-    small = io.BytesIO()
-    with PIL.Image.open(png) as picture:
+def image(drawing: Any) -> bytes:
+    """A figure as a PNG file with a palette, which is a third as large."""
+    large, small = io.BytesIO(), io.BytesIO()
+    with canvas.style(figures.style()):
+        drawing.savefig(large, format="png", dpi=DPI)
+    with PIL.Image.open(large) as picture:
         few = picture.convert("RGB").quantize(COLORS, PIL.Image.Quantize.FASTOCTREE, dither=PIL.Image.Dither.NONE)
         few.save(small, format="png", optimize=True)
     return small.getvalue()
 
 
-def _sheet(cases: Cases) -> tuple[str, Image]:
+def _sheet(cases: Cases) -> tuple[str, bytes]:
     return "sheet", image(figures.sheet([figures.pictured(figure, cases) for figure in FIGURES]))
 
 
-def _large(figure: Figure, cases: Cases) -> tuple[str, Image]:
+def _large(figure: Figure, cases: Cases) -> tuple[str, bytes]:
     return f"fig_{figure.number:02d}", image(figures.large(figures.pictured(figure, cases)))
 
 
 def _further(
     key: str, compute: Callable[..., Any], arguments: tuple[Any, ...], draw: Callable[[Any], Any]
-) -> tuple[str, Any, Image]:
+) -> tuple[str, Any, bytes]:
     """What the paper lacks, and its figure."""
     found = compute(*arguments)
     return key, found, image(draw(found))
 
 
-def _stepped(cases: Cases) -> tuple[str, Any, Image]:
+def _stepped(cases: Cases) -> tuple[str, Any, bytes]:
     return "stepped", arms.stepped(cases), image(beyond_figures.stepped(cases))
 
 

@@ -26,7 +26,6 @@ from lab.paper.quantities import quantities
 from lab.paper.replay import COLUMNS, TICKS, frames, pack
 from lab.paper.sample import Sample
 from lab.paper.scatter import median
-from lab.paper.svg import data_uri, seen, short_svg
 from lab.paper.symmetry import asymmetry, where_false
 
 CASES = load_cases()
@@ -272,20 +271,3 @@ def test_settling_is_counted_in_swings_too() -> None:
         swept: Any = statements()[key].parts[1]
         judged = swept._replace(values=(), words=("swings",)).judge(CASES, STARTS)
         assert any("in swings" in check.text for check in judged.turned)
-
-
-def test_a_path_loses_no_point_that_is_seen() -> None:
-    x = np.linspace(0.0, 400.0, 4001)
-    line = np.column_stack([x, 50.0 + 40.0 * np.sin(x / 20.0)])
-    kept = seen(line, 0.04)
-    assert kept.sum() < 400
-    drawn = np.interp(x, line[kept, 0], line[kept, 1])
-    assert np.abs(drawn - line[:, 1]).max() <= 0.04 * np.sqrt(5.0)  # across the line, whose slope is up to 2
-    assert seen(line, 0.0).sum() > 4000
-
-
-def test_a_short_svg_has_the_same_picture() -> None:
-    straight = b'<path d="M 0 0 \nL 1 0 \nL 2 0 \nL 2 5.1234 \nz \nM 7 7 \nL 8 9 \n"/>'
-    svg = b'<svg><!-- x -->%s<path d="M 0 0 Q 1.23456 2 3 4 z"/></svg>' % straight
-    assert short_svg(svg) == b'<svg><path d="M0 0l2 0 0 5.12zM7 7l1 2"/><path d="M 0 0 Q 1.23 2 3 4 z"/></svg>'
-    assert data_uri(b'<a b="#c">') == "data:image/svg+xml,%3Ca b='%23c'%3E"
