@@ -151,6 +151,11 @@ def test_arrays_that_numpy_does_not_write_are_refused(
         ("state", np.zeros((5, 6), ">f8")), ("events", np.full((1, 5), 9.0)), ("setting", np.array(-1.0)),
         ("setting", np.array(np.nan)), ("sampled", np.array("yes")), ("work", np.full(4, -1)),
         ("work_names", np.array(["a"] * 4)), ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)),
+        ("state", np.zeros((2, 6))), ("state", np.zeros((5, 5))), ("t", np.zeros((5, 1))), ("t", np.array(0.0)),
+        ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))),
+        ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", np.array("euler")),
+        ("status", np.array("FINE")), ("scene", np.array("title: 5")), ("setting", np.array("fine")),
+        ("setting", np.zeros(2)),
     ],
 )
 def test_numbers_that_no_run_has_are_refused(
