@@ -16,11 +16,11 @@ from markupsafe import Markup
 from grasp_ros.scene.files import writing
 from lab.paper.answer import FIGURE
 from lab.paper.claims import Claim, Verdict
+from lab.paper.equation_table import ALGEBRA, Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
 from lab.paper.results import Result
-from lab.paper.sample import ALGEBRA, Equation
 from lab.studies import pages
 
 Row = tuple[str, ...]

@@ -15,9 +15,8 @@ from lab.oracles.closed_forms import elastic_period
 from lab.paper import arms, beyond, by_hand
 from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, started, with_values
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
-from lab.paper.conditions import condition_rows
 from lab.paper.doubts import doubts
-from lab.paper.equations import equations, form_equations
+from lab.paper.equations import equations, rows_of
 from lab.paper.judgement import judge, statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
@@ -142,11 +141,11 @@ def test_a_border_in_asymmetry_is_named_where_there_is_one() -> None:
 def test_an_equation_written_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each against values written out by hand: V, its rate, its parts, and the entries of P."""
     sample = Sample(CASES[4])
-    right = {row.number for row in (*form_equations([sample]), *condition_rows([sample])) if row.agrees}
+    right = {row.number for row in rows_of([sample]) if row.agrees}
     for name in ("matrix", "level", "rate", "parts"):
         own = getattr(by_hand, name)
         monkeypatch.setattr(by_hand, name, lambda scene, y, own=own: 1.001 * own(scene, y))
-    left = {row.number for row in (*form_equations([sample]), *condition_rows([sample])) if row.agrees}
+    left = {row.number for row in rows_of([sample]) if row.agrees}
     assert right - left >= {"(11)", "(12)", "(16)", "(18)", "(21)", "(23)", "(28)", "(29)"}
 
 
