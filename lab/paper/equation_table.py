@@ -55,7 +55,7 @@ EQUATIONS = {row.number: row for row in (
              "negative H, p that a scene accepts, of 2", 0.0, ALGEBRA),
     Equation("(10)", "contact and noncontact", "physics.model.in_contact",
              "places where the condition and the located events disagree", 0.0),
-    Equation(AT_EVENTS, "touch and release at u = 0", "exact.automaton.modes.make_transitions",
+    Equation(AT_EVENTS, "touch and release at u = 0", "exact.automaton.modes.make_transition",
              "largest |u| at an event, m", 1e-15),
     Equation("(11)", "V = x' P(x) x", "lab.paper.quadratic_form.quadratic_form",
              "x' P x, with P by hand and without, against V, relative", 1e-13, ALGEBRA),
