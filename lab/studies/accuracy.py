@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
@@ -64,16 +65,15 @@ def climb(
     made_by = origin(contender.family)
     for setting in ladder:
         key = f"{scene_key(scene)} {made_by} {contender.name} {setting!r} {effort.budget}"
-        kept = journal.get(key, Record)
-        if kept is None:
-            record = measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
-            journal.put(key, record)
-        else:
-            record = kept._replace(scene=scene.name)
-        records.append(record)
+        record = journal.kept(key, Record, partial(_attempt, contender, scene, setting, journal, effort))
+        records.append(record._replace(scene=scene.name))
         if measure.given_up(record, effort):
             break
     return records
+
+
+def _attempt(contender: Contender, scene: Scene, setting: float, journal: Journal, effort: Effort) -> Record:
+    return measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
 
 
 def frontier(records: Iterable[Record]) -> list[Record]:

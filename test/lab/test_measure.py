@@ -110,7 +110,7 @@ def test_a_study_resumes_and_survives_a_line_cut_short(tmp_path: Path) -> None:
     assert set(calls) == {0.25}
     assert second[:2] == first
     lines = [json.loads(line) for line in path.read_text().splitlines()]
-    assert len(lines) == 3
+    assert len(lines) == 4  # the reference is the first
     assert Journal(tmp_path).get(lines[-1]["key"], Record) == second[2]
 
 
