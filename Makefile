@@ -3,7 +3,8 @@
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
-SLOWER ?= 30%
+BEFORE ?= ../before
+SLOWER ?= 0.3
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 
@@ -53,11 +54,9 @@ study-%: laboratory
 laboratory: install
 	$(BIN)/pip install --quiet -c constraints.txt ".[lab]"
 
-# Saves a result in runs/benchmarks, and fails if the fastest run of a benchmark is slower than in the last one there.
-benchmark: laboratory
-	$(BIN)/pytest lab/benchmarks -W default --benchmark-storage=runs/benchmarks --benchmark-autosave \
-	    --benchmark-columns=min,median,rounds \
-	    $(if $(wildcard runs/benchmarks/*/*.json),--benchmark-compare --benchmark-compare-fail=min:$(SLOWER))
+# Times of this checkout beside those of another one, which fail where one is longer by more than SLOWER.
+benchmark: install
+	$(BIN)/python lab/benchmarks/compare.py $(BEFORE) . --slower $(SLOWER)
 
 # Changes branches, comparisons, operations and numbers of the automaton in turn; a test should fail for each.
 mutants: install

@@ -10,16 +10,11 @@ from functools import partial
 from grasp_ros.cli.main import run
 from grasp_ros.cli.parser import Command
 from grasp_ros.physics.errors import Refused
-from lab.commands import accuracy, graph, proofs
+from lab.commands import COMMANDS
 
 # names of modules of the extra `lab`
 PACKAGES = ("gmpy2", "heyoka", "jinja2", "mpmath", "ruamel", "scipy", "sksundae", "xarray", "zarr")
 ABOUT = "Measure, and print what was measured. Those with --docs write a page; `make study` writes all pages."
-COMMANDS = (
-    proofs.add_paper, proofs.add_domain, accuracy.add_certificate, proofs.add_hard, proofs.add_fuzz,
-    accuracy.add_accuracy, accuracy.add_speed, accuracy.add_derivatives, accuracy.add_effects, accuracy.add_maps,
-    graph.add_graph, graph.add_recorder, graph.add_steering, proofs.add_faults, proofs.add_readers,
-)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,8 +26,8 @@ def _parser() -> argparse.ArgumentParser:
     program = "python -m lab"
     parser = argparse.ArgumentParser(usage=f"{program} NAME [options]", description=ABOUT)
     names = parser.add_subparsers(prog=program, title="studies", required=True, metavar="name, and what")
-    for add in COMMANDS:
-        sub = add(names)
+    for command in COMMANDS:
+        sub = command.add(names)
         sub.set_defaults(command=partial(with_packages, sub.get_default("command")))
     return parser
 

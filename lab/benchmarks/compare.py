@@ -1,6 +1,6 @@
-"""Times of the same runs with several checkouts, side by side: what does a change cost, or gain?
+"""Times of the same runs with several checkouts, side by side: what a change costs, or gains.
 
-    python lab/benchmarks/compare.py CHECKOUT [CHECKOUT ...] [--rounds 5] [--rows REGEX] [--json FILE]
+    python lab/benchmarks/compare.py CHECKOUT [CHECKOUT ...] [--rounds 5] [--rows REGEX] [--slower 0.3] [--json FILE]
 
 Ratios are to the times of the first checkout: below 1 is faster. All run with this interpreter, the scenes of `config/`
 beside this script. In each round every checkout has a fresh process, pinned to one core; they take each row in turn,
@@ -33,6 +33,9 @@ VARIANTS, OFF, ERROR = 4000, 0.02, 1e-6
 LADDER = (1e-6, 3e-7, 1e-7, 3e-8, 1e-8, 3e-9, 1e-9, 3e-10, 1e-10, 3e-11, 1e-11, 3e-12, 1e-12)
 
 
+METHODS = {"paper": 1e-3, "rk4": 1e-3, "rk4_events": 1e-3, "discrete_gradient": 1e-3, "dop853_events": 1e-6}
+
+
 class Row(NamedTuple):
     """What is timed: a scene, how it is run, and on how many cores; a call does `runs` of them."""
 
@@ -46,6 +49,7 @@ CONTINUOUS = ("case_01", "case_02", "case_03", "case_04", "no_contact", "hammer"
 ROWS = {
     **{f"{name}, {how}": Row(name, how) for name in CONTINUOUS for how in ("last, 1e-9", "last, finest", "outputs")},
     **{f"{name}, sampled": Row(name, "sampled") for name in ("case_01", "noise", "everything")},
+    **{f"case_01, {method}": Row("case_01", method) for method in METHODS},
     "ensemble, one core": Row("case_01", "ensemble", 1, VARIANTS),
     "ensemble, two cores": Row("case_01", "ensemble", 2, VARIANTS),
 }
@@ -72,6 +76,7 @@ def prepare(row: Row) -> tuple[Callable[[], Any], Measured]:
     ways: dict[str, dict[str, Any]] = {
         "last, 1e-9": {"grid": end, "accuracy": 1e-9}, "last, finest": {"grid": end, "accuracy": FINEST},
         "outputs": {"grid": grid, "accuracy": FINEST}, "sampled": {"sampled": True},
+        **{method: {"method": method, "setting": setting} for method, setting in METHODS.items()},
     }
     if row.how in ways:
         run = partial(simulate, scene, **ways[row.how])
@@ -187,6 +192,8 @@ def main() -> None:
     parser.add_argument("checkouts", nargs="+", type=lambda text: Path(text).resolve(), metavar="CHECKOUT")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--rows", type=re.compile, default=re.compile(""), metavar="REGEX")
+    parser.add_argument("--slower", type=float, default=math.inf, metavar="PART",
+                        help="fail if a row's least time is longer than the first checkout's by more than this part")
     parser.add_argument("--json", type=Path, metavar="FILE", help="what each round gave, and the table")
     parser.add_argument("--work", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -202,6 +209,10 @@ def main() -> None:
     if options.json:
         record = {"checkouts": [checkout.name for checkout in checkouts], "table": table, "rounds": rounds}
         options.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    slow = [name for name, row in table.items()
+            if any(told.get("ratio, minimum", 0.0) > 1.0 + options.slower for told in row)]
+    if slow:
+        sys.exit(f"slower by more than {options.slower:.0%}: {'; '.join(slow)}")
 
 
 if __name__ == "__main__":

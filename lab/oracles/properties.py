@@ -19,7 +19,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from lab.cases.case import Product, Unfinished
 from lab.oracles.motion import ledgers
-from lab.oracles.related_runs import FALLS, mirror, short_periods, units
+from lab.oracles.related_runs import mirror, units
 from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.rounding_bounds import DIED_OUT
@@ -30,7 +30,7 @@ MOST_WORK = 100_000  # of a run
 CHEAP = 3_000  # work beyond which the relations that need more runs are left out
 OUTPUTS, ROUNDS = 201, 4  # of a run that stalls
 LIMIT = 100.0  # units of rounding
-SPLIT, SHORT = 4, 50  # every how many scenes a run is started anew, and compared with short control periods
+SPLIT = 4  # every how many scenes a run is started anew, and run backwards
 
 
 class Check(NamedTuple):
@@ -133,7 +133,6 @@ def _related_runs(close: Detail, first: Trajectory, product: Product, every: boo
         (1, partial(units, first, product, _smallest(close.run)), 0.0),
         (SPLIT, partial(splitting, close, part * SPLIT % 1.0, product), LIMIT),
         (SPLIT, partial(reversal, first, product), LIMIT),
-        (SHORT, partial(short_periods, first, product), FALLS),
     ]
     if compare:
         relations.append((1, partial(digits, first, product), LIMIT))

@@ -12,7 +12,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.losses import losses
 from lab.paper.cases import STANDARD, Cases, Start, started, with_values
-from lab.paper.measures import Wish, over
+from lab.paper.measures import over
 from lab.paper.motion import contacts_found, first_contact_error, without_object
 from lab.paper.scatter import Median, median
 
@@ -32,12 +32,6 @@ class Stiffer(NamedTuple):
     speed: float  # m/s, root mean square speed of approach at a touch
     share: float  # of the energy lost within 20 s: by impacts
     starts: int
-
-
-def wishes(cases: Cases, starts: Sequence[Start]) -> list[Wish]:
-    """The settling times behind `stiffer` and `damped`."""
-    scenes = [*_of_stiffness(cases).values(), *_of_damping(cases).values()]
-    return [Wish(each, tuple(starts), "settling") for scene in scenes for each in (scene, without_object(scene))]
 
 
 def _of_stiffness(cases: Cases) -> dict[float, Scene]:

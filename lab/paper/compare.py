@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.claims import HALF, Check, Kind, Part, almost_all
-from lab.paper.measures import MARGIN, NAMES, UNITS, Wish, near, over, ratio, seconds
+from lab.paper.measures import MARGIN, NAMES, UNITS, near, over, ratio, seconds
 from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
 
@@ -83,26 +83,9 @@ class Comparison(NamedTuple):
         """Whether a ratio is so by whatever amount."""
         return found > 1.0 if self.higher else found < 1.0
 
-    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[Wish]:
-        """All that `judge` measures."""
-        for pair in self.decisive:
-            scenes = [each.scene(cases) for each in pair]
-            read = (*ALIKE, *read_starts(*scenes).values())
-            for scene in scenes:
-                for start in (start_of(scene), *read):
-                    yield Wish(scene, self._several(start), self.measure)
-                yield Wish(scene, tuple(starts), self.measure)
-        for word in self.words:
-            yield from (Wish(each.scene(cases), tuple(starts), word) for each in (self.changed, self.other))
-        yield from (Wish(scene, tuple(starts), self.measure) for scene in self._swept(cases))
-
     def _several(self, start: Start) -> tuple[Start, ...]:
         """Where a scene is measured from in place of one start: of times from all that cannot be told apart."""
         return near(start) if self.measure == "settling" else (start,)
-
-    def _swept(self, cases: Cases) -> list[Scene]:
-        other = self.other.scene(cases)
-        return [with_values(other, {self.letter: value}) for value in self.values]
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Measure and check."""
@@ -210,11 +193,11 @@ class Comparison(NamedTuple):
         """Value of the parameter and median ratio, over the sweep."""
         if not self.values:
             return []
-        before = over(self.other.scene(cases), starts, self.measure)
-        return [
-            (value, median([ratio(a, b) for a, b in zip(over(scene, starts, self.measure), before, strict=True)]))
-            for value, scene in zip(self.values, self._swept(cases), strict=True)
-        ]
+        other = self.other.scene(cases)
+        before = over(other, starts, self.measure)
+        swept = {value: over(with_values(other, {self.letter: value}), starts, self.measure) for value in self.values}
+        return [(value, median([ratio(a, b) for a, b in zip(found, before, strict=True)]))
+                for value, found in swept.items()]
 
 
 def _range(found: Sequence[float]) -> str:

@@ -9,27 +9,22 @@ from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
 from lab.paper import by_hand, quadratic_form
-from lab.paper.sample import ALGEBRA, Equation, Sample
-
-DRAWS = 4000  # random states at which positivity is looked at
-V_FUNCTION, RATE = "physics.energy.energy, V", "physics.energy.energy, V_rate"
+from lab.paper.equation_table import DRAWS
+from lab.paper.sample import Sample
 
 
-def condition_rows(samples: list[Sample]) -> list[Equation]:
+def condition_rows(samples: list[Sample]) -> dict[str, float]:
     """(16) to (37)."""
-    return [
-        *_condition(samples, Mode.BOTH, ("(16)", "(17)", "(18)", "(20)"), "both in contact"),
-        _constant(samples, "(19)"),
-        *_condition(samples, Mode.LEFT, ("(21)", "(22)", "(23)", "(25)"), "left in contact"),
-        _constant(samples, "(24)"),
-        *_condition(samples, Mode.RIGHT, ("", "(26)", "", "(27)"), "right in contact"),
-        *_flight(samples),
-        *_enclosure(samples),
-    ]
+    constant = _constant(samples)
+    return {
+        **_condition(samples, Mode.BOTH, ("(16)", "(17)", "(18)", "(20)")), "(19)": constant,
+        **_condition(samples, Mode.LEFT, ("(21)", "(22)", "(23)", "(25)")), "(24)": constant,
+        **_condition(samples, Mode.RIGHT, ("", "(26)", "", "(27)")), **_flight(samples), **_enclosure(samples),
+    }
 
 
-def _condition(samples: list[Sample], mode: Mode, numbers: tuple[str, str, str, str], text: str) -> list[Equation]:
-    """V, its sign, its rate and the sign of its rate in one condition of contact; empty numbers are left out."""
+def _condition(samples: list[Sample], mode: Mode, numbers: tuple[str, ...]) -> dict[str, float]:
+    """V, its sign, its rate and the sign of its rate in one condition of contact; an empty number is not printed."""
     value, rate, highest = 0.0, 0.0, -np.inf
     for sample in samples:
         here = sample.where(mode)
@@ -43,37 +38,8 @@ def _condition(samples: list[Sample], mode: Mode, numbers: tuple[str, str, str, 
             rate = max(rate, float(np.abs(sample.V_rate[here] - stated).max()) / scale)
             rate = max(rate, float(np.abs(sample.level.V_rate[here] - stated).max()) / scale)
             highest = max(highest, float(sample.level.V_rate[here].max()))
-    rows = (
-        Equation(
-            numbers[0],
-            f"V, {text}",
-            f"physics.lyapunov.parts; {V_FUNCTION}",
-            "V and the sum of its parts against the printed sum by hand, relative",
-            value,
-            1e-14,
-            by=ALGEBRA,
-        ),
-        Equation(
-            numbers[1],
-            f"V > 0 for x != 0, {text}",
-            V_FUNCTION,
-            f"smallest V / x'x of {DRAWS} random states in m and m/s",
-            _smallest(samples[0], mode),
-            0.0,
-            margin=True,
-            by=ALGEBRA,
-        ),
-        Equation(
-            numbers[2],
-            f"V', {text}",
-            RATE,
-            "V differentiated, and V_rate, against the printed rate by hand, in the largest rate",
-            rate,
-            1e-7,
-        ),
-        Equation(numbers[3], f"V' <= 0, {text}", RATE, "largest rate, W", highest, 0.0),
-    )
-    return [row for row in rows if row.number]
+    found = zip(numbers, (value, _smallest(samples[0], mode), rate, highest), strict=True)
+    return {number: each for number, each in found if number}
 
 
 def _smallest(sample: Sample, mode: Mode) -> float:
@@ -86,7 +52,7 @@ def _smallest(sample: Sample, mode: Mode) -> float:
     return float((level.V[here] / (states[here] ** 2).sum(axis=1)).min())
 
 
-def _constant(samples: list[Sample], number: str) -> Equation:
+def _constant(samples: list[Sample]) -> float:
     """The a that makes V' a sum of losses, from the motion: V' + 2 C v^2 + ... = ((5/2) a - 2) H u^(3/2) u'."""
     above, below = 0.0, 0.0
     for sample in samples:
@@ -98,17 +64,10 @@ def _constant(samples: list[Sample], number: str) -> Equation:
             alone = sample.where(Mode.LEFT if side == LEFT else Mode.RIGHT)
             slope = 2.5 * sample.system.pairs[side, 0] * np.maximum(u, 0.0)[alone] ** 1.5 * d[alone]
             above, below = above + float(slope @ without[alone]), below + float(slope @ slope)
-    return Equation(
-        number,
-        "a = b = 4/5",
-        "lab.paper.quadratic_form.A",
-        "a fitted to the motion, its distance from 4/5",
-        abs(above / below),
-        1e-8,
-    )
+    return abs(above / below)
 
 
-def _flight(samples: list[Sample]) -> list[Equation]:
+def _flight(samples: list[Sample]) -> dict[str, float]:
     """(28) to (34)."""
     total, rates, apart = 0.0, np.zeros(3), 0.0
     for sample in samples:
@@ -124,39 +83,9 @@ def _flight(samples: list[Sample]) -> list[Equation]:
         for row, (part, body, column) in enumerate(((stencils.V_l, 0, 1), (stencils.V_r, 1, 5), (stencils.V_o, 2, 3))):
             stated = -2.0 * damping[body] * sample.state[here, column] ** 2
             rates[row] = max(rates[row], float(np.abs(sample.differentiated(part) - stated).max()) / scale)
-    function = "physics.lyapunov.parts"
-    rate = "differentiated against -2 C x'^2, in the largest V'"
-    return [
-        Equation("(28)", "V, none in contact", V_FUNCTION, "V against V_l + V_o + V_r by hand, relative", total, 1e-14,
-                 by=ALGEBRA),
-        Equation(
-            "(29)", "V_l, V_o, V_r", function, "each against its printed terms by hand, in V", apart, 1e-15,
-            by=ALGEBRA,
-        ),
-        Equation(
-            "(30)",
-            "V_l > 0 but at rest in 0",
-            function,
-            f"smallest V_l / (x_l^2 + x_l'^2) of {DRAWS} states in m and m/s",
-            _smallest_part(samples[0], 0),
-            0.0,
-            margin=True,
-            by=ALGEBRA,
-        ),
-        Equation("(31)", "V_l'", function, rate, float(rates[0]), 1e-8),
-        Equation("(32)", "V_r', as on the left", function, rate, float(rates[1]), 1e-8),
-        Equation(
-            "(33)",
-            "V_o > 0 but at rest anywhere",
-            function,
-            f"smallest V_o / x_o'^2 of {DRAWS} states in m/s",
-            _smallest_part(samples[0], 1),
-            0.0,
-            margin=True,
-            by=ALGEBRA,
-        ),
-        Equation("(34)", "V_o' = 0", function, "V_o differentiated, in the largest V'", float(rates[2]), 1e-8),
-    ]
+    left, right, thing = rates.tolist()
+    return {"(28)": total, "(29)": apart, "(30)": _smallest_part(samples[0], 0), "(31)": left, "(32)": right,
+            "(33)": _smallest_part(samples[0], 1), "(34)": thing}
 
 
 def _smallest_part(sample: Sample, part: int) -> float:
@@ -167,7 +96,7 @@ def _smallest_part(sample: Sample, part: int) -> float:
     return float((found / (states[:, columns] ** 2).sum(axis=1)).min())
 
 
-def _enclosure(samples: list[Sample]) -> list[Equation]:
+def _enclosure(samples: list[Sample]) -> dict[str, float]:
     """(35) to (37)."""
     bound, margin = np.full(2, np.inf), np.inf
     for sample in samples:
@@ -177,34 +106,4 @@ def _enclosure(samples: list[Sample]) -> list[Equation]:
         bound = np.minimum(bound, allowed / epsilon)
         x_l, x_o, x_r = run.state[:, 0], run.state[:, 2], run.state[:, 4]
         margin = min(margin, float((x_o - x_l + allowed[LEFT]).min()), float((x_r + allowed[RIGHT] - x_o).min()))
-    function = "physics.lyapunov.largest_deformation, lab.paper.quadratic_form.deformation_bound"
-    text = "smallest of (5 V_c(0) / 4H)^(2/5) over the largest deformation, less 1"
-    return [
-        Equation(
-            "(35)",
-            "the left deformation is limited by eps_l",
-            function,
-            text,
-            float(bound[LEFT]) - 1.0,
-            0.0,
-            margin=True,
-        ),
-        Equation(
-            "(36)",
-            "the right deformation is limited by eps_r",
-            function,
-            text,
-            float(bound[RIGHT]) - 1.0,
-            0.0,
-            margin=True,
-        ),
-        Equation(
-            "(37)",
-            "x_l - eps_l < x_o < x_r + eps_r",
-            function,
-            "smallest clearance, eps from V_c(0), m",
-            margin,
-            0.0,
-            margin=True,
-        ),
-    ]
+    return {"(35)": float(bound[LEFT]) - 1.0, "(36)": float(bound[RIGHT]) - 1.0, "(37)": margin}

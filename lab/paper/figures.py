@@ -56,10 +56,9 @@ def _fine(scene: Scene) -> Trajectory:
 
 
 def style() -> dict[str, object]:
-    """Letters, lines, and text as paths: the same picture everywhere."""
+    """Letters and lines of a page in print."""
     return {
         "font.size": 7.0, "axes.titlepad": 3.0, "axes.labelpad": 2.0, "axes.linewidth": 0.6, "lines.linewidth": 0.9,
-        "svg.fonttype": "path", "svg.hashsalt": "grasp",
     }
 
 

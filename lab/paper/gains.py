@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from functools import partial
 
 from grasp_ros.scene import Scene
 from lab.paper.cases import STANDARD, Cases, Start, started, value_of
 from lab.paper.compare import Comparison, Variant
-from lab.paper.measures import MARGIN, Wish, measure, ratio
+from lab.paper.measures import MARGIN, measure, ratio
 from lab.paper.properties import SETTLING, tenfold, wide
 from lab.paper.universal import Found, Share
 
@@ -39,10 +38,6 @@ def _gain_matters(number: int, cases: Cases, start: Start) -> Found:
     return Found(change, change > MARGIN)
 
 
-def _both(number: int, cases: Cases, start: Start) -> Iterator[Wish]:
-    yield from (Wish(cases[each], (start,), name) for each in (number, STANDARD) for name in CHANGED)
-
-
 def any_gain() -> tuple[Share, ...]:
     """Observation (9)."""
     return tuple(
@@ -54,7 +49,6 @@ def any_gain() -> tuple[Share, ...]:
             (number, STANDARD),
             letter=letter,
             values=tenfold(standard),
-            measured=partial(_both, number),
         )
         for number, letter, standard in ((9, "Kp", 5.0), (10, "Kv", 0.5))
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,19 +56,8 @@ SHORT: Mapping[str, str] = {  # ratios, where there is little room
 }
 
 
-class Wish(NamedTuple):
-    """A measure of a scene from some starts: what is to be known before a statement is judged."""
-
-    scene: Scene
-    starts: tuple[Start, ...]
-    name: str  # in NAMES
-
-
-Key = tuple[str, str]  # a scene by its numbers but for its start, and what is measured in one run
-Known = dict[Key, dict[Start, Any]]
-
 _MOTION = "motion"
-_KNOWN: Known = {}
+_KNOWN: dict[tuple[str, str], dict[Start, Any]] = {}  # by a scene but for its start, and what one run measures
 
 
 def over(scene: Scene, starts: Sequence[Start], name: str) -> list[float]:
@@ -79,10 +68,11 @@ def over(scene: Scene, starts: Sequence[Start], name: str) -> list[float]:
     RuntimeError
         If a run does not reach its end.
     """
-    known = _KNOWN.setdefault(key_of(scene, name), {})
+    kind = "settling" if name == "swings" else _MOTION if name in Motion._fields else name
+    known = _KNOWN.setdefault((text_of(scene, start=False), kind), {})
     missing = [start for start in dict.fromkeys(starts) if start not in known]
     if missing:
-        known.update(zip(missing, _measured(scene, missing, _kind(name)), strict=True))
+        known.update(zip(missing, _measured(scene, missing, kind), strict=True))
     found = [known[start] for start in starts]
     if name == "swings":
         return [time / _period(scene) for time in found]
@@ -94,39 +84,12 @@ def measure(scene: Scene, name: str) -> float:
     return over(scene, [start_of(scene)], name)[0]
 
 
-def key_of(scene: Scene, name: str) -> Key:
-    """What is remembered of a scene under the name of a measure."""
-    return text_of(scene, start=False), _kind(name)
-
-
-def remember(known: Known) -> None:
-    """Take what other processes have measured."""
-    for key, found in known.items():
-        _KNOWN.setdefault(key, {}).update(found)
-
-
-def found_of(wishes: Iterable[Wish]) -> Known:
-    """Measure, or remember, what is wished."""
-    found: Known = {}
-    for scene, starts, name in wishes:
-        over(scene, starts, name)
-        known = _KNOWN[key := key_of(scene, name)]
-        found.setdefault(key, {}).update((start, known[start]) for start in starts)
-    return found
-
-
-def _kind(name: str) -> str:
-    if name == "swings":
-        return "settling"
-    return _MOTION if name in Motion._fields else name
-
-
 def _measured(scene: Scene, starts: Sequence[Start], kind: str) -> Sequence[Any]:
     if kind == _MOTION:
         return [_motion(started(scene, start)) for start in starts]
     outcome, bound = ("settling_time", BOUNDS[kind]) if kind in BOUNDS else ("peak_input", SETTLED)
     rows = {key: values for key, values in columns_of(starts).items() if key.split(".")[0] in scene.values}
-    found = ensemble(scene, rows, (outcome,), setup=Setup(horizons=HORIZONS, settled=bound), threads=1)
+    found = ensemble(scene, rows, (outcome,), setup=Setup(horizons=HORIZONS, settled=bound))
     if not found.done.all():
         raise RuntimeError(f"{scene.name}: {next(iter(found.stops.values()))}")
     return [float(value) for value in np.max([*found.columns.values()], axis=0)]

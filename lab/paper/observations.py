@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from grasp_ros import scene as scenes
@@ -11,7 +11,6 @@ from lab.paper import gains, motion, properties
 from lab.paper.cases import PRINTED, READ_STARTS, Cases, Start, started, with_values
 from lab.paper.claims import Check, Kind, Part
 from lab.paper.compare import Comparison, Variant
-from lab.paper.measures import Wish, near
 from lab.paper.properties import SETTLING
 from lab.paper.statement import Judged, Statement
 from lab.paper.universal import Found, Share, Universal
@@ -36,15 +35,8 @@ def _without_own_springs(cases: Cases) -> Scene:
 
 
 def _marginal_settles(cases: Cases, start: Start) -> Found:
-    return (motion.converges_wherever if _named(start) else motion.converges)(started(cases[3], start))
-
-
-def _marginal(cases: Cases, start: Start) -> Iterator[Wish]:
-    yield Wish(cases[3], near(start) if _named(start) else (start,), "settling")
-
-
-def _named(start: Start) -> bool:
-    return start == PRINTED or start in READ_STARTS.values()
+    named = start == PRINTED or start in READ_STARTS.values()
+    return (motion.converges_wherever if named else motion.converges)(started(cases[3], start))
 
 
 def observations() -> list[Statement]:
@@ -87,7 +79,6 @@ def _one() -> tuple[Comparison | Universal | Share, ...]:
             " s",
             letter="p",
             values=(0.3, 1.0, 3.0),
-            measured=_marginal,
         ),
         Universal(
             "Lyapunov's function agrees: V never rises in No. 3.",
@@ -121,10 +112,6 @@ class Gripped(NamedTuple):
     """That a grasp is possible: whether the arms press the object in the paper's cases, and with another set-point."""
 
     values: tuple[float, ...] = ()  # nothing is swept
-
-    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterable[Wish]:
-        """None: its runs are few."""
-        return ()
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """In the cases that settle, as T9, and where the set-points overlap."""

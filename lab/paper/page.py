@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -15,12 +16,11 @@ from markupsafe import Markup
 from grasp_ros.scene.files import writing
 from lab.paper.answer import FIGURE
 from lab.paper.claims import Claim, Verdict
+from lab.paper.equation_table import ALGEBRA, Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
 from lab.paper.results import Result
-from lab.paper.sample import ALGEBRA, Equation
-from lab.paper.svg import data_uri
 from lab.studies import pages
 
 Row = tuple[str, ...]
@@ -36,13 +36,6 @@ class Picture(NamedTuple):
     caption: str
     readings: Sequence[str]
     compared: Compared  # with the print
-
-
-class Image(NamedTuple):
-    """A figure in both forms."""
-
-    svg: bytes
-    png: bytes
 
 
 class Report(NamedTuple):
@@ -65,7 +58,7 @@ class Report(NamedTuple):
     doubts: Sequence[tuple[str, str]]
     replays: Sequence[dict[str, Any]]
     origin: str
-    images: Mapping[str, Image]
+    images: Mapping[str, bytes]  # PNG
 
 
 def template(name: str) -> str:
@@ -90,8 +83,8 @@ def write_html(report: Report, path: Path) -> None:
         css=Markup(template("page.css")),
         js=Markup(template("replay.js")),
         runs=Markup(runs),
-        model=_figure(template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
-        figure=lambda key, text: _figure(report.images[key].svg, text),
+        model=_figure("svg+xml", template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
+        figure=lambda key, text: _figure("png", report.images[key], text),
         beside=FIGURE,
         printed=PRINTED,
         signs=SIGNS,
@@ -115,7 +108,7 @@ def write_markdown(report: Report, path: Path) -> None:
     with writing(directory):
         directory.mkdir(parents=True, exist_ok=True)
         for key, image in report.images.items():
-            (directory / f"{key}.png").write_bytes(image.png)
+            (directory / f"{key}.png").write_bytes(image)
         (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
     text = environment.from_string(template("paper.md")).render(
         report=report, beside=FIGURE, printed=PRINTED, signs=SIGNS, told=told)
@@ -150,11 +143,10 @@ def _told(claims: Sequence[Claim]) -> dict[str, str]:
     return {part.statement: claim.key for claim in reversed(claims) for part in claim.parts}
 
 
-def _figure(svg: bytes, text: str) -> Markup:
-    """An image with its caption."""
-    text = text.rstrip(".")
-    form = Markup('<figure><img alt="{0}" src="{1}"><figcaption>{0}.</figcaption></figure>')
-    return form.format(text, Markup(data_uri(svg)))
+def _figure(kind: str, image: bytes, text: str) -> Markup:
+    """An image within the page, and its caption."""
+    form = Markup('<figure><img alt="{0}" src="data:image/{1};base64,{2}"><figcaption>{0}.</figcaption></figure>')
+    return form.format(text.rstrip("."), kind, base64.b64encode(image).decode("ascii"))
 
 
 def _cell(text: str) -> str:

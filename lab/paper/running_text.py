@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import partial
 
 from grasp_ros import scene as scenes
@@ -10,7 +9,7 @@ from grasp_ros.scene import Scene
 from lab.paper import motion
 from lab.paper.cases import NUMBERS, Cases, Start
 from lab.paper.compare import Comparison, Variant
-from lab.paper.measures import MARGIN, Wish
+from lab.paper.measures import MARGIN
 from lab.paper.method_text import method_text
 from lab.paper.observations import DAMPED, LOSSY_IMPACTS
 from lab.paper.statement import Statement
@@ -35,14 +34,8 @@ def _alone(number: int) -> Share:
         starts=EVERY,
         letter="p",
         values=(0.0, 1.0, 10.0),
-        measured=partial(_both, number),
         reading=True,
     )
-
-
-def _both(number: int, cases: Cases, start: Start) -> Iterator[Wish]:
-    for scene in (cases[number], motion.without_object(cases[number])):
-        yield Wish(scene, (start,), "settling")
 
 
 def _with_loss() -> Comparison:

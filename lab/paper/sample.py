@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,27 +16,6 @@ from grasp_ros.simulation import simulate
 STEP = 2e-4  # s, of the differences
 STENCIL = np.array([1.0 / 280.0, -4.0 / 105.0, 0.2, -0.8, 0.0, 0.8, -0.2, 4.0 / 105.0, -1.0 / 280.0])  # order 8
 PLACES = 12  # in each stretch between two events
-
-
-ALGEBRA = "algebra"  # two ways to write the same function of a state: wrong code breaks the row, and no motion does
-
-
-class Equation(NamedTuple):
-    """One row: equation, what it says, the function that states it, what was compared, and the number found."""
-
-    number: str
-    says: str
-    function: str
-    compared: str
-    found: float
-    allowed: float  # the number must not exceed it; or, for a margin, not fall below 0
-    margin: bool = False
-    by: str = "motion"  # what could break it: a motion, or ALGEBRA alone
-
-    @property
-    def agrees(self) -> bool:
-        """Whether the number is as it must be."""
-        return self.found > 0.0 if self.margin else self.found <= self.allowed
 
 
 class Sample:

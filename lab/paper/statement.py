@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 from lab.paper.cases import Cases, Start
 from lab.paper.claims import Claim, Part
-from lab.paper.measures import Wish
 
 
 class Judged(Protocol):
     """A part that can be judged: `Comparison`, `Universal` or `Share`."""
-
-    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterable[Wish]:
-        """What it will measure, for several processes to measure it first."""
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Measure and check."""
@@ -30,8 +26,4 @@ class Statement(NamedTuple):
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Claim:
         """Judge all parts."""
-        return self.claim([part.judge(cases, starts) for part in self.parts])
-
-    def claim(self, parts: Sequence[Part]) -> Claim:
-        """The judgement, put together of that of its parts."""
-        return Claim(self.key, self.where, self.statement, parts)
+        return Claim(self.key, self.where, self.statement, [part.judge(cases, starts) for part in self.parts])

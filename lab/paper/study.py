@@ -7,7 +7,6 @@ import multiprocessing
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from itertools import chain
 from typing import Any
 
 import PIL.Image
@@ -35,56 +34,48 @@ from lab.paper.compare import Comparison, Variant
 from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
-from lab.paper.judgement import claims_of, judged, pieces, statements, wishes_of
+from lab.paper.judgement import statements
 from lab.paper.knife_edge import knife_edge
-from lab.paper.measures import SHORT, Known, found_of, remember
-from lab.paper.page import Image, Picture, Report, agreement, summary
+from lab.paper.measures import SHORT
+from lab.paper.page import Picture, Report, agreement, summary
 from lab.paper.prints import compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import replay
 from lab.paper.results import Beyond, results
-from lab.paper.svg import short_svg
 
 DPI = 220
 COLORS = 256  # of a PNG file
-Job = tuple[str, Callable[..., Any], tuple[Any, ...], Known]  # what comes out, how, of what, and what is known
+Job = tuple[str, Callable[..., Any], tuple[Any, ...]]  # what comes out, how, and of what
 
 
 def report(starts: int) -> Report:
     """Compute everything, with so many random starts."""
     cases, drawn = load_cases(), random_starts(starts)
-    wishes = wishes_of(cases, drawn)
-    wanted = pieces([*chain.from_iterable(wishes), *arms.wishes(cases, drawn)])
+    known, jobs = statements(), _jobs(cases, drawn)
+    claims: list[Claim] = []
+    done: dict[str, list[Any]] = {}
     context = multiprocessing.get_context("spawn")
-    with context.Pool(os.cpu_count() or 1) as pool, tqdm(
-        total=len(wanted), desc="random starts and sweeps", file=sys.stderr
-    ) as bar:
-        for found in pool.imap_unordered(found_of, wanted):
-            remember(found)
+    with context.Pool(os.cpu_count() or 1) as pool, tqdm(total=len(known) + len(jobs), file=sys.stderr) as bar:
+        drawing = pool.imap_unordered(_called, jobs)
+        for each in known.values():  # here: what one measures the next one remembers
+            bar.set_description(f"random starts and sweeps of {each.key}")
+            claims.append(each.judge(cases, drawn))
             bar.update()
-        jobs: list[Job] = [
-            *_jobs(cases, drawn),
-            *(("part", judged, (place, cases, drawn), found_of(own)) for place, own in enumerate(wishes)),
-        ]
-        bar.reset(len(jobs))
-        bar.set_description("figures, verdicts, what the paper lacks")
-        done: dict[str, list[Any]] = {}
-        for key, value in pool.imap_unordered(_called, jobs):
+        bar.set_description("figures, what the paper lacks")
+        for key, value in drawing:
             done.setdefault(key, []).append(value)
             bar.update()
-    return _put_together(cases, drawn, done)
+    return _put_together(cases, claims, len(drawn), done)
 
 
 def _called(job: Job) -> tuple[str, Any]:
-    key, function, arguments, known = job
-    remember(known)
+    key, function, arguments = job
     return key, function(*arguments)
 
 
 def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
     """What can be computed at the same time, the longest first."""
-    settled = found_of(arms.wishes(cases, drawn))
-    several: list[tuple[str, Callable[..., Any], tuple[Any, ...]]] = [
+    return [
         ("found", _further, ("chaos", beyond.chaos, (cases, started(cases[2], SYMMETRIC)), beyond_figures.chaos)),
         ("found", _further, ("stiffer", arms.stiffer, (cases, drawn), beyond_figures.stiffer)),
         ("found", _further, ("damped", arms.damped, (cases, drawn), beyond_figures.damped)),
@@ -99,48 +90,36 @@ def _jobs(cases: Cases, drawn: list[Start]) -> list[Job]:
         ("doubts", doubts, (cases,)),
         ("replays", _replays, (cases,)),
     ]
-    return [(*job, settled) for job in several]
 
 
-def image(drawing: Any) -> Image:
-    """A figure as SVG and as PNG."""
-    files = []
-    for kind in ("svg", "png"):
-        file = io.BytesIO()
-        metadata = {"Date": None} if kind == "svg" else {"Software": None}
-        with canvas.style(figures.style()):
-            drawing.savefig(file, format=kind, dpi=DPI, metadata=metadata)
-        drawing.set_layout_engine("none")  # what the first has laid out stays
-        files.append(file)
-    return Image(short_svg(files[0].getvalue()), _few_colors(files[1]))
-
-
-def _few_colors(png: io.BytesIO) -> bytes:
-    """A PNG file with a palette, which is a third as large."""
-    small = io.BytesIO()
-    with PIL.Image.open(png) as picture:
+def image(drawing: Any) -> bytes:
+    """A figure as a PNG file with a palette, which is a third as large."""
+    large, small = io.BytesIO(), io.BytesIO()
+    with canvas.style(figures.style()):
+        drawing.savefig(large, format="png", dpi=DPI)
+    with PIL.Image.open(large) as picture:
         few = picture.convert("RGB").quantize(COLORS, PIL.Image.Quantize.FASTOCTREE, dither=PIL.Image.Dither.NONE)
         few.save(small, format="png", optimize=True)
     return small.getvalue()
 
 
-def _sheet(cases: Cases) -> tuple[str, Image]:
+def _sheet(cases: Cases) -> tuple[str, bytes]:
     return "sheet", image(figures.sheet([figures.pictured(figure, cases) for figure in FIGURES]))
 
 
-def _large(figure: Figure, cases: Cases) -> tuple[str, Image]:
+def _large(figure: Figure, cases: Cases) -> tuple[str, bytes]:
     return f"fig_{figure.number:02d}", image(figures.large(figures.pictured(figure, cases)))
 
 
 def _further(
     key: str, compute: Callable[..., Any], arguments: tuple[Any, ...], draw: Callable[[Any], Any]
-) -> tuple[str, Any, Image]:
+) -> tuple[str, Any, bytes]:
     """What the paper lacks, and its figure."""
     found = compute(*arguments)
     return key, found, image(draw(found))
 
 
-def _stepped(cases: Cases) -> tuple[str, Any, Image]:
+def _stepped(cases: Cases) -> tuple[str, Any, bytes]:
     return "stepped", arms.stepped(cases), image(beyond_figures.stepped(cases))
 
 
@@ -189,8 +168,7 @@ def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]
     return found
 
 
-def _put_together(cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]]) -> Report:
-    claims = claims_of(dict(done["part"]))
+def _put_together(cases: Cases, claims: list[Claim], starts: int, done: Mapping[str, list[Any]]) -> Report:
     found = {key: value for key, value, _ in done["found"]}
     images = {**dict(done["image"]), **{key: each for key, _, each in done["found"]}}
     images["sweeps"] = image(beyond_figures.sweeps(_curves(cases, claims)))
@@ -200,7 +178,7 @@ def _put_together(cases: Cases, drawn: list[Start], done: Mapping[str, list[Any]
     heads, amounts = heads_and_rows
     further = Beyond(**found)
     return Report(
-        title=TITLE, subtitle=SUBTITLE, answer=answer(claims, further), definitions=definitions(len(drawn)),
+        title=TITLE, subtitle=SUBTITLE, answer=answer(claims, further), definitions=definitions(starts),
         summary=summary(claims), claims=claims,
         sweeps=SWEEPS, pictures=[picture(figure, cases, claims) for figure in FIGURES], quantity_heads=heads,
         quantities=amounts, prints=PRINTS, agreement=agreement(rows), equations=rows, results=results(further),

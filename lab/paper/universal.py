@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from grasp_ros.scene import Scene
@@ -19,7 +19,6 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.claims import Check, Kind, Part, almost_all
-from lab.paper.measures import Wish
 
 FEW = 20  # random starts of each case
 FEWER = 10  # of each value of a sweep
@@ -52,10 +51,6 @@ class Universal(NamedTuple):
     unit: str = ""
     base: int = STANDARD  # the case that the sweep begins from
     reading: bool = False
-
-    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterable[Wish]:
-        """None: the tests are quick."""
-        return ()
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Test and check."""
@@ -121,24 +116,7 @@ class Share(NamedTuple):
     starts: int = 2 * FEW  # at most
     letter: str = ""  # swept in the first of the cases
     values: tuple[float, ...] = ()
-    measured: Callable[[Cases, Start], Iterable[Wish]] = lambda cases, start: ()
     reading: bool = False
-
-    def _changed(self, cases: Cases) -> list[tuple[float, Cases]]:
-        """The sweep."""
-        number = self.of[0]
-        return [(value, {**cases, number: with_values(cases[number], {self.letter: value})}) for value in self.values]
-
-    def _read(self, cases: Cases) -> dict[str, Start]:
-        return read_starts(*(cases[number] for number in self.of))
-
-    def wishes(self, cases: Cases, starts: Sequence[Start]) -> Iterator[Wish]:
-        """Those of `measured`."""
-        for start in (PRINTED, *self._read(cases).values(), *starts[: self.starts]):
-            yield from self.measured(cases, start)
-        for _, changed in self._changed(cases):
-            for start in starts[:FEWER]:
-                yield from self.measured(changed, start)
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Test and check."""
@@ -146,11 +124,13 @@ class Share(NamedTuple):
         checks = [Check(Kind.PRINTED, "from the printed start", self._text(own), float(own.holds), own.holds)]
         drawn = [self.test(cases, start) for start in starts[: self.starts]]
         checks.append(self._many(Kind.RANDOM, f"seed {SEED}", drawn))
-        for value, changed in self._changed(cases):
+        first = self.of[0]
+        for value in self.values:
+            changed = {**cases, first: with_values(cases[first], {self.letter: value})}
             found = [self.test(changed, start) for start in starts[:FEWER]]
-            text = f"No. {self.of[0]} with {self.letter} = {value:g}, {len(found)} random starts"
+            text = f"No. {first} with {self.letter} = {value:g}, {len(found)} random starts"
             checks.append(self._many(Kind.SWEEP, text, found))
-        for name, start in self._read(cases).items():
+        for name, start in read_starts(*(cases[number] for number in self.of)).items():
             each = self.test(cases, start)
             checks.append(Check(Kind.READING, name, self._text(each), float(each.holds), each.holds))
         return Part(self.statement, self.threshold, self.why, checks, self.reading)

@@ -102,11 +102,6 @@ class Motion:
             return mpfr(0)
         return self.acting.body(body).acceleration(self.state.x[body], self.state.v[body])
 
-    def relaxation(self, side: int) -> Real:
-        """How fast the dissipation of a pressed pair ends its speed, 1/s."""
-        law = self.plant.law(side)
-        return law.dissipation * law.hertzian * self.state.w[side] ** 3 / self.plant.reduced_mass(side, self.wall)
-
     def _first(self, side: int) -> Pair:
         """The mode of a pair at the start; at u = 0 the next step decides."""
         law, u = self.plant.laws[side], self.depth(side)

@@ -14,7 +14,6 @@ from lab.reference.motion import Pair
 from lab.reference.plant import OBJECT, SIDES, Plant, Real, Reals, State
 from lab.reference.roots import bound_at, first_crossing, value_at
 from lab.reference.series import Expansion, expand, reach
-from lab.reference.stiff import Squeeze
 
 EXTRA_DIGITS = 10  # of a step beyond those asked for
 EXTRA_BITS = 110  # of the arithmetic beyond those of a step
@@ -23,9 +22,6 @@ SAME = 1000  # steps' errors within which events are one instant
 STILL = 40  # events in a row that last no time: the modes contradict each other
 NEAR = 10  # steps from u = 0: there w is the better variable
 FAR = 12  # shortest time scales: so long a wait is flown at once
-STIFF, WORTH = 3, 2000  # relaxation times of a step that is limited by them, and of an interval worth a collocation
-SLACK = 10**6  # of a collocation: its end is better than its polynomials, which are compared
-PATIENCE = 8  # Taylor steps after a collocation that failed
 Row = tuple[Real, ...]  # x_l, v_l, x_o, v_o, x_r, v_r
 
 
@@ -64,7 +60,6 @@ class Run(Automaton):
         self._outputs = list(outputs)
         self._budget = budget
         self._lasted = mpfr(0)  # duration of the last step
-        self._collocation, self._rest = mpfr(0), 0  # next step of it, Taylor steps before it
 
     def advance(self, end: Real) -> None:
         """Go on to a time.
@@ -126,9 +121,6 @@ class Run(Automaton):
         far = [side for side in self.arms if self.pressed and self.pairs[side] in (Pair.OPEN, Pair.ABSENT)]
         series = self._series([side for side in self.arms if side not in far])
         h, ends = self._length(series, end)
-        squeezed = self._squeeze(series, h, end, far)
-        if squeezed is not None:
-            series, h, ends = squeezed
         way = h * bound_at(series.x[OBJECT][1:], h) if far else mpfr(0)
         if not any(self.may_meet(side, bound_at(series.t, h), way) for side in far):
             return series, h, ends, far
@@ -165,25 +157,6 @@ class Run(Automaton):
             if impulse <= self.tolerance * mass * rate:
                 return h
             h /= 4
-
-    def _squeeze(self, series: Expansion, h: Real, end: Real, far: list[int]) -> tuple[Expansion, Real, bool] | None:
-        """A step by collocation, where the relaxation of a squeezed contact makes those of a series too short."""
-        rate = max((self.relaxation(side) for side in self.pressed), default=mpfr(0))
-        left, t = end - self.state.t, value_at(series.t, h) if self.pressed else mpfr(0)
-        if Pair.STARTING in self.pairs or rate * t < STIFF or rate * left < WORTH:
-            return None
-        if self._rest > 0:
-            self._rest -= 1
-            return None
-        moving = [*(side for side in self.arms if side not in far), *self.free]
-        h = min(max(self._collocation, 4 * t), left)
-        found = Squeeze(self.acting, self.state, moving, self.pressed).collocate(h, SLACK * self.tolerance)
-        self._collocation = h * 2 if found is not None else h / 3
-        if found is not None:
-            return found, h, h == left
-        if self._collocation <= 4 * t:
-            self._rest = PATIENCE
-        return None
 
     def _at(self, series: Expansion, s: Real, far: list[int]) -> State:
         """The state at s; arms that are far fly."""

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 
 from tqdm import tqdm
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
-from grasp_ros.accuracy.compare import by_method, fastest
 from grasp_ros.accuracy.contender import Contender
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.scene import Scene
@@ -64,16 +64,15 @@ def climb(
     made_by = origin(contender.family)
     for setting in ladder:
         key = f"{scene_key(scene)} {made_by} {contender.name} {setting!r} {effort.budget}"
-        kept = journal.get(key, Record)
-        if kept is None:
-            record = measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
-            journal.put(key, record)
-        else:
-            record = kept._replace(scene=scene.name)
-        records.append(record)
+        record = journal.kept(key, Record, partial(_attempt, contender, scene, setting, journal, effort))
+        records.append(record._replace(scene=scene.name))
         if measure.given_up(record, effort):
             break
     return records
+
+
+def _attempt(contender: Contender, scene: Scene, setting: float, journal: Journal, effort: Effort) -> Record:
+    return measure.attempt(contender, scene, setting, measure.truth(scene, journal), effort)
 
 
 def frontier(records: Iterable[Record]) -> list[Record]:
@@ -83,23 +82,3 @@ def frontier(records: Iterable[Record]) -> list[Record]:
         if not best or (record.error or 0.0) < (best[-1].error or 0.0):
             best.append(record)
     return best
-
-
-def summary(records: Sequence[Record]) -> list[str]:
-    """Lines for one scene: milliseconds to each target error by method, its best error, and what it missed."""
-    heads = "".join(f"{f'<= {target:.0e}':>11}" for target in TARGETS)
-    lines = [f"{'milliseconds to an error of':30}{heads}{'best error':>12}{'misses':>8}  at its tightest"]
-    for name, group in by_method(records).items():
-        cells = []
-        for target in TARGETS:
-            found = fastest(group, target)
-            cells.append(f"{1e3 * found.time:11.3g}" if found else f"{'-':>11}")
-        best = min((r.error for r in group if r.good and r.error is not None), default=None)
-        last = group[-1]
-        wrong = [r for r in group if r.missed]
-        lines.append(
-            f"  {name:28}{''.join(cells)}{'-' if best is None else f'{best:.1e}':>12}"
-            f"{'-' if last.missed is None and not wrong else f'{len(wrong)}/{len(group)}':>8}"
-            f"  {last.knob} {last.setting:.0e}: {last.status}"
-        )
-    return lines

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Sequence
 from pathlib import Path
-
-import numpy as np
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.accuracy.compare import fastest
-from grasp_ros.accuracy.measure import Record, seconds
+from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
@@ -28,13 +25,12 @@ from lab.studies import (
     speed,
     stability,
 )
-from lab.studies.contenders import OURS, all_contenders, own_contenders
+from lab.studies.contenders import OURS, all_contenders
 from lab.studies.records import Journal, write_csv
 
 LOOP_SCENE = "case_01"
 QUICK_S = 5.0
 QUICK_DRIFT = {EXACT: 1e-16, "paper": 1e-3, "discrete_gradient": 1e-3}
-OUTPUT_RUNS = 100
 
 
 def write(docs: Path, directory: Path, quick: bool) -> Path:
@@ -79,7 +75,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),
         topics=accuracy_rows.topics(case.title, points, limits),
-        profiles=accuracy_rows.profiles(_profiles(subjects, records)), output=_output(subjects),
+        profiles=accuracy_rows.profiles(_profiles(subjects, records)),
         last=None if quick else accuracy_rows.last_state(_final_states(subjects, directory)),
     )
 
@@ -98,16 +94,3 @@ def _final_states(subjects: Sequence[Scene], directory: Path) -> dict[str, list[
     journal = Journal(directory)
     return {scene.name: speed.final_state(scene, measure.truth(scene, journal), accuracy_rows.ERROR)
             for scene in subjects}
-
-
-def _output(subjects: Sequence[Scene]) -> list[list[str]]:
-    """Times of `exact` with all output times and with the last alone, in turn, and their ratio."""
-    exact = next(contender for contender in own_contenders() if contender.name == EXACT)
-    rows = []
-    for scene in subjects:
-        solve = exact.build(scene, METHODS[EXACT].default)
-        grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
-        pairs = [(seconds(solve, grid), seconds(solve, grid[-1:])) for _ in range(OUTPUT_RUNS)]
-        both, last = map(statistics.median, zip(*pairs, strict=True))
-        rows.append([scene.name, f"{1e3 * both:.3g} ms", f"{1e3 * last:.3g} ms", f"{both / last:.2f}"])
-    return rows

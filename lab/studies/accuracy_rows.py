@@ -37,7 +37,6 @@ def by_error(records: Sequence[Record]) -> dict[str, Any]:
         "paper": [_paper(name, here) for name, here in scenes.items()], "tolerance": _tolerance(records, list(scenes)),
         "missed": _missed(records), "ahead": {"error": ERROR, "rivals": list(RIVALS), "rows": _ahead(scenes)},
         "methods": [[f"`{m.name}`", m.order, m.at_touch, m.source] for m in METHODS.values()],
-        "details": [(name, "\n".join(accuracy.summary(here))) for name, here in scenes.items()],
     }
 
 

@@ -16,10 +16,9 @@ from grasp_ros.physics.layout import Law, Transition
 from grasp_ros.physics.model import Arm, Array, Contact, Grasp
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
-from lab.studies import page_figures, pages
+from lab.studies import pages
 from lab.studies.stability import first_limit
 
-PAGE = "jumps"
 SCENES = ("v_jump_symmetric", "v_jump_one_sided", "v_jump_smallest_p")
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 HORIZON = 20.0  # s
@@ -148,7 +147,7 @@ def search(family: Family, draws: int, steps: int, seed: int) -> Found:
 
 
 def run(docs: Path | None) -> None:
-    """Print jumps and limits; with a directory of pages, write the page with its figure there.
+    """Print jumps and limits; with a directory of pages, write the page there.
 
     Raises
     ------
@@ -159,9 +158,7 @@ def run(docs: Path | None) -> None:
     for rows in found.values():
         print("\n".join(" ".join(row) for row in rows), end="\n\n")
     if docs is not None:
-        shown = [simulate(scenes.load(name), grid=np.linspace(0.0, 0.8, 8001)) for name in SCENES[:2]]
-        page_figures.v_jumps(shown, docs / f"{PAGE}.png")
-        pages.write(docs, PAGE, amplitude=AMPLITUDE, horizon=HORIZON, draws=DRAWS, steps=STEPS, seed=SEED, **found)
+        pages.write(docs, "jumps", amplitude=AMPLITUDE, horizon=HORIZON, draws=DRAWS, steps=STEPS, seed=SEED, **found)
 
 
 def limit_rows() -> list[list[str]]:

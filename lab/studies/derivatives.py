@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,12 +57,13 @@ def run(directory: Path) -> list[Row]:
         scene = scene.changed({"time.duration_s": SECONDS.get(name, scene.duration)})
         times = [part * scene.duration for part in PARTS]
         entry = f"derivative {scene_key(scene)} {key} {times!r}"
-        known = journal.get(entry, Known)
-        if known is None:
-            known = Known(difference(scene, key, times).state.tolist())
-            journal.put(entry, known)
+        known = journal.kept(entry, Known, partial(_known, scene, key, times))
         rows += _rows(scene, key, np.array(times), np.array(known.state))
     return rows
+
+
+def _known(scene: Scene, key: str, times: list[float]) -> Known:
+    return Known(difference(scene, key, times).state.tolist())
 
 
 def _rows(scene: Scene, key: str, times: Array, expected: Array) -> list[Row]:

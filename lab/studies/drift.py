@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -57,11 +58,7 @@ def run(directory: Path, seconds: float = SECONDS, methods: dict[str, float] | N
     for name, setting in (bar := tqdm(chosen.items(), unit="method", file=sys.stderr)):
         bar.set_description(f"energy drift {name}")
         key = f"drift {scene_key(scene)} {origin(contenders[name].family)} {name} {setting!r}"
-        drift = journal.get(key, Drift)
-        if drift is None:
-            drift = _measure(contenders[name], scene, setting)
-            journal.put(key, drift)
-        results.append(drift)
+        results.append(journal.kept(key, Drift, partial(_measure, contenders[name], scene, setting)))
     return results
 
 

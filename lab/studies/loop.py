@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -52,11 +53,7 @@ def run(scene: Scene, directory: Path, graph_periods: tuple[float, ...] = GRAPH_
     for period in (bar := tqdm(PERIODS_MS, unit="period", file=sys.stderr)):
         bar.set_description(f"control period {period:g} ms")
         key = f"loop {scene_key(scene)} {origin('grasp_ros')} {period!r} {period in graph_periods}"
-        point = journal.get(key, Point)
-        if point is None:
-            point = _measure(scene, period, grid, ideal, period in graph_periods)
-            journal.put(key, point)
-        points.append(point)
+        points.append(journal.kept(key, Point, partial(_measure, scene, period, grid, ideal, period in graph_periods)))
     return points
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -14,15 +15,19 @@ from grasp_ros.accuracy.measure import NOT_INSTALLED, Record
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
-from grasp_ros.scene.files import decoding, replacing
-from grasp_ros.scene.npz import Field, read_npz, signed
 from lab import reference
 from lab.reference.deadline import Deadline, deadline
 from lab.studies.records import Journal, scene_key
 
 DIGITS = 25
 LATE = "stopped: longer"
-TRUTH = {"grid": Field("<f8", ("n",)), "state": Field("<f8", ("n", 6)), "touches": Field("<i8", (2,))}
+
+
+class Known(NamedTuple):
+    """What the reference says, in a journal."""
+
+    state: list[list[float]]  # at the output times
+    touches: tuple[int, int]
 
 
 class Effort(NamedTuple):
@@ -40,24 +45,15 @@ QUICK = Effort(patience=0.2, deadline=60.0, budget=0.02, most=3, stride=4)
 
 
 def truth(scene: Scene, journal: Journal) -> Truth:
-    """The reference at the default output times; kept beside the journal.
-
-    Raises
-    ------
-    Refused
-        If what was kept is damaged, or cannot be written.
-    """
-    path = journal.directory / f"reference_{scene_key(scene)}.npz"
-    if path.exists():
-        with decoding(path, "a reference of a study"):
-            data = read_npz(path, TRUTH)
-            return Truth(data["grid"], data["state"], (int(data["touches"][0]), int(data["touches"][1])))
+    """The reference at the default output times; kept in the journal."""
     grid = np.linspace(0.0, scene.duration, simulation.GRID_POINTS)
-    exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid.tolist(), digits=DIGITS)
-    result = Truth(grid, exact.as_array(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
-    with replacing(path) as file:
-        np.savez_compressed(file, **signed({key: getattr(result, key) for key in TRUTH}))
-    return result
+    known = journal.kept(f"reference {scene_key(scene)} {len(grid)}", Known, partial(_reference, scene, grid.tolist()))
+    return Truth(grid, np.array(known.state), known.touches)
+
+
+def _reference(scene: Scene, grid: list[float]) -> Known:
+    exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid, digits=DIGITS)
+    return Known(exact.as_array().tolist(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
 
 
 def attempt(contender: Contender, scene: Scene, setting: float, target: Truth, effort: Effort) -> Record:

@@ -1,4 +1,4 @@
-"""The figures of the pages on effects, on the certificate and on the hard cases."""
+"""The figures of the pages on effects and on the hard cases."""
 
 from __future__ import annotations
 
@@ -9,13 +9,12 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from grasp_ros.physics.model import penetration
 from grasp_ros.simulation import canvas
-from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, save
-from grasp_ros.simulation.tables import Motion
+from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, save
 
 KEPT, BROKEN, NONE = "kept", "broken", "no result"
 OUTCOMES = {KEPT: (LEFT_COLOR, "", "white"), BROKEN: ("#f2a65a", "////", "black"), NONE: ("#d8d8d8", "", "black")}
+
 
 @canvas.style()
 def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
@@ -31,35 +30,6 @@ def effect_costs(rows: Sequence[tuple[str, float, float]], path: Path) -> None:
         axes.set_xlabel(label)
     panels[0].invert_yaxis()
     figure.suptitle("cost of each effect; beside the bars: ratio to the bare scene", fontsize="medium")
-    save(figure, path)
-
-
-@canvas.style()
-def v_jumps(motions: Sequence[Motion], path: Path) -> None:
-    """Draw V and V_c of motions whose V jumps, and u' beside -1/p."""
-    figure, panels = canvas.subplots(2, len(motions), sharex="col", figsize=(11.0, 6.0), layout="constrained")
-    for motion, (top, bottom) in zip(motions, panels.T, strict=True):
-        level, pairs = motion.energy, motion.scene.system.pairs
-        _, d_l, _, d_r = penetration(motion.state)
-        top.plot(motion.t, level.V_c, color="black", linewidth=1.4, label="$V_c$")
-        top.plot(motion.t, level.V, color="#cc79a7", linewidth=1.2, linestyle="--", label="$V$ of the paper")
-        top.set_yscale("log")
-        top.set_title(motion.scene.title, fontsize="medium")
-        for d, p, label, color, style in (
-            (d_l, pairs[0, 1], "$p\\,\\dot u_l$", LEFT_COLOR, "-"),
-            (d_r, pairs[1, 1], "$p\\,\\dot u_r$", RIGHT_COLOR, "--"),
-        ):
-            bottom.plot(motion.t, p * d, color=color, linestyle=style, linewidth=1.2, label=label)
-        bottom.axhline(-1.0, color="black", linewidth=0.8, label="$-1$: second half of (10)")
-        bottom.set_ylim(-1.6, 0.6)
-        bottom.set_xlabel("time, s")
-        for axes in (top, bottom):
-            axes.grid(alpha=0.3)
-            axes.set_xlim(0.0, motion.t[-1])
-    panels[0, 0].set_ylabel("twice the energy, J")
-    panels[1, 0].set_ylabel("speed of deformation, in $1/p$")
-    lines = [line for axes in panels[:, 0] for line in axes.get_lines()]
-    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines), frameon=False)
     save(figure, path)
 
 

@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -109,6 +109,13 @@ class Journal:
             if wrong or len(line) != len(hints):
                 raise Refused(f"{', '.join(wrong) or ', '.join(line)}: not what a study writes")
             return kind(**value)
+
+    def kept(self, key: str, kind: type[T], measure: Callable[[], T]) -> T:
+        """What was noted under a key, or what is measured now and noted at once."""
+        value = self.get(key, kind)
+        if value is None:
+            self.put(key, value := measure())
+        return value
 
     def put(self, key: str, value: Any) -> None:
         """Note a record at once."""

@@ -147,8 +147,6 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("lab accuracy --quick -o words", "words/journal.jsonl: not the journal of a study"),
         ("accuracy case_01 --budget -1", "--budget -1.0 is not allowed; allowed: a number > 0"),
         ("lab accuracy --quick --docs file/x", "file/x/accuracy.md: cannot be written"),
-        ("lab speed case_01 --error 0", "--error 0.0 is not allowed; allowed: a number > 0"),
-        ("lab speed hammer", "paper: hammer lacks right_arm, right_contact, right_feedback; it knows"),
         ("lab effects --docs file/x", "file/x/costs.md: cannot be written: Not a directory"),
         ("lab certificate --docs file/x", "file/x/jumps.md: cannot be written: Not a directory"),
         ("lab hard --docs file/x", "file/x/hard.md: cannot be written: Not a directory"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
-from grasp_ros.scene import Scene, compose
+from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from lab.cases import regression
 from lab.cases.case import Product
@@ -19,7 +18,7 @@ from lab.drills import fuzz
 from lab.oracles import restart_check as restarts
 from lab.oracles.motion import ledgers
 from lab.oracles.properties import LIMIT, examine, look
-from lab.oracles.related_runs import FALLS, mirror, short_periods, units
+from lab.oracles.related_runs import mirror, units
 from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.segments import FIRST, INNER, LAST, WHOLE, Detail, pieces_of, rule
@@ -217,50 +216,9 @@ def test_roundings_of_the_way_to_a_touch_are_no_errors_behind_it(name: str, part
     assert all(error <= LIMIT for _, error in splitting(close(first), part, Product()))
 
 
-@pytest.mark.parametrize("name", ["early_impact_cancels_late_one", "periods_longer_than_a_swing"])
-def test_distances_that_cancel_or_lie_between_swings_say_nothing(name: str) -> None:
-    first = Product().run(regression.load(name), [0.0, regression.load(name).duration])
-    assert [error <= FALLS for _, error in short_periods(first, Product())] == [True]
-
-
-class OtherGain(Product):
-    """Runs whose held commands are those of another law."""
-
-    def run(self, scene: Scene, times: Iterable[float] | None = None, sampled: bool = False) -> Trajectory:
-        key = "right_feedback.velocity_gain_Ns_per_m"
-        other = {key: 1.1 * scene.values["right_feedback"]["velocity_gain_Ns_per_m"]}
-        return super().run(scene.changed(other) if sampled else scene, times, sampled)
-
-
-def test_another_law_is_seen_at_short_periods(first: Trajectory) -> None:
-    stiff = regression.load("periods_longer_than_a_swing")
-    for run in (first, Product().run(stiff, [0.0, stiff.duration])):
-        assert only(short_periods(run, OtherGain())) > FALLS
-
-
-def test_an_open_pair_does_not_hide_another_law() -> None:
-    """However hard it is: what is apart has no impact whose roundings could cancel."""
-    body = {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0}
-    arm = body | {"stiffness_N_per_m": 10.0, "damping_Ns_per_m": 0.2}
-    scene = compose("apart", {
-        "object": body, "left_arm": arm | {"position_m": -0.5}, "right_arm": arm | {"position_m": 0.5},
-        "right_feedback": {"position_gain_N_per_m": 5.0, "velocity_gain_Ns_per_m": 4.0},
-        "left_contact": {"hertz_N_per_m1_5": 1e12, "dissipation_s_per_m": 0.5},
-        "right_contact": {"hertz_N_per_m1_5": 1e12, "dissipation_s_per_m": 0.5},
-        "time": {"duration_s": 0.1, "control_period_s": 0.001},
-    })
-    run = Product().run(scene, [0.0, scene.duration])
-    assert len(run.events) == 0
-    assert only(short_periods(run, OtherGain())) > FALLS
-
-
 def test_a_motion_that_died_out_before_the_first_output_may_stall() -> None:
     scene = regression.load("dies_out_between_outputs")
     assert [(check.name, check.holds) for check in examine(scene).checks] == [("ends STALLED", True)]
-
-
-def test_short_periods_tend_to_continuous_feedback(first: Trajectory) -> None:
-    assert only(short_periods(first, Product())) == pytest.approx(1.0 / 16.0, rel=0.2)
 
 
 def test_ends_beside_the_reference_and_backwards(first: Trajectory, monkeypatch: pytest.MonkeyPatch) -> None:

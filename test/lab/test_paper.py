@@ -15,9 +15,8 @@ from lab.oracles.closed_forms import elastic_period
 from lab.paper import arms, beyond, by_hand
 from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, started, with_values
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
-from lab.paper.conditions import condition_rows
 from lab.paper.doubts import doubts
-from lab.paper.equations import equations, form_equations
+from lab.paper.equations import equations, rows_of
 from lab.paper.judgement import judge, statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
@@ -26,7 +25,6 @@ from lab.paper.quantities import quantities
 from lab.paper.replay import COLUMNS, TICKS, frames, pack
 from lab.paper.sample import Sample
 from lab.paper.scatter import median
-from lab.paper.svg import data_uri, seen, short_svg
 from lab.paper.symmetry import asymmetry, where_false
 
 CASES = load_cases()
@@ -143,11 +141,11 @@ def test_a_border_in_asymmetry_is_named_where_there_is_one() -> None:
 def test_an_equation_written_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each against values written out by hand: V, its rate, its parts, and the entries of P."""
     sample = Sample(CASES[4])
-    right = {row.number for row in (*form_equations([sample]), *condition_rows([sample])) if row.agrees}
+    right = {row.number for row in rows_of([sample]) if row.agrees}
     for name in ("matrix", "level", "rate", "parts"):
         own = getattr(by_hand, name)
         monkeypatch.setattr(by_hand, name, lambda scene, y, own=own: 1.001 * own(scene, y))
-    left = {row.number for row in (*form_equations([sample]), *condition_rows([sample])) if row.agrees}
+    left = {row.number for row in rows_of([sample]) if row.agrees}
     assert right - left >= {"(11)", "(12)", "(16)", "(18)", "(21)", "(23)", "(28)", "(29)"}
 
 
@@ -272,20 +270,3 @@ def test_settling_is_counted_in_swings_too() -> None:
         swept: Any = statements()[key].parts[1]
         judged = swept._replace(values=(), words=("swings",)).judge(CASES, STARTS)
         assert any("in swings" in check.text for check in judged.turned)
-
-
-def test_a_path_loses_no_point_that_is_seen() -> None:
-    x = np.linspace(0.0, 400.0, 4001)
-    line = np.column_stack([x, 50.0 + 40.0 * np.sin(x / 20.0)])
-    kept = seen(line, 0.04)
-    assert kept.sum() < 400
-    drawn = np.interp(x, line[kept, 0], line[kept, 1])
-    assert np.abs(drawn - line[:, 1]).max() <= 0.04 * np.sqrt(5.0)  # across the line, whose slope is up to 2
-    assert seen(line, 0.0).sum() > 4000
-
-
-def test_a_short_svg_has_the_same_picture() -> None:
-    straight = b'<path d="M 0 0 \nL 1 0 \nL 2 0 \nL 2 5.1234 \nz \nM 7 7 \nL 8 9 \n"/>'
-    svg = b'<svg><!-- x -->%s<path d="M 0 0 Q 1.23456 2 3 4 z"/></svg>' % straight
-    assert short_svg(svg) == b'<svg><path d="M0 0l2 0 0 5.12zM7 7l1 2"/><path d="M 0 0 Q 1.23 2 3 4 z"/></svg>'
-    assert data_uri(b'<a b="#c">') == "data:image/svg+xml,%3Ca b='%23c'%3E"

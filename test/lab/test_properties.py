@@ -56,7 +56,7 @@ def test_every_scene_keeps_all_properties_or_ends_with_a_status(draw_scene: Call
 
 @pytest.mark.parametrize("name", regression.names())
 def test_regression_scenes_keep_all_properties(name: str) -> None:
-    """Each of them had a balance wrong by 100 roundings to 1e9, broken bits, or ended as no run may."""
+    """Each of them had a balance wrong by 100 roundings to 1e9, broken bits, or ended as no run may; O6 and O7 too."""
     most = MAX_WORK if name in LONG else properties.MOST_WORK
     assert examine(regression.load(name), every=False, max_work=most).broken == []
 
@@ -131,7 +131,7 @@ def test_a_wrong_run_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
 @settings(FIXED, max_examples=40)
 @given(st.floats(0.0, 12.0), st.floats(-6.0, 3.0), st.just(0.0) | st.floats(1e-3, 100.0), st.floats(-3.0, 3.0))
 def test_isolated_impacts_of_any_kind(hertzian: float, speed: float, loss: float, mass: float) -> None:
-    """Restitution and duration to 1e-11 over H = 1 to 1e12, v = 1e-6 to 1e3 m/s, p v = 0 to 100."""
+    """O1 and O2: restitution and duration to 1e-11 over H = 1 to 1e12, v = 1e-6 to 1e3 m/s, p v = 0 to 100."""
     assert impact_error(1.0, 10.0**mass, 10.0**hertzian, (loss,), 10.0**speed, Product()) <= 1e-11
 
 

@@ -1,4 +1,4 @@
-"""The high-precision oracle on scenes: friction, held and sampled forces, corners, squeezed contacts."""
+"""The high-precision oracle on scenes: friction, held and sampled forces, corners."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Contact, impact_force, penetration
 from grasp_ros.scene import Scene
 from lab.cases.regression import load
-from lab.reference import integrate_scene, run
+from lab.reference import integrate_scene
 
 FLAT = {"stiffness_N_per_m": 0.0, "damping_Ns_per_m": 0.0}
 CONTACT = {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.0}
@@ -169,18 +169,6 @@ def test_a_general_integrator_agrees(name: str) -> None:
     general = solve_ivp(slope, (0.0, scene.duration), scene.initial_state, "LSODA", rtol=1e-12, atol=1e-15)
     found = integrate_scene(scene, [scene.duration]).as_array()[0]
     assert np.abs(general.y[:, -1] - found).max() < 1e-7 * np.abs(found).max()
-
-
-@pytest.mark.slow
-def test_collocation_agrees_with_series(monkeypatch: pytest.MonkeyPatch) -> None:
-    contact = {"hertz_N_per_m1_5": 1e6, "dissipation_s_per_m": 1e4}
-    pushed = {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": 0.3}
-    scene = compose(2e-4, left_arm=body(1.0, 0.01, 0.0, **FLAT), object=body(0.5), left_contact=contact,
-                    left_feedback=pushed)
-    collocated = integrate_scene(scene, [2e-4])
-    monkeypatch.setattr(run, "WORTH", np.inf)
-    expanded = integrate_scene(scene, [2e-4])
-    assert all(close(a, b, "1e-24") for a, b in zip(collocated.state[0], expanded.state[0], strict=True))
 
 
 def test_a_budget_ends_a_run_where_it_is() -> None:

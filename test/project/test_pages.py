@@ -15,8 +15,10 @@ from lab.site import examples
 
 ROOT = Path(__file__).parents[2]
 README = ROOT / "README.md"
-LONG = {f"docs/{name}.md" for name in ("tutorials/map", "tutorials/controller", "tutorials/exercises",
-                                       "how-to/recover-a-bag", "how-to/identify-parameters")}
+LONG = {f"docs/{name}.md" for name in (
+    "tutorials/map", "tutorials/controller", "tutorials/exercises", "how-to/recover-a-bag",
+    "how-to/identify-parameters", "how-to/choose-gains", "how-to/export-to-pandas", "how-to/test-your-node",
+    "how-to/compare-methods")}
 PAGES = [page for page in (README, *sorted((ROOT / "docs").rglob("*.md"))) if examples.has_examples(page.read_text())]
 
 
@@ -79,6 +81,7 @@ def test_the_readme_is_short_and_its_script_has_ten_lines() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.thorough
 def test_the_site_is_built_strictly(tmp_path: Path) -> None:
     """Every link, anchor and name of the reference leads somewhere; the figures of the pages are drawn."""
     result = subprocess.run(

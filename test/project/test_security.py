@@ -202,9 +202,8 @@ def test_the_option_asks_for_the_network(tmp_path: Path, asked: bool) -> None:
     became = Path(f"/proc/{process.pid}/cmdline")
     wait_for(lambda: b"grasp_ros.graph" in became.read_bytes(), "the node")
     assert (b"ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET" in (became.parent / "environ").read_bytes()) is asked
-    _, err = process.communicate(timeout=DEADLINE)
-    assert process.returncode == 1
-    assert "no plant answers in ROS domain" in err
+    process.kill()
+    process.communicate(timeout=DEADLINE)
 
 
 @pytest.mark.slow

@@ -1,13 +1,12 @@
 """The graph without the project: the same processes, messages and QoS on plain rclpy, and nothing else.
 
-It is the yardstick of `python -m lab graph`: how much of what rclpy can do is left when there is physics.
+It is the yardstick of `python -m lab accuracy`: how much of what rclpy can do is left when there is physics.
 """
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -91,27 +90,22 @@ class Bare(Node):
             self._outputs[0].publish(plain_messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
 
 
-def main(names: Sequence[str], ticks: int) -> None:
-    """Run one node, or several in one thread; the plant prints its ticks per second and ends the process.
-
-    The others run until they are stopped.
-    """
+def main(name: str, ticks: int) -> None:
+    """Run one node until it is stopped; the plant prints its ticks per second and ends."""
     rclpy.init()
-    nodes = [Bare(name, ticks) for name in names]
+    node = Bare(name, ticks)
     executor = EventsExecutor()
-    for node in nodes:
-        executor.add_node(node)
+    executor.add_node(node)
     settled = time.monotonic() + SETTLE_SECONDS
     while time.monotonic() < settled:
         executor.spin_once(timeout_sec=0.1)
     begin = time.monotonic()
-    plant = next((node for node in nodes if node.get_name() == "plant"), nodes[0])
-    if plant.get_name() == "plant":
-        plant.publish_state()
-    while not plant.finished:
+    if name == "plant":
+        node.publish_state()
+    while not node.finished:
         executor.spin_once(timeout_sec=0.2)
     print(f"{ticks / (time.monotonic() - begin):.1f} ticks/s", file=sys.stderr)
 
 
 if __name__ == "__main__":
-    main(sys.argv[2:], int(sys.argv[1]))
+    main(sys.argv[2], int(sys.argv[1]))

@@ -1,0 +1,236 @@
+"""The commands of `python -m lab`: what each is asked, and what it runs."""
+
+from __future__ import annotations
+
+import argparse
+import math
+import signal
+from collections.abc import Callable
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from grasp_ros.cli.arguments import add_command, add_output, add_scene, whole
+from grasp_ros.cli.checks import load_scene, prepare
+from grasp_ros.physics.errors import Refused
+
+Options = argparse.Namespace
+Option = Callable[[argparse.ArgumentParser], object]  # adds itself to a parser
+QUICK_STARTS = 4
+LONG_SCENE = "case_01"
+PAPER_PAGE, STUDIES = Path("runs") / "paper.html", Path("runs") / "studies"
+
+
+class Command(NamedTuple):
+    """One command: its name, a line on it, what runs it and returns the exit status, and what it can be asked.
+
+    With a `page` it takes --docs, a directory for docs/PAGE.md, and refuses one that cannot be written before the work.
+    """
+
+    name: str
+    text: str
+    run: Callable[[Options], int]
+    asked: tuple[Option, ...] = ()
+    page: str = ""
+
+    def add(self, commands: Any) -> argparse.ArgumentParser:
+        """Add its parser to those of the program."""
+        sub = add_command(commands, self.name, self._run, self.text)
+        for add in self.asked:
+            add(sub)
+        if self.page:
+            sub.add_argument("--docs", type=Path, metavar="DIRECTORY", help="write the page there as well")
+        return sub
+
+    def _run(self, options: Options) -> int:
+        if self.page and options.docs is not None:
+            from lab.studies import pages
+
+            pages.claim(options.docs / f"{self.page}.md")
+        return self.run(options)
+
+
+def _asked(*names: str, **words: Any) -> Option:
+    return lambda sub: sub.add_argument(*names, **words)
+
+
+def _output(metavar: str, text: str, default: Path) -> Option:
+    return lambda sub: add_output(sub, metavar, f"{text} (default {default})", default)
+
+
+def _paper(options: Options) -> int:
+    from lab.paper import page, study
+    from lab.paper.definitions import RANDOM_STARTS
+    from lab.studies import pages
+
+    pages.claim(options.output)
+    prepare()
+    found = study.report(QUICK_STARTS if options.quick else RANDOM_STARTS)
+    page.write_html(found, options.output)
+    print(found.summary)
+    for claim in found.claims:
+        print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
+    print(f"written to {options.output}")
+    if options.docs is not None:
+        page.write_markdown(found, options.docs / "paper.md")
+        print(f"written to {options.docs / 'paper.md'}")
+    return 0
+
+
+def _domain(options: Options) -> int:
+    from lab.studies import domain
+
+    domain.run(options.docs)
+    return 0
+
+
+def _hard(options: Options) -> int:
+    from lab.studies import hard
+
+    prepare()
+    return hard.run(options.docs, alone=options.alone)
+
+
+def _fuzz(options: Options) -> int:
+    from lab.drills import fuzz, random_scenes
+
+    seconds = _seconds(options.seconds, options.draws)
+    prepare()
+    memory = None if options.docs is None else random_scenes.Kept(options.output, options.seed)
+    book = fuzz.run(options.seed, options.output, seconds=seconds, draws=options.draws, first=options.first,
+                    jobs=options.jobs, memory=memory)
+    if options.docs is not None:
+        random_scenes.write_page(options.docs, options.seed, options.first, book)
+    return 1 if book.broken else 0
+
+
+def _seconds(seconds: float | None, count: int | None) -> float | None:
+    """For how long random input is tried; None: until it has been enough."""
+    seconds = 60.0 if seconds is None and count is None else seconds
+    if seconds is not None and not (math.isfinite(seconds) and seconds > 0.0):
+        raise Refused(f"--seconds {seconds!r} is not allowed; allowed: a number > 0")
+    return seconds
+
+
+def _readers(options: Options) -> int:
+    from lab.drills import parser_fuzzing
+
+    seconds = _seconds(options.seconds, options.count)
+    prepare()
+    broken = parser_fuzzing.run(
+        options.output, seed=options.seed, first=options.first, count=options.count, seconds=seconds)
+    return 1 if broken else 0
+
+
+def _resumed(module: str, options: Options) -> int:
+    """A study that goes on from what it has measured, and whose result is its page."""
+    study = import_module(f"lab.studies.{module}")
+    prepare()
+    print(f"written to {study.write(options.docs or options.output, options.output, options.quick)}")
+    return 0
+
+
+def _printed(module: str, options: Options) -> int:
+    """A study that prints its numbers, and writes its page where one is wanted."""
+    study = import_module(f"lab.studies.{module}")
+    prepare()
+    study.run(options.docs)
+    return 0
+
+
+def _derivatives(options: Options) -> int:
+    from lab.studies import derivatives
+
+    prepare()
+    wanted = options.tables or [name for name in derivatives.TABLES if name != derivatives.PEERS]
+    found = derivatives.tables(wanted, options.output, options.draws)
+    print("\n\n".join(found.values()))
+    if options.docs is not None:
+        print(f"written to {derivatives.write(options.docs, found)}")
+    return 0
+
+
+def _steering(options: Options) -> int:
+    from lab.drills import steering
+
+    scene = load_scene(options.scene, options.settings)
+    prepare()
+    return 0 if steering.run(scene, options.calls, options.seed) else 1
+
+
+def _recorder(options: Options) -> int:
+    from lab.drills import recorder
+
+    scene = load_scene(options.scene, options.settings)
+    prepare()
+    return 0 if recorder.run(scene, options.kills, options.seed) else 1
+
+
+def _faults(options: Options) -> int:
+    from lab.drills.faults import endurance, run
+
+    if options.ticks:
+        prepare()
+        return 0 if endurance.run(LONG_SCENE, options.ticks) else 1
+    drills = run.chosen(options.only, options.quick)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)  # under nohup the graphs would inherit that it is ignored
+    prepare()
+    return 0 if run.run(drills, options.docs) else 1
+
+
+SECONDS = "how long (default 60, or until {} are done)"
+FIRST = _asked("--first", type=whole(0), default=0, help="number of the first one (default 0)")
+SEED = _asked("--seed", type=whole(0), default=0, help="another seed draws others (default 0)")
+JOURNAL = _output("DIRECTORY", "what was measured, which is not measured again, and without --docs the page", STUDIES)
+RESUMED = JOURNAL, _asked("--quick", action="store_true", help="a part of it, without ROS and outside peers: to try it")
+COMMANDS = (
+    Command("paper", "the paper reproduced and judged, with what it lacks", _paper, (
+        _asked("--quick", action="store_true", help=f"{QUICK_STARTS} random starts: to try it out"),
+        _output("FILE.html", "the page, in one file", PAPER_PAGE),
+    ), "paper"),
+    Command("domain", "which scenes are simulated: every bound and its reason", _domain, page="domain"),
+    Command("certificate", "where the paper's V jumps; limits of the control period", partial(_printed, "certificate"),
+            page="jumps"),
+    Command("hard", "hard cases: the error reached, and what others reach", _hard, (
+        _asked("--alone", action="store_true", help="without other solvers, which takes a minute instead of ten"),
+    ), "hard"),
+    Command("fuzz", "random scenes against all properties", _fuzz, (
+        _asked("--seconds", type=float, help=SECONDS.format("--draws")),
+        _asked("--draws", type=whole(1), help="how many scenes"), FIRST, SEED,
+        _asked("--jobs", type=whole(1), default=1, help="processes (default 1)"),
+        _output("DIRECTORY", "for scenes that fail; with --docs what is known there is not drawn again",
+                Path("runs") / "fuzz"),
+    ), "fuzz"),
+    Command("accuracy", "what accuracy costs: error against time of every method, energy, prediction, control periods;"
+            " resumes", partial(_resumed, "accuracy_page"), RESUMED, "accuracy"),
+    Command("derivatives", "derivatives through impacts beside the reference, which takes hours and resumes, random"
+            " scenes, and peers", _derivatives, (
+                _asked("--table", dest="tables", action="append", choices=("reference", "random", "peers", "cost"),
+                       help="one of the page's tables; repeatable (default all but peers)"),
+                _asked("--draws", type=whole(1), default=300, metavar="N", help="random scenes (default 300)"),
+                JOURNAL,
+            ), "derivatives"),
+    Command("effects", "what each effect costs: counts of work, times, bytes", partial(_printed, "effects"),
+            page="costs"),
+    Command("maps", "where a grasp settles, and how robust it is; resumes", partial(_resumed, "map_page"), RESUMED,
+            "maps"),
+    Command("recorder", "recordings are killed: what is left in their bags", _recorder, (
+        add_scene, _asked("--kills", type=whole(0), default=10, metavar="N", help="how many recordings (default 10)"),
+        SEED,
+    )),
+    Command("steering", "random pause, step, resume and reset calls, each checked", _steering, (
+        add_scene, _asked("--calls", type=whole(1), default=1000, metavar="N", help="how many (default 1000)"), SEED,
+    )),
+    Command("faults", "accidents done to graphs of real processes, some minutes", _faults, (
+        _asked("--only", nargs="+", default=[], metavar="NAME", help="these drills alone"),
+        _asked("--quick", action="store_true", help="a handful of drills"),
+        _asked("--ticks", type=whole(1000), metavar="N",
+               help=f"in place of drills, {LONG_SCENE} in lockstep for N ticks: losses, and memory of processes"),
+    ), "faults"),
+    Command("readers", "damaged files of all kinds against their readers", _readers, (
+        _asked("--seconds", type=float, help=SECONDS.format("--count")),
+        _asked("--count", type=whole(1), help="how many files"), FIRST, SEED,
+        _output("DIRECTORY", "for files that break a reader", Path("runs") / "readers"),
+    )),
+)
