@@ -17,19 +17,17 @@ fuzz_options := --draws 5000 --jobs 2
 demo: install
 	$(BIN)/grasp run case_01
 
-# The tests of every commit; last those that judge by wall time, alone.
+# The tests of every commit.
 test: lint
-	$(BIN)/pytest -n 2 --dist loadfile -m "not thorough and not alone" --durations 20
-	$(BIN)/pytest -m "alone and not thorough"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not thorough" --durations 20
 
 # All tests, before a release and after a change of what only these look at.
 thorough: lint
-	$(BIN)/pytest -n 2 --dist loadfile -m "not alone" --durations 20
-	$(BIN)/pytest -m alone
+	$(BIN)/pytest -n 2 --dist loadfile --durations 20
 
 # What takes seconds.
 quick: lint
-	$(BIN)/pytest -n 2 --dist loadfile -m "not slow and not alone"
+	$(BIN)/pytest -n 2 --dist loadfile -m "not slow"
 
 lint: install
 	$(BIN)/ruff check .
@@ -67,7 +65,7 @@ lowest:
 	$(PYTHON) -m venv $(VENV)-lowest
 	$(VENV)-lowest/bin/pip install --quiet uv
 	$(VENV)-lowest/bin/uv pip install --quiet --python $(VENV)-lowest/bin/python --resolution lowest-direct ".[test]"
-	$(VENV)-lowest/bin/pytest -n 2 --dist loadfile -m "not slow and not alone"
+	$(VENV)-lowest/bin/pytest -n 2 --dist loadfile -m "not slow"
 
 $(VENV)/ready: pyproject.toml setup.py constraints.txt
 	$(PYTHON) -c "import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 12) and 'Python 3.11 or 3.12 is needed')"

@@ -24,8 +24,6 @@ from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
 from lab.drills.nodes import plain_messages
 
-pytestmark = pytest.mark.alone  # it judges by wall time
-
 PERIOD, END = 1_000_000, 10**10
 BODIES = [0]
 

@@ -30,7 +30,7 @@ from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import RUN as RUNNING
 
-pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
+pytestmark = pytest.mark.slow
 
 NODES = ("monitor", "left_controller", "right_controller", "plant")
 

@@ -18,7 +18,7 @@ from processes import DEADLINE, START, children, wait_for
 from grasp_ros.graph import bag, shared_memory
 from grasp_ros.scene.topics import JOINT_STATES
 
-pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
+pytestmark = pytest.mark.slow
 
 RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
 TERMINAL = """

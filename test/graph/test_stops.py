@@ -29,7 +29,7 @@ from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
 from lab.drills import recorder
 
-pytestmark = [pytest.mark.slow, pytest.mark.alone]  # real processes, judged by wall time
+pytestmark = pytest.mark.slow
 
 
 def _words(process: str) -> str:

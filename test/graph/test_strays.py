@@ -28,7 +28,7 @@ from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import ALIVE, JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT, SCENE
 from lab.drills.nodes import plain_messages
 
-pytestmark = pytest.mark.alone  # it judges by wall time
+pytestmark = pytest.mark.slow
 
 PERIOD, END = 1_000_000, 10**10
 RUN = [sys.executable, "-m", "grasp_ros.cli", "run"]

@@ -17,7 +17,6 @@ GOOD = Evidence(said="it is gone", noticed=0.5, exits={"grasp run": 1})
 
 
 @pytest.mark.slow
-@pytest.mark.alone
 @pytest.mark.thorough
 def test_quick_drills_pass_and_are_written(lab_command: Any, tmp_path: Path) -> None:
     result = lab_command("faults", "--quick", "--docs", "docs")
