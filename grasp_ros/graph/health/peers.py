@@ -32,7 +32,6 @@ class Gone(Enum):
     ENDS = "ends"
     AS_TOLD = "ends or waits on, as on_silence says"
     STAYS = "waits for the next one"
-    NOTED = "says so"  # and does not end for it, either: another one does
 
 
 class Need(NamedTuple):
@@ -50,7 +49,6 @@ class Trouble(NamedTuple):
 
     words: str
     certain: bool  # whether it is more than slowness
-    announced: bool = False  # whether its source has said that it ends
 
 
 class PeerNode(GraspNode):
@@ -157,7 +155,7 @@ class PeerNode(GraspNode):
             last = self._last[need.topic]
             said = [beat.ended for beat in self.heartbeats.of(last) if beat.ended]
             words = f"{need.topic.name}: {' and '.join(last)} has ended"
-            return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True, bool(said))
+            return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
         patience = self.patience
@@ -203,13 +201,12 @@ class PeerNode(GraspNode):
                 self._left = self.phase, self.words
                 self.phase, self.words = Phase.IDLE, f"waiting for another one: {trouble.words}"
                 self.get_logger().info(self.words)
-        elif (gone and need.gone is Gone.ENDS) or (need.gone is not Gone.NOTED and self._ends and trouble.certain):
+        elif (gone and need.gone is Gone.ENDS) or (self._ends and trouble.certain):
             self.fail(trouble.words)
-        elif since is None and not (trouble.announced and need.gone is Gone.NOTED):
-            self._silent[name] = self._said = now
-            self.count("silent peers")
-            self.get_logger().error(f"{trouble.words}; waits on")
-        elif since is not None and now - self._said > PATIENCE_SECONDS:
+        elif since is None or now - self._said > PATIENCE_SECONDS:
+            if since is None:
+                self._silent[name] = now
+                self.count("silent peers")
             self._said = now
             self.get_logger().error(f"{trouble.words}; waits on")
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""
