@@ -20,10 +20,9 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.scene.topics import CHANGES, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
 from grasp_ros.simulation.sampled_plant import SampledPlant
-
-STATES = ("left position", "left velocity", "object position", "object velocity", "right position", "right velocity")
 
 
 class Difference(NamedTuple):
@@ -171,10 +170,10 @@ def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:
 
 def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[_Column]:
     """Everything of an episode that follows from its inputs."""
-    system, present = recording.scene.system, recording.scene.system.present
-    for number, name in enumerate(STATES):
-        if any(COLUMN[body] == number // 2 * 2 for body in present):
-            yield (JOINT_STATES.name, name, recording.state[rows, number], states[:, number])
+    system = recording.scene.system
+    for body in system.present:
+        for column, name in enumerate(("position", "velocity"), COLUMN[body]):
+            yield (JOINT_STATES.name, f"{NAMES[body]} {name}", recording.state[rows, column], states[:, column])
     if recording.running.lockstep:  # the force that acted until a tick is the command that had arrived: after the delay
         wait = system.delay + 1
         for body in system.laws:
@@ -186,7 +185,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield (topic, "force", recording.outputs[topic][rows], force)
     external = system.external_over(np.arange(len(rows))) if system.external else None
-    for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
+    for name, body in SECTIONS.items():
         if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield (topic, "force", recording.outputs[topic][rows], external[:, body])
     alone = energy(system, states, feedback=False)
