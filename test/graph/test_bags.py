@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap_ros2.decoder import DecoderFactory
 from processes import DEADLINE, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -148,23 +147,6 @@ def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Pa
     for side, force in zip(("left", "right"), impact_forces(recording.scene.grasp, recording.state), strict=True):
         assert np.array_equal(recording.outputs[f"contact/{side}"], force)
         assert force.max() > 10.0
-
-
-def test_an_independent_reader_decodes_the_bag(two_runs: tuple[Path, Path]) -> None:
-    with (two_runs[0] / "bag" / "bag.mcap").open("rb") as file:
-        reader = make_reader(file, decoder_factories=[DecoderFactory()])
-        rows = [
-            (schema.name, channel.metadata["offered_qos_profiles"], message.log_time, decoded)
-            for schema, channel, message, decoded in reader.iter_decoded_messages(topics=["/joint_states"])
-        ]
-    names, qos, times, states = zip(*rows, strict=True)
-    assert set(names) == {"sensor_msgs/msg/JointState"}
-    assert "reliab" in qos[0]
-    assert list(times) == [tick * 1_000_000 for tick in range(3001)]
-    assert states[500].name == ["left", "object", "right"]
-    stamp = states[500].header.stamp
-    assert (stamp.sec, stamp.nanosec) == (0, 500_000_000)
-    assert states[500].position[0] == simulate(scene.load("case_01"), sampled=True, grid=np.array([0.5])).state[0, 0]
 
 
 def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
