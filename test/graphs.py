@@ -1,13 +1,42 @@
-"""Graphs that run at the same time."""
+"""Graphs that run at the same time, and bags without a graph."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
 import pytest
 from conftest import SECOND_DOMAIN
+from processes import DEADLINE
+from std_srvs.srv import Trigger
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.recording import Recording
+from grasp_ros.scene import Scene
+from lab.drills.recorder import Tick
+
+
+def written(path: Path, scene: Scene, ticks: Iterable[Tick], counters: Mapping[str, object] | None = None) -> Path:
+    """A new bag of some ticks, closed with counters of what was lost."""
+    recorder = bag.Recorder(path, scene, {"python": "3"})
+    for tick in ticks:
+        recorder.write_tick(*tick)
+    recorder.close(counters)
+    return path
+
+
+def call(service: str, node: tuple[Any, Any]) -> Any:
+    """Answer of a service of the plant to a node, which has an executor."""
+    peer, executor = node
+    client = peer.create_client(Trigger, f"plant/{service}")
+    assert client.wait_for_service(timeout_sec=DEADLINE)
+    future = client.call_async(Trigger.Request())
+    executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
+    assert future.done(), service
+    peer.destroy_client(client)
+    return future.result()
 
 
 def recordings_of(first: Graph, second: Graph, monkeypatch: pytest.MonkeyPatch) -> list[Recording]:

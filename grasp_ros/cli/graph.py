@@ -174,7 +174,7 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.summary import summary
-    from grasp_ros.graph.verify import compare_recording
+    from grasp_ros.graph.verify import answers_of, verify
 
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
@@ -187,8 +187,9 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
         if not ends:
             print(f"grasp: {graph.bag}: the run ended at {recording.t[-1]:g} s, before its scene", file=sys.stderr)
     if not (stopped or options.no_check):
-        comparison = compare_recording(recording)
-        whole, rows = whole and comparison.equal, rows + comparison.rows
+        verification = verify(recording)
+        whole = whole and verification.holds
+        rows += report.describe_verification(verification, answers_of(recording))
         spent.append((time.monotonic(), "check"))
     if not (stopped or options.no_figure):
         from grasp_ros.simulation import plots

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.verify import Answers, Verification
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
@@ -112,6 +113,11 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
         values = ", ".join(f"{name} {number:g}" for name, number in numbers.items())
         rows.append((f"set at {recording.scene.time_of(tick):g} s", values))
     return _with_words(recording.scene, rows, other=not recording.closed or bool(recording.changes))
+
+
+def describe_verification(verification: Verification, answers: Mapping[str, Answers]) -> list[Row]:
+    """Whose commands a bag has, and whether its numbers follow from them."""
+    return [*((f"{side} controller", str(found)) for side, found in answers.items()), ("verified", verification.words)]
 
 
 def _messages(topics: dict[str, dict[str, float]]) -> str:

@@ -8,9 +8,8 @@ from contextlib import closing
 import numpy as np
 from rich.live import Live
 
-from grasp_ros.graph.keys import Key, Keys
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.view import Moment, View, named
+from grasp_ros.graph.terminal import Key, Keys, Moment, View, named
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import CONTACTS

@@ -61,7 +61,7 @@ class Recording(Tabular, Frozen):
         Ticks of the bag at which the plant began the scene, again after each reset; the first is 0 in a bag that has
         the beginning. `tick` and `t` go on where a reset puts simulated time back.
     timing : dict of str to array (m,)
-        What a free run has published of its quality, about once a second, see `lockstep.timing`; empty in lockstep.
+        What a free run has published of its quality, about once a second, see `free_running.Timing`; empty in lockstep.
     unheard : dict of str to int
         How many announcements of changed numbers the bag lacks, by topic, as far as their numbers show it.
     lost : dict of str to str

@@ -20,11 +20,9 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.scene.effects.force import SECTIONS
 from grasp_ros.scene.topics import CHANGES, CONTACTS, EXTERNAL_FORCES, JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES
-from grasp_ros.simulation import Trajectory, simulate
 from grasp_ros.simulation.sampled_plant import SampledPlant
-
-STATES = ("left position", "left velocity", "object position", "object velocity", "right position", "right velocity")
 
 
 class Difference(NamedTuple):
@@ -172,10 +170,10 @@ def _simulate(recording: Recording, rows: np.ndarray) -> tuple[Array, str]:
 
 def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[_Column]:
     """Everything of an episode that follows from its inputs."""
-    system, present = recording.scene.system, recording.scene.system.present
-    for number, name in enumerate(STATES):
-        if any(COLUMN[body] == number // 2 * 2 for body in present):
-            yield (JOINT_STATES.name, name, recording.state[rows, number], states[:, number])
+    system = recording.scene.system
+    for body in system.present:
+        for column, name in enumerate(("position", "velocity"), COLUMN[body]):
+            yield (JOINT_STATES.name, f"{NAMES[body]} {name}", recording.state[rows, column], states[:, column])
     if recording.running.lockstep:  # the force that acted until a tick is the command that had arrived: after the delay
         wait = system.delay + 1
         for body in system.laws:
@@ -187,7 +185,7 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield (topic, "force", recording.outputs[topic][rows], force)
     external = system.external_over(np.arange(len(rows))) if system.external else None
-    for body, name in ((LEFT, "left_arm"), (RIGHT, "right_arm"), (2, "object")):
+    for name, body in SECTIONS.items():
         if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield (topic, "force", recording.outputs[topic][rows], external[:, body])
     alone = energy(system, states, feedback=False)
@@ -206,60 +204,3 @@ def _first(
         return None
     place = int(np.argmax(differ))
     return Difference(int(recording.tick[rows[place]]), topic, name, float(recorded[place]), float(computed[place]))
-
-
-class Comparison(NamedTuple):
-    """A recorded motion beside the same scene without ROS."""
-
-    equal: bool  # every bit is as it should be
-    own: bool  # whether all commands are those of the scene's laws, in lockstep and without a reset
-    offset: Array | None  # (6,), largest distance from continuous feedback, m and m/s; None if it has none of its own
-    verification: Verification
-    answers: dict[str, Answers]  # whose commands these are, by side
-
-    @property
-    def rows(self) -> list[tuple[str, str]]:
-        """For `table`."""
-        rows = [(f"{side} controller", str(law)) for side, law in self.answers.items()]
-        rows.append(("verified", self.verification.words))
-        if self.own:
-            rows.append(("same without ROS", "equal, bit for bit" if self.equal else "NOT EQUAL"))
-        if self.offset is not None:
-            far = ", ".join(
-                f"{name} {distance:.3g}"
-                for name, distance in zip(("x_l", "x_o", "x_r"), self.offset[0::2], strict=True)
-                if not np.isnan(distance)
-            )
-            rows.append(("from continuous feedback", f"at most {far} m"))
-        return rows
-
-
-def compare_recording(recording: Recording) -> Comparison:
-    """Simulate a recorded scene again: with its recorded inputs, and with the scene's laws if it was these that ran.
-
-    With the scene's laws also under the paper's continuous feedback, to say how far from it the held commands lead.
-    """
-    times, scene, accuracy = recording.t, recording.scene, recording.running.accuracy
-    verification, answers = verify(recording), answers_of(recording)
-    one_run = recording.running.lockstep and len(recording.starts) <= 1
-    own = one_run and not any(found.differs for found in answers.values())
-    equal, offset = verification.holds, None
-    if own:
-        same = simulate(scene, sampled=True, grid=times, accuracy=accuracy, changes=recording.changes)
-        equal = verification.difference is None and _equal(same, recording)
-    if own and not (scene.sampled or recording.changes):
-        ideal = simulate(scene, grid=times, accuracy=accuracy)
-        offset = np.abs(ideal.state - recording.state).max(axis=0)
-    return Comparison(equal, own, offset, verification, answers)
-
-
-def _equal(same: Trajectory, recording: Recording) -> bool:
-    """Whether states, commands and the inputs that the bag knows have the same bits."""
-    if len(same.t) != len(recording.t):
-        return False
-    known = ~np.isnan(recording.inputs).any(axis=1)  # not at the last tick
-    pairs = (
-        (same.state, recording.state), (same.command, recording.command),
-        (same.inputs[known], recording.inputs[known]),
-    )
-    return all(simulated.tobytes() == recorded.tobytes() for simulated, recorded in pairs)

@@ -6,11 +6,12 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 import rclpy
-from processes import DEADLINE
+from processes import DEADLINE, GRASP
 from rclpy.executors import SingleThreadedExecutor
 
 from grasp_ros.exact.integrator import compile_kernels
@@ -48,13 +49,28 @@ def launch() -> Iterator[Callable[..., subprocess.Popen[str]]]:
 
 
 @pytest.fixture
-def node() -> Iterator[tuple[Any, SingleThreadedExecutor]]:
+def grasp_run(launch: Any, tmp_path: Path) -> Callable[..., subprocess.Popen[str]]:
+    """Starts `grasp run ... -o run` in the directory of the test; what it says is to be read."""
+    def call(*words: str) -> subprocess.Popen[str]:
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        return launch(*GRASP, "run", *words, "-o", "run", cwd=tmp_path, **streams)  # type: ignore[no-any-return]
+
+    return call
+
+
+@pytest.fixture
+def context() -> Iterator[rclpy.Context]:
     context = rclpy.Context()
     rclpy.init(context=context)
+    yield context
+    context.shutdown()
+
+
+@pytest.fixture
+def node(context: rclpy.Context) -> Iterator[tuple[Any, SingleThreadedExecutor]]:
     peer = rclpy.create_node("peer", context=context)
     executor = SingleThreadedExecutor(context=context)
     executor.add_node(peer)
     yield peer, executor
     executor.shutdown()
     peer.destroy_node()
-    context.shutdown()

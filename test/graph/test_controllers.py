@@ -4,53 +4,37 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from flipped import with_a_flipped_bit
-from graphs import recordings_of
-from processes import DEADLINE, START, wait_for
+from graphs import call
+from processes import DEADLINE, START, node_command, wait_for
 from rclpy.executors import SingleThreadedExecutor
-from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.verify import laws_of, verify
-from grasp_ros.physics.accuracy import ACCURACY
-from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.system import COLUMN
+from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
-from grasp_ros.simulation import SampledPlant, simulate
 from lab.site.examples import titled
 
 pytestmark = pytest.mark.slow  # real processes
 
 PAGE = Path(__file__).parents[2] / "docs" / "tutorials" / "controller.md"
-OWN = """
-class Limited:
-    def __init__(self):
-        self.before = 0.0
-    def __call__(self, tick, time, x, v):
-        self.before = 0.9 * self.before + 0.1 * max(-1.5, min(1.5, -5.0 * x - 0.5 * v))
-        return self.before
-"""
 
 
-def test_a_controller_that_we_did_not_write_is_recorded_and_verified(launch: Any, tmp_path: Path) -> None:
+def test_a_controller_that_we_did_not_write_is_recorded_and_verified(
+    launch: Any, grasp_run: Any, tmp_path: Path
+) -> None:
     """The one that the page prints on the left, and on the right one with a frame_id that reads like a number."""
     source = titled(PAGE, "my_controller.py")
     assert len(source.splitlines()) == 19
     other = source.replace("left", "right").replace("my_controller", "another").replace(
         "    commands.publish", '    command.header.frame_id = "7" if i else "world"\n    commands.publish')
-    run = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=0.6", "-o", "run",
-        "--without", "left_controller", "--without", "right_controller",
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )
+    without = ("--without", "left_controller", "--without", "right_controller")
+    run = grasp_run("case_01", "--set", "time.duration_s=0.6", *without)
     for text in (source, other):
         launch(sys.executable, "-c", text, stderr=subprocess.DEVNULL)
     out, err = run.communicate(timeout=DEADLINE)
@@ -70,89 +54,10 @@ def test_a_controller_that_we_did_not_write_is_recorded_and_verified(launch: Any
     assert "NOT EQUAL" not in out
 
 
-FOREIGN = """
-import rclpy
-from geometry_msgs.msg import WrenchStamped
-from own_law import Limited
-from sensor_msgs.msg import JointState
-rclpy.init()
-node = rclpy.create_node("foreign")
-commands = node.create_publisher(WrenchStamped, "left/effort_command", 1000)
-law, said = Limited(), {}
-def answer(state):
-    i, stamp = state.name.index("left"), (state.header.stamp.sec, state.header.stamp.nanosec)
-    if stamp not in said:  # otherwise it comes again
-        said[stamp] = law(0, 0.0, state.position[i], state.velocity[i])
-    command = WrenchStamped(header=state.header)
-    command.wrench.force.x = said[stamp]
-    commands.publish(command)
-while commands.get_subscription_count() < 2:
-    rclpy.spin_once(node, timeout_sec=0.01)
-node.create_subscription(JointState, "joint_states", answer, 1000)
-rclpy.spin(node)
-"""
-
-
-def test_a_law_with_limits_and_memory_gives_the_same_bits_in_four_processes_in_one_and_without_ros(
-    launch: Any, tmp_path: Path, command: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In four processes on the left as a node that we did not write, on the right as an object; both at a time."""
-    (tmp_path / "own_law.py").write_text(OWN)
-    place, case = "own_law:Limited", scene.load("case_01", ["time.duration_s=0.5"])
-    names: dict[str, Any] = {}
-    exec(OWN, names)
-    simulated = simulate(case, controllers=dict.fromkeys(("left", "right"), names["Limited"]))
-    four = Graph(case, tmp_path / "four", ACCURACY, without=["left_controller"], laws={"right_controller": place})
-    laws_of_both = dict.fromkeys(case.controllers, place)
-    one = Graph(case, tmp_path / "one", ACCURACY, laws=laws_of_both, one_process=True)
-    launch(sys.executable, "-c", FOREIGN, cwd=tmp_path, stderr=subprocess.DEVNULL)
-    monkeypatch.chdir(tmp_path)
-    for recording in recordings_of(four, one, monkeypatch):
-        assert recording.state.tobytes() == simulated.state.tobytes()
-        assert recording.command.tobytes() == simulated.command.tobytes()
-        assert verify(recording).words == "501 states follow from the recorded inputs, bit for bit"
-        assert all(law.startswith("foreign: ") for law in laws_of(recording).values())
-    plant, states = SampledPlant(case.system, case.period_ns), []
-    laws = {LEFT: names["Limited"](), RIGHT: names["Limited"]()}
-    for tick in range(len(simulated.t)):
-        states.append(plant.state.copy())
-        commands = np.zeros(3)
-        for body, law in laws.items():
-            commands[body] = law(tick, case.time_of(tick), *plant.state[COLUMN[body] :][:2].tolist())
-        plant.step(commands)
-    assert np.array(states).tobytes() == simulated.state.tobytes()
-    copy = with_a_flipped_bit(four.bag / "bag.mcap", tmp_path / "copy.mcap", "/joint_states", 300)
-    found = command("verify", str(copy))
-    assert found.returncode == 1
-    assert "NOT EQUAL, first at tick 300, joint_states, right position: recorded " in found.stdout
-
-
-def test_a_force_that_was_not_commanded_is_found(two_runs: tuple[Path, Path]) -> None:
-    recording = bag.read(two_runs[0] / "bag")
-    effort = recording.effort.copy()
-    effort[300, 0] = np.nextafter(effort[300, 0], np.inf)
-    found = verify(replace(recording, effort=effort)).difference
-    assert found is not None
-    assert found[:3] == (300, "joint_states", "left velocity") or found[:3] == (300, "joint_states", "left effort")
-
-
-def call(service: str, node: tuple[Any, SingleThreadedExecutor]) -> Any:
-    """Answer of a service of the plant."""
-    peer, executor = node
-    client = peer.create_client(Trigger, f"plant/{service}")
-    assert client.wait_for_service(timeout_sec=DEADLINE)
-    future = client.call_async(Trigger.Request())
-    executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
-    assert future.done(), service
-    peer.destroy_client(client)
-    return future.result()
-
-
 def test_a_second_source_of_commands_is_named_and_refused(
     launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
 ) -> None:
-    options = ["--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true"]
-    plant = launch(*START, "plant", *options, stderr=subprocess.PIPE)
+    plant = launch(*node_command("plant", scene="arm_alone", paused="true"), stderr=subprocess.PIPE)
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
     wait_for(lambda: '"state": "paused"' in call("status", node).message, "the first state")
     launch(*START, "left_controller", "--ros-args", "-r", "__node:=rogue", stderr=subprocess.DEVNULL)
@@ -168,16 +73,13 @@ def test_a_second_source_of_commands_is_named_and_refused(
 @pytest.mark.thorough
 def test_controllers_that_stay_work_with_the_next_scene_or_say_why_not(launch: Any, tmp_path: Path) -> None:
     with (tmp_path / "right").open("w") as log:
-        monitored = ["--ros-args", "-p", "wait_for_monitor:=true"]
-        launch(*START, "left_controller", *monitored, stderr=subprocess.DEVNULL)
-        launch(*START, "right_controller", *monitored, stderr=log)
+        launch(*node_command("left_controller", wait_for_monitor="true"), stderr=subprocess.DEVNULL)
+        launch(*node_command("right_controller", wait_for_monitor="true"), stderr=log)
     for number, (name, gain) in enumerate((("case_01", 5.0), ("case_09", 50.0), ("arm_alone", None))):
         file = tmp_path / f"{name}.yaml"
         file.write_text(scene.load(name, ["time.duration_s=0.2"]).to_yaml())
-        monitor = launch(*START, "monitor", "--ros-args", "-p", f"bag:={tmp_path / f'bag{number}'}",
-                         stderr=subprocess.PIPE)
-        plant = launch(*START, "plant", "--ros-args", "-p", f"scene:={file}", "-p", "wait_for_monitor:=true",
-                       stderr=subprocess.PIPE)
+        monitor = launch(*node_command("monitor", bag=tmp_path / f"bag{number}"), stderr=subprocess.PIPE)
+        plant = launch(*node_command("plant", scene=file, wait_for_monitor="true"), stderr=subprocess.PIPE)
         errors = plant.communicate(timeout=DEADLINE)[1]
         assert plant.returncode == 0, errors
         said = monitor.communicate(timeout=DEADLINE)[1]

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from graphs import call
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from processes import DEADLINE, START, wait_for
+from processes import DEADLINE, node_command, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
-from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
@@ -30,18 +30,18 @@ from lab.site.examples import titled
 
 pytestmark = pytest.mark.slow  # real processes
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "operate-the-graph.md"
+FREE = {"scene": "arm_alone", "free_running": "true"}
 
 
 @pytest.mark.thorough
-def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any, tmp_path: Path) -> None:
+def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(
+    launch: Any, grasp_run: Any, tmp_path: Path
+) -> None:
     """The one that the page prints, beside one of ours."""
     source = titled(PAGE, "own_rate.py")
     begin = time.monotonic()
-    run = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "--set", "time.duration_s=1.5", "-o", "run",
-        "--without", "left_controller", "--free-running", "0.5", cwd=tmp_path, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    words = ("--without", "left_controller", "--free-running", "0.5")
+    run = grasp_run("case_01", "--set", "time.duration_s=1.5", *words)
     launch(sys.executable, "-c", source, stderr=subprocess.DEVNULL)
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, out + err
@@ -63,11 +63,8 @@ def test_a_controller_at_its_own_rate_is_held_recorded_and_verified(launch: Any,
 
 @pytest.mark.parametrize(("reaction", "status"), [("stop", 1), ("zero", 0)])
 def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: str, status: int) -> None:
-    plant = launch(
-        *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
-        "real_time_factor:=50", "-p", "left_timeout_s:=0.25", "-p", f"left_on_timeout:={reaction}", "-p",
-        "progress:=true", stderr=subprocess.PIPE,
-    )
+    numbers = {**FREE, "real_time_factor": 50, "left_timeout_s": 0.25, "left_on_timeout": reaction}
+    plant = launch(*node_command("plant", **numbers, progress="true"), stderr=subprocess.PIPE)
     errors = plant.communicate(timeout=DEADLINE)[1]
     assert "%|" not in errors  # no bar of progress where no terminal is
     assert plant.returncode == status
@@ -75,6 +72,7 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
 
 
+THREE_SECONDS = ("arm_alone", "--set", "time.duration_s=3", "--no-figure")
 SLOW = """
 import time
 def law(tick, t, x, v):
@@ -84,15 +82,12 @@ def law(tick, t, x, v):
 
 
 def test_a_slow_controller_answers_the_newest_state_and_its_age_is_shown(
-    launch: Any, tmp_path: Path, command: Any
+    grasp_run: Any, tmp_path: Path, command: Any
 ) -> None:
     """5 ms for a period of 0.5 ms of wall time: to answer each state would take five times as long as the run."""
     (tmp_path / "slow.py").write_text(SLOW)
-    run = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=3", "-o", "run",
-        "--free-running", "2", "--controller", "left=slow:law", "--max-age", "1", "--no-figure", "--min-factor", "2.5",
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )
+    limits = ("--max-age", "1", "--min-factor", "2.5")
+    run = grasp_run(*THREE_SECONDS, "--free-running", "2", "--controller", "left=slow:law", *limits)
     out, err = run.communicate(timeout=DEADLINE)
     recording = bag.read(tmp_path / "run" / "bag")
     usual, most = recording.ages["left"]
@@ -124,13 +119,9 @@ hung = []
 """
 
 
-def test_a_bag_tells_for_how_long_a_command_was_missing(launch: Any, tmp_path: Path, command: Any) -> None:
+def test_a_bag_tells_for_how_long_a_command_was_missing(grasp_run: Any, tmp_path: Path, command: Any) -> None:
     (tmp_path / "hangs.py").write_text(HANGS)
-    run = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=3", "-o", "run",
-        "--free-running", "1", "--controller", "left=hangs:law", "--no-figure", cwd=tmp_path, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    run = grasp_run(*THREE_SECONDS, "--free-running", "1", "--controller", "left=hangs:law")
     out, err = run.communicate(timeout=DEADLINE)
     assert "no command that answers a state of the last 0.1 s" in err
     late = bag.read(tmp_path / "run" / "bag").timed_out["left"]
@@ -152,17 +143,12 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
 
     peer.create_subscription(JointState, JOINT_STATES.name, note, messages.qos(JOINT_STATES))
     recorded = peer.create_publisher(JointState, LYAPUNOV.name, messages.qos(LYAPUNOV))
-    status = peer.create_client(Trigger, "plant/status")
-    launch(
-        *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
-        "real_time_factor:=50", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL,
-    )
+    monitored = node_command("plant", **FREE, real_time_factor=50, wait_for_monitor="true")
+    launch(*monitored, stderr=subprocess.DEVNULL)
     for last, next_one in ((WINDOW, 400), (400 + WINDOW + 1, 900)):
         wait_for(lambda last=last: executor.spin_once(timeout_sec=0.05) or ticks[-1:] == [last], f"tick {last}")
         for _ in range(3):
-            answer = status.call_async(Trigger.Request())
-            executor.spin_until_future_complete(answer, timeout_sec=DEADLINE)
-            assert json.loads(answer.result().message)["tick"] == last
+            assert json.loads(call("status", node).message)["tick"] == last
         recorded.publish(plain_messages.lyapunov(next_one * period_ns, [0.0] * len(LYAPUNOV_NAMES)))
     assert ticks == list(range(len(ticks)))
 
@@ -170,10 +156,7 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
 def test_a_plant_takes_the_priority_that_it_is_given_or_says_why_not(launch: Any, tmp_path: Path) -> None:
     errors = tmp_path / "errors"
     with errors.open("w") as file:
-        plant = launch(
-            *START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "free_running:=true", "-p",
-            "real_time_factor:=20", "-p", "real_time_priority:=3", stderr=file,
-        )
+        plant = launch(*node_command("plant", **FREE, real_time_factor=20, real_time_priority=3), stderr=file)
 
     def policies() -> set[tuple[int, int]]:
         threads = [int(thread.name) for thread in Path(f"/proc/{plant.pid}/task").iterdir()]
@@ -187,6 +170,6 @@ def test_a_plant_takes_the_priority_that_it_is_given_or_says_why_not(launch: Any
     else:
         wait_for(lambda: policies() == {(os.SCHED_RR, 3)}, "its priority")
     assert plant.wait(DEADLINE) == 0
-    refused = launch(*START, "left_controller", "--ros-args", "-p", "real_time_priority:=100", stderr=subprocess.PIPE)
+    refused = launch(*node_command("left_controller", real_time_priority=100), stderr=subprocess.PIPE)
     assert "real_time_priority: 100 is not allowed; allowed: 0 to 99" in refused.communicate(timeout=DEADLINE)[1]
     assert refused.returncode == 2

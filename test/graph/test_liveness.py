@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from processes import DEADLINE, START, children, end_nodes, wait_for
+from processes import DEADLINE, START, Terminals, children, end_nodes, growing, more_ticks, node_command, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
@@ -31,31 +31,6 @@ from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import RUN as RUNNING
 
 pytestmark = pytest.mark.slow
-
-NODES = ("monitor", "left_controller", "right_controller", "plant")
-
-
-class Terminals:
-    """Four nodes, each with its terminal."""
-
-    def __init__(self, launch: Any, directory: Path, scene: str, options: tuple[str, ...] = ()) -> None:
-        self.directory, self.processes = directory, {}
-        for name in NODES:
-            own = {"plant": ["-p", f"scene:={scene}"], "monitor": ["-p", f"bag:={directory / 'bag'}"]}.get(name, [])
-            wait = [] if name == "monitor" else ["-p", "wait_for_monitor:=true"]
-            with (directory / name).open("w") as log:
-                words = [*START, name, "--ros-args", *own, *wait, *options]
-                self.processes[name] = launch(*words, stderr=log)
-        file = directory / "bag" / "bag.mcap"
-        wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
-
-    def said(self, name: str) -> str:
-        return (self.directory / name).read_text()
-
-    def wait_for(self, name: str, words: str) -> None:
-        """Until a node has said something."""
-        wait_for(lambda: bool(re.search(words, self.said(name))), words)
-
 
 @pytest.fixture
 def levels(node: tuple[Any, SingleThreadedExecutor]) -> Any:
@@ -97,18 +72,16 @@ def test_who_waits_says_for_whom_and_goes_on_when_it_is_back(launch: Any, tmp_pa
     graph.wait_for("plant", r"right/effort_command: no (sign of life|answer).* of /right_controller for 1\.\d s")
     launch(*START, "right_controller", "--ros-args", "-p", "wait_for_monitor:=true", stderr=subprocess.DEVNULL)
     wait_for(lambda: "right/effort_command: is back after" in graph.said("plant"), "the one in its place")
-    size = (tmp_path / "bag" / "bag.mcap").stat().st_size
-    wait_for(lambda: (tmp_path / "bag" / "bag.mcap").stat().st_size > size + 20_000, "more ticks")
+    more_ticks(graph.file)
     graph.processes["plant"].send_signal(signal.SIGINT)
     assert graph.processes["monitor"].wait(DEADLINE) == 1
     assert re.search(r"joint_states: /plant has ended; the bag has \d+ ticks", graph.said("monitor"))
     recording = bag.read(tmp_path / "bag")
     assert not any(recording.missing.values())
     assert verify(recording).holds
-    assert "Traceback" not in "".join(graph.said(name) for name in NODES)
+    assert "Traceback" not in graph.said()
 
 
-RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
 FAULTS = [  # and the last sentence, in the words of the first that has noticed
     ("left_controller", signal.SIGSTOP, r"left/effort_command: no (sign of life|answer).* of /left_controller for 1"
      r"|left_controller: was stopped"),
@@ -122,12 +95,10 @@ FAULTS = [  # and the last sentence, in the words of the first that has noticed
 
 @pytest.mark.parametrize(("name", "number", "words"), FAULTS, ids=[f"{name} {fault.name}" for name, fault, _ in FAULTS])
 def test_a_run_ends_with_a_sentence(
-    launch: Any, tmp_path: Path, name: str, number: signal.Signals, words: str
+    grasp_run: Any, tmp_path: Path, name: str, number: signal.Signals, words: str
 ) -> None:
-    options = ["--one-process"] if name == "together" else []
-    run = launch(*RUN, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    file = tmp_path / "run" / "bag" / "bag.mcap"
-    wait_for(lambda: file.exists() and file.stat().st_size > 50_000, "a bag that grows")
+    run = grasp_run("case_01", *(["--one-process"] if name == "together" else []))
+    file = growing(tmp_path / "run" / "bag", 50_000)
     os.kill(children(tmp_path)[name], number)
     _, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 1
@@ -162,16 +133,13 @@ rclpy.spin(node)
 """
 
 
-def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, tmp_path: Path) -> None:
+def test_a_state_that_is_lost_comes_again_and_is_in_the_bag_once(launch: Any, grasp_run: Any, tmp_path: Path) -> None:
     """With a controller that gives no sign of life."""
-    run = launch(
-        *RUN, "--set", "time.duration_s=0.3", "--without", "left_controller", cwd=tmp_path, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-    )
+    run = grasp_run("case_01", "--set", "time.duration_s=0.3", "--without", "left_controller")
     launch(sys.executable, "-c", FORGETFUL, stderr=subprocess.DEVNULL)
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err
-    assert "equal, bit for bit" in out
+    assert "301 states follow from the recorded inputs, bit for bit" in out
     recording = bag.read(tmp_path / "run" / "bag")
     assert recording.tick.tolist() == list(range(301))
     assert not any(recording.missing.values())
@@ -214,18 +182,14 @@ def test_who_is_busy_was_not_stopped(launch: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(BUSY)
     (tmp_path / "scene.yaml").write_text(scene.load("arm_alone", ["time.duration_s=0.1"]).to_yaml())
     plant = launch(*START, "plant", "--ros-args", "-p", "scene:=scene.yaml", cwd=tmp_path, stderr=subprocess.DEVNULL)
-    controller = launch(
-        *START, "left_controller", "--ros-args", "-p", "law:=mine:law", cwd=tmp_path, stderr=subprocess.PIPE
-    )
+    controller = launch(*node_command("left_controller", law="mine:law"), cwd=tmp_path, stderr=subprocess.PIPE)
     assert plant.wait(DEADLINE) == 0
     controller.terminate()
     assert "this process was stopped" not in controller.communicate(timeout=DEADLINE)[1]
 
 
-def test_who_prepares_is_waited_for_and_who_does_not_come_is_not() -> None:
+def test_who_prepares_is_waited_for_and_who_does_not_come_is_not(context: rclpy.Context) -> None:
     """A node that nobody spins is as one that compiles: its signs come from a thread of their own."""
-    context = rclpy.Context()
-    rclpy.init(context=context)
     short = [Parameter("start_timeout_s", value=1.6), Parameter("on_silence", value="end")]
     other = Controller("right_controller", context=context)
     controller = Controller("left_controller", context=context, parameter_overrides=short)
@@ -240,7 +204,6 @@ def test_who_prepares_is_waited_for_and_who_does_not_come_is_not() -> None:
     assert "nobody has come for 1.6 s" in controller.words
     executor.shutdown()
     end_nodes(controller)
-    context.shutdown()
 
 
 AWAY = """
@@ -259,10 +222,10 @@ def law(tick, t, x, v):
 
 
 def test_a_law_that_goes_away_is_followed_and_one_that_stands_in_one_process_has_as_long_as_in_four(
-    launch: Any, tmp_path: Path
+    grasp_run: Any, tmp_path: Path
 ) -> None:
     (tmp_path / "mine.py").write_text(AWAY)
-    run = launch(*RUN, "--one-process", "--controller", "left=mine:law", cwd=tmp_path, stderr=subprocess.PIPE)
+    run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law")
     _, err = run.communicate(timeout=DEADLINE)  # the time for the first answer is longer than this
     assert run.returncode == 1
     assert re.search(r"^grasp: plant: stands for \d+\.\d s: in .*mine.py, line 11; run/bag has what", err, re.M), err
@@ -283,10 +246,8 @@ def law(tick, t, x, v):
 def test_who_stands_because_another_was_stopped_says_so_and_ends(launch: Any, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(STANDING)
     plant = launch(*START, "plant", "--ros-args", "-p", "scene:=arm_alone", cwd=tmp_path, stderr=subprocess.DEVNULL)
-    controller = launch(
-        *START, "left_controller", "--ros-args", "-p", "law:=mine:law", "-p", "on_silence:=end", cwd=tmp_path,
-        stderr=subprocess.PIPE,
-    )
+    words = node_command("left_controller", law="mine:law", on_silence="end")
+    controller = launch(*words, cwd=tmp_path, stderr=subprocess.PIPE)
     wait_for((tmp_path / "standing").exists, "a law that stands")
     plant.send_signal(signal.SIGSTOP)
     _, err = controller.communicate(timeout=DEADLINE)

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from graphs import written
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.recorder import Recorder
 from grasp_ros.graph.rosbag2 import list_message
-from grasp_ros.scene.topics import CLOCK, JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
 
@@ -36,11 +36,11 @@ def test_messages_of_another_make_have_the_same_numbers(tmp_path: Path, little: 
     """In another order of bytes or of bodies, in other frames; some of them among those of the recorder."""
     run = simulate(scenes.load("everything", ["time.duration_s=0.05"]), sampled=True)
     study.write(tmp_path / "bag", run)
-    recorder = Recorder(tmp_path / "other", run.scene, {})
-    for number, (time_ns, messages) in enumerate(study.ticks_of(run)):
-        other = [(topic, again(topic, cdr, little, "x" * number)) for topic, cdr in messages if topic != CLOCK]
-        recorder.write_tick(time_ns, other if number % 3 else messages)
-    recorder.close()
+    ticks = list(study.ticks_of(run))
+    for number, (_, messages) in enumerate(ticks):
+        if number % 3:
+            messages[:] = [(topic, again(topic, cdr, little, "x" * number)) for topic, cdr in messages]
+    written(tmp_path / "other", run.scene, ticks)
     bags = [bag.read(tmp_path / name) for name in ("bag", "other")]
     for name in ("tick", "state", "effort", "command", "lyapunov", "starts"):
         assert len({getattr(found, name).tobytes() for found in bags}) == 1, name
@@ -51,13 +51,12 @@ def test_messages_of_another_make_have_the_same_numbers(tmp_path: Path, little: 
 def test_what_is_no_message_is_refused_wherever_it_stands(tmp_path: Path, topic: Topic) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
     for number in range(5):
-        recorder = Recorder(tmp_path / str(number), run.scene, {})
-        for time_ns, messages in study.ticks_of(run):
-            cdr = dict(messages)[topic]
-            wrong = [cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:], cdr[:12] + b"\xff" + cdr[13:]][number]
-            at = [(other, wrong if (other, time_ns) == (topic, 5_000_000) else found) for other, found in messages]
-            recorder.write_tick(time_ns, at)
-        recorder.close()
+        ticks = list(study.ticks_of(run))
+        time_ns, messages = ticks[5]
+        cdr = dict(messages)[topic]
+        wrong = [cdr[:-1], cdr + bytes(8), b"", b"\x07" + cdr[1:], cdr[:12] + b"\xff" + cdr[13:]][number]
+        ticks[5] = time_ns, [*{**dict(messages), topic: wrong}.items()]
+        written(tmp_path / str(number), run.scene, ticks)
         with pytest.raises(bag.BagError, match="not a bag of this package"):
             bag.read(tmp_path / str(number))
 
@@ -85,12 +84,9 @@ def test_a_recording_has_the_numbers_that_another_reader_decodes(tmp_path: Path,
 
 def test_a_list_of_another_length_is_refused(tmp_path: Path) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    recorder = Recorder(tmp_path / "bag", run.scene, {})
-    for time_ns, messages in study.ticks_of(run):
-        if time_ns == 10_000_000:
-            messages[-1] = LYAPUNOV, list_message(time_ns, LYAPUNOV_NAMES[:8], np.zeros(8))
-        recorder.write_tick(time_ns, messages)
-    recorder.close()
+    ticks = list(study.ticks_of(run))
+    ticks[-1][1][-1] = LYAPUNOV, list_message(ticks[-1][0], LYAPUNOV_NAMES[:8], np.zeros(8))
+    written(tmp_path / "bag", run.scene, ticks)
     with pytest.raises(bag.BagError, match="/lyapunov: 8 numbers; allowed: 9"):
         bag.read(tmp_path / "bag")
 
@@ -99,10 +95,7 @@ def test_a_list_of_another_length_is_refused(tmp_path: Path) -> None:
 def test_ticks_that_are_none_are_refused(tmp_path: Path, times: tuple[float, ...]) -> None:
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
     _, messages = next(study.ticks_of(run))
-    recorder = Recorder(tmp_path / "bag", run.scene, {})
-    for time in times:
-        recorder.write_tick(round(time * run.scene.period_ns), messages)
-    recorder.close()
+    written(tmp_path / "bag", run.scene, [(round(time * run.scene.period_ns), messages) for time in times])
     wrong = round(times[-1] * run.scene.period_ns)
     with pytest.raises(bag.BagError, match=f": {wrong} ns; allowed: ticks of the scene in their order"):
         bag.read(tmp_path / "bag")

@@ -97,22 +97,17 @@ def test_laws_that_see_more_give_the_same_bits_everywhere(tmp_path: Path, monkey
 
 
 def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_do_not_act(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    context: rclpy.Context, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "asking.py").write_text("def law(tick, time, x, v, x_object):\n    return x_object - x\n")
     monkeypatch.syspath_prepend(tmp_path)
-    context = rclpy.Context()
-    rclpy.init(context=context)
-    try:
-        law = [Parameter("law", value="asking:law")]
-        controller = Controller("left_controller", context=context, parameter_overrides=law)
-        with pytest.raises(Refused, match="law: asking:law: asks for x_object; the scene has no object"):
-            controller._take(scenes.load("arm_alone"))
-        controller._take(scenes.load("case_01"))
-        gain = "left_feedback.position_gain_N_per_m"
-        result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
-        assert result.reason == f"{gain}: another controller acts in place of this feedback"
-        assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
-        end_nodes(controller)
-    finally:
-        context.shutdown()
+    law = [Parameter("law", value="asking:law")]
+    controller = Controller("left_controller", context=context, parameter_overrides=law)
+    with pytest.raises(Refused, match="law: asking:law: asks for x_object; the scene has no object"):
+        controller._take(scenes.load("arm_alone"))
+    controller._take(scenes.load("case_01"))
+    gain = "left_feedback.position_gain_N_per_m"
+    result = controller.set_parameters([Parameter(gain, value=9.0)])[0]
+    assert result.reason == f"{gain}: another controller acts in place of this feedback"
+    assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
+    end_nodes(controller)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -13,7 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from processes import DEADLINE, START, end_nodes, wait_for
+from graphs import written
+from processes import GRASP, START, end_nodes, ran, wait_for
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -36,10 +35,8 @@ GAIN = "left_feedback.position_gain_N_per_m"
 
 
 @pytest.fixture
-def loop() -> Iterator[tuple[Plant, Controller, SingleThreadedExecutor]]:
+def loop(context: rclpy.Context) -> Iterator[tuple[Plant, Controller, SingleThreadedExecutor]]:
     """A plant and its controller in this process."""
-    context = rclpy.Context()
-    rclpy.init(context=context)
     plant = Plant(context=context, parameter_overrides=[Parameter("scene", value="arm_alone")])
     controller = Controller("left_controller", context=context)
     executor = SingleThreadedExecutor(context=context)
@@ -49,7 +46,6 @@ def loop() -> Iterator[tuple[Plant, Controller, SingleThreadedExecutor]]:
     yield plant, controller, executor
     executor.shutdown()
     end_nodes(plant, controller)
-    context.shutdown()
 
 
 def test_a_node_takes_what_it_dumps(loop: tuple[Any, ...]) -> None:
@@ -86,10 +82,8 @@ def test_numbers_that_somebody_else_refuses_never_act(loop: tuple[Any, ...]) -> 
 
 
 @pytest.mark.thorough
-def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: Path) -> None:
+def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(context: rclpy.Context, tmp_path: Path) -> None:
     """One for each state that the plant may be ahead of it."""
-    context = rclpy.Context()
-    rclpy.init(context=context)
     (tmp_path / "scene.yaml").write_text(scene.load("arm_alone", ["time.duration_s=0.6"]).to_yaml())
     watched = Parameter("wait_for_monitor", value=True)
     given = [Parameter("scene", value=str(tmp_path / "scene.yaml")), watched]
@@ -104,9 +98,7 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: 
         assert controller.set_parameters([Parameter(GAIN, value=1.0 + plant.tick)])[0].successful
         loop.spin_once(timeout_sec=0.1)
     wait_for(lambda: [executor.spin_once(timeout_sec=0.001) for executor in (loop, behind)] and monitor.finished, "end")
-    for node in (plant, controller, monitor):
-        end_nodes(node)
-    context.shutdown()
+    end_nodes(plant, controller, monitor)
     recording = bag.read(tmp_path / "bag")
     assert len(recording.changes) > 400
     assert laws_of(recording) == {"left": "the scene's law"}
@@ -116,16 +108,14 @@ def test_no_number_that_was_set_is_missed_by_a_monitor_that_is_behind(tmp_path: 
 
 def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None:
     run = simulate(scene.load("arm_alone", ["time.duration_s=0.004"]), sampled=True)
-    writer = bag.Recorder(tmp_path / "bag", run.scene, {})
-    numbers, types = run.scene.numbers_of("left_controller"), get_typestore(Stores.ROS2_JAZZY)
+    ticks, numbers, types = [], run.scene.numbers_of("left_controller"), get_typestore(Stores.ROS2_JAZZY)
     for tick, (time_ns, rows) in enumerate(recorder.ticks_of(run)):
         values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
         said = types.deserialize_cdr(rosbag2.list_message(time_ns, list(numbers), values), NAMED_LIST)
         said.header.frame_id = str(1 + 2 * tick)  # its number
         beside = [(CHANGES["left"], bytes(types.serialize_cdr(said, NAMED_LIST)))] if tick < 3 else []
-        writer.write_tick(time_ns, [*beside, *rows])
-    writer.close()
-    recording = bag.read(tmp_path / "bag")
+        ticks.append((time_ns, [*beside, *rows]))
+    recording = bag.read(written(tmp_path / "bag", run.scene, ticks))
     assert recording.unheard == {"left/parameters": 2}
     assert recording.missing["left/parameters"] == 2
     assert laws_of(recording) == {"left": "not known: the bag lacks 2 announcements of its numbers"}
@@ -140,8 +130,7 @@ def test_help_names_what_can_be_set(loop: tuple[Any, ...]) -> None:
         assert declared | later == {*NODES[name]}
     for name in ("plant", "left_controller", "right_controller", "monitor"):
         for words in (["--help"], ["-h", "--ros-args", "-p", "scene:=case_99"]):
-            command = [*START, name, *words]
-            found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+            found = ran(*START, name, *words)
             assert (found.returncode, found.stderr) == (0, "")
             assert found.stdout.startswith(f"usage: {name} ")
             assert all(f"  {key} " in found.stdout for key in NODES[name])
@@ -166,14 +155,13 @@ def test_where_no_graph_can_be_none_starts(
         assert found.returncode == 2
         assert f"{name}: {value!r} is not allowed" in found.stderr
         assert why in found.stderr
-    found = subprocess.run([*START, "monitor"], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    found = ran(*START, "monitor")
     assert found.returncode == 2
     assert why in found.stderr
 
 
 def test_a_warning_that_the_user_makes_an_error_is_no_fault() -> None:
-    found = subprocess.run([*START, "monitor"], capture_output=True, text=True, timeout=DEADLINE, check=False,
-                           env={**os.environ, "PYTHONWARNINGS": "error"})
+    found = ran(*START, "monitor", env={**os.environ, "PYTHONWARNINGS": "error"})
     assert found.returncode == 1
     assert found.stderr.startswith("monitor: PYTHONWARNINGS makes it an error: DeprecationWarning: ")
 
@@ -191,27 +179,22 @@ NOT_BEGUN = {  # variables of the environment, and what a node says of them
 def test_a_run_whose_nodes_refuse_what_they_are_given_is_refused(tmp_path: Path, variables: str) -> None:
     (tmp_path / "laws.py").write_text("class Camera:\n    def __init__(self):\n        raise ValueError('no camera')\n")
     environment = {**os.environ, **dict(word.split("=") for word in variables.split())}
-    run = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=laws:Camera"]
-    found = subprocess.run(run, capture_output=True, text=True, timeout=DEADLINE, check=False, env=environment,
-                           cwd=tmp_path)
+    found = ran(*GRASP, "run", "arm_alone", "--controller", "left=laws:Camera", env=environment, cwd=tmp_path)
     assert found.returncode == 2
     assert re.search(NOT_BEGUN[variables], found.stderr, re.M)
     assert "Traceback" not in found.stderr
 
 
-@pytest.mark.parametrize("words", [[*START, "plant"], [sys.executable, "-m", "grasp_ros.cli", "run", "case_01"]])
+@pytest.mark.parametrize("words", [[*START, "plant"], [*GRASP, "run", "case_01"]])
 def test_a_limit_of_memory_in_which_no_node_has_room_is_named(tmp_path: Path, words: list[str]) -> None:
-    found = subprocess.run(["sh", "-c", 'ulimit -v 1000000; exec "$@"', "sh", *words], capture_output=True, text=True,
-                           timeout=DEADLINE, check=False, cwd=tmp_path)
+    found = ran("sh", "-c", 'ulimit -v 1000000; exec "$@"', "sh", *words, cwd=tmp_path)
     assert (found.returncode, len(found.stderr.splitlines())) == (2, 1)
     assert "memory (`ulimit -v`): 1000000 kB is not allowed; allowed: 2097152 or more" in found.stderr
 
 
 def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
-    environment = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
-    run = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process"]
-    found = subprocess.run(run, capture_output=True, text=True, timeout=DEADLINE, check=False, env=environment,
-                           cwd=tmp_path)
+    run = [*GRASP, "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process"]
+    found = ran(*run, env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, cwd=tmp_path)
     assert found.returncode == 0, found.stderr
 
 
@@ -225,13 +208,12 @@ def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
     ],
 )
 def test_what_a_node_cannot_start_with_is_refused_by_its_name(word: str, why: str) -> None:
-    command = [*START, "plant", "--ros-args", "-p", word]
-    found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    found = ran(*START, "plant", "--ros-args", "-p", word)
     assert found.returncode == 2
     assert found.stderr.startswith(why)
 
 
 def test_a_word_that_no_node_takes_is_refused() -> None:
-    found = subprocess.run([*START, "plant", "case_03"], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    found = ran(*START, "plant", "case_03")
     assert found.returncode == 2
     assert found.stderr == "plant: case_03: not allowed; allowed: --help, or --ros-args -p NAME:=VALUE ...\n"

@@ -27,8 +27,8 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.picture import ASIDE, NEWTONS_PER_METRE, TOUCHING, markers
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.terminal import SIGNS, Moment, View
 from grasp_ros.graph.tools.watch import HINT
-from grasp_ros.graph.view import SIGNS, Moment, View
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import impact_forces

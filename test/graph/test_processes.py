@@ -13,24 +13,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import DEADLINE, START, children, wait_for
+from processes import DEADLINE, GRASP, START, children, growing, wait_for
 
 from grasp_ros.graph import bag, shared_memory
 from grasp_ros.scene.topics import JOINT_STATES
 
 pytestmark = pytest.mark.slow
 
-RUN = [sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", "run"]
 TERMINAL = """
 import fcntl, os, sys, termios
 fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 os.execv(sys.argv[1], sys.argv[1:])
 """
-
-
-def records(directory: Path) -> bool:
-    file = directory / "run" / "bag" / "bag.mcap"
-    return file.exists() and file.stat().st_size > 300_000
 
 
 def check_bag(directory: Path) -> None:
@@ -51,12 +45,13 @@ def survivors(tmp_path: Path) -> Iterator[None]:
 
 @pytest.mark.usefixtures("survivors")
 @pytest.mark.parametrize("options", [[], ["--one-process"]], ids=["four processes", "one process"])
-def test_nothing_outlives_a_run_that_is_killed(launch: Any, tmp_path: Path, options: list[str]) -> None:
+def test_nothing_outlives_a_run_that_is_killed(grasp_run: Any, tmp_path: Path, options: list[str]) -> None:
     """Not even a process that is stopped at that moment. Before, the reader of its progress has had enough."""
-    run = launch(*RUN, *options, cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+    run = grasp_run("case_01", *options)
     assert run.stderr.read(10)
     run.stderr.close()
-    wait_for(lambda: records(tmp_path), "a bag that grows")
+    run.stdout.close()
+    growing(tmp_path / "run" / "bag", 300_000)
     started = children(tmp_path)
     assert len(started) == (1 if options else 4)
     os.kill(started.get("right_controller", 0) or started["together"], signal.SIGSTOP)
@@ -69,12 +64,10 @@ def test_nothing_outlives_a_run_that_is_killed(launch: Any, tmp_path: Path, opti
 @pytest.mark.usefixtures("survivors")
 def test_a_terminal_that_is_closed_ends_a_run_cleanly(launch: Any, tmp_path: Path) -> None:
     ours, theirs = os.openpty()
-    run = launch(
-        sys.executable, "-c", TERMINAL, *RUN, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs,
-        start_new_session=True,
-    )
+    words = [sys.executable, "-c", TERMINAL, *GRASP, "run", "case_01", "-o", "run"]
+    run = launch(*words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs, start_new_session=True)
     os.close(theirs)
-    wait_for(lambda: records(tmp_path), "a bag that grows")
+    growing(tmp_path / "run" / "bag", 300_000)
     os.close(ours)
     assert run.wait(DEADLINE) in (0, 1)
     assert not children(tmp_path)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from graphs import written
 from mcap.reader import make_reader
 from mcap.records import Chunk
 from mcap.stream_reader import StreamReader
@@ -88,6 +89,10 @@ def test_three_readers_take_it(closed: Path, run: Trajectory) -> None:
         assert summary.statistics.message_count == 7 * len(run.t) + 2
         rows = list(reader.iter_decoded_messages(topics=["/left/effort_command"]))
         assert [decoded.wrench.force.x for _, _, _, decoded in rows] == run.command[:, 0].tolist()
+        schema, channel, message, decoded = rows[500]
+        assert (schema.name, message.log_time) == ("geometry_msgs/msg/WrenchStamped", 500_000_000)
+        assert (decoded.header.stamp.sec, decoded.header.stamp.nanosec) == (0, 500_000_000)
+        assert "reliab" in channel.metadata["offered_qos_profiles"]
 
 
 def test_the_metadata_are_those_of_another_writer(tmp_path: Path, closed: Path, run: Trajectory) -> None:
@@ -191,12 +196,8 @@ def test_a_recovered_bag_is_one_for_other_readers(tmp_path: Path, closed: Path, 
 
 
 def test_ticks_that_are_missing_are_named_in_the_bag(tmp_path: Path, run: Trajectory) -> None:
-    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
-    for number, tick in enumerate(study.ticks_of(run)):
-        if number not in (0, 7, 100, 101, 102):
-            recorder.write_tick(*tick)
-    recorder.close({"lost messages": 5})
-    recording = bag.read(tmp_path / "bag")
+    ticks = [tick for number, tick in enumerate(study.ticks_of(run)) if number not in (0, 7, 100, 101, 102)]
+    recording = bag.read(written(tmp_path / "bag", run.scene, ticks, {"lost messages": 5}))
     assert recording.lost == {"end": "closed", "ticks that are missing": "0, 7, 100-102", "lost messages": "5"}
     assert recording.versions == {"python": "3"}
 
@@ -274,11 +275,8 @@ def test_a_writer_of_the_library_that_has_moved_is_refused_in_a_sentence() -> No
 
 
 def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: Trajectory, command: Any) -> None:
-    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
-    for time_ns, messages in study.ticks_of(run):
-        recorder.write_tick(time_ns, messages[:1] + messages[2:])
-    recorder.close()
-    recording = bag.read(tmp_path / "bag")
+    ticks = [(time_ns, messages[:1] + messages[2:]) for time_ns, messages in study.ticks_of(run)]
+    recording = bag.read(written(tmp_path / "bag", run.scene, ticks))
     assert np.isnan(recording.command[:, 0]).all()
     assert recording.missing["left/effort_command"] == len(run.t)
     result = command("inspect", "bag")
@@ -290,10 +288,7 @@ def test_a_topic_without_a_message_is_missing_and_no_error(tmp_path: Path, run: 
 
 
 def test_what_the_monitor_did_not_record_is_lost(tmp_path: Path, run: Trajectory, command: Any) -> None:
-    recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
-    for tick in study.ticks_of(run):
-        recorder.write_tick(*tick)
-    recorder.close({NOT_RECORDED: 7})
+    written(tmp_path / "bag", run.scene, study.ticks_of(run), {NOT_RECORDED: 7})
     result = command("inspect", "bag")
     assert re.search(r"^lost +messages not recorded 7$", result.stdout, re.M)
     assert bag.read(tmp_path / "bag").missing[NOT_RECORDED] == 7
@@ -442,10 +437,7 @@ def test_recordings_that_are_killed_are_there(run: Trajectory) -> None:
 
 
 def test_a_bag_of_another_scene_is_refused(tmp_path: Path, run: Trajectory) -> None:
-    recorder = Recorder(tmp_path / "bag", scenes.load("case_01", ["time.duration_s=0.5"]), {})
-    for tick in study.ticks_of(run):
-        recorder.write_tick(*tick)
-    recorder.close()
+    written(tmp_path / "bag", scenes.load("case_01", ["time.duration_s=0.5"]), study.ticks_of(run))
     with pytest.raises(bag.BagError, match="/joint_states: 501000000 ns; allowed: ticks of the scene"):
         bag.read(tmp_path / "bag")
     assert recover(tmp_path / "bag", tmp_path / "new").ticks == 501

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import grasp
-from flipped import with_a_flipped_bit
-from processes import DEADLINE, START, wait_for
+from processes import DEADLINE, GRASP, START, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rosgraph_msgs.msg import Clock
@@ -24,11 +24,13 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills import steering
 
 pytestmark = pytest.mark.slow  # real processes
 SEED, CALLS = 13, 40
+PIPES = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
 
 
 @pytest.fixture(scope="module")
@@ -38,14 +40,14 @@ def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
     with steering.steered(scene.load("case_01", ["time.duration_s=100"]), directory) as plant:
         done = steering.steer(plant, CALLS, SEED)
         assert {"pause done", "resume done", "resume refused", "step done", "step refused", "reset done"} <= set(done)
-        command = [sys.executable, "-m", "grasp_ros.cli", "ctl", "step", "7"]
-        said = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+        command = [*GRASP, "ctl", "step", "7"]
+        said = ran(*command)
         assert (said.returncode, said.stderr) == (0, "")
         plant.tick += 7
         assert f"case_01: paused at tick {plant.tick} of 100000" in said.stdout
         plant.settle()
         plant.expect("resume")
-        refused = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+        refused = ran(*command)
         assert (refused.returncode, refused.stdout) == (1, "")
         assert "not paused; allowed: step of a paused plant" in refused.stderr
         plant.tick = plant.expect("pause")["tick"]
@@ -64,22 +66,13 @@ def test_random_steering_leaves_a_bag_that_verifies(steered: tuple[Path, list[in
     assert bag.read(directory / "bag").closed
 
 
-def test_one_flipped_bit_in_a_bag_is_found_and_named(
-    steered: tuple[Path, list[int]], tmp_path: Path, command: Any
-) -> None:
-    """In a message of a copy whose checksums, which the reader would see first, are put right."""
+def test_one_flipped_bit_in_a_bag_is_found_and_named(steered: tuple[Path, list[int]]) -> None:
     recording = bag.read(steered[0] / "bag")
-    row = int(recording.starts[1]) - 2
-    copy = with_a_flipped_bit(recording.path / "bag.mcap", tmp_path / "copy.mcap", "/joint_states", row)
-    flipped = bag.read(copy)
-    assert np.count_nonzero(flipped.state != recording.state) == 1
-    found = command("verify", str(copy))
-    assert found.returncode == 1
-    x = float(recording.state[row, 4])
-    other = np.array(x)
-    other.view(np.int64)[...] ^= 1
-    words = f"joint_states, right position: recorded {float(other)!r} ({float(other).hex()}), computed {x!r}"
-    assert f"NOT EQUAL, first at tick {recording.tick[row]}, {words}" in found.stdout
+    row, state = int(recording.starts[1]) - 2, recording.state.copy()
+    state[row].view(np.int64)[4] ^= 1
+    (x, other), tick = (float(states[row, 4]) for states in (recording.state, state)), recording.tick[row]
+    words = f"joint_states, right position: recorded {other!r} ({other.hex()}), computed {x!r} ({x.hex()})"
+    assert verify(replace(recording, state=state)).words == f"NOT EQUAL, first at tick {tick}, {words}"
 
 
 def test_a_bag_is_published_again_with_its_clock(
@@ -93,7 +86,7 @@ def test_a_bag_is_published_again_with_its_clock(
         peer.create_subscription(kind, name, note, messages.qos(JOINT_STATES), raw=True)
     executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
     executor.add_node(peer)  # which has all its readers: a new one may be missed
-    player = launch(sys.executable, "-m", "grasp_ros.cli", "replay", str(two_runs[0] / "bag"), "--rate", "1.5")
+    player = launch(*GRASP, "replay", str(two_runs[0] / "bag"), "--rate", "1.5")
     begin = time.monotonic()
     while player.poll() is None:
         assert time.monotonic() < begin + DEADLINE
@@ -114,7 +107,7 @@ def test_a_bag_is_published_again_with_its_clock(
 def test_a_bag_is_not_published_beside_another_one(two_runs: tuple[Path, Path], launch: Any, command: Any) -> None:
     """Nor beside a graph, which holds the same place; both would lose their states to each other."""
     words = ("replay", str(two_runs[0] / "bag"))
-    player = launch(sys.executable, "-m", "grasp_ros.cli", *words)
+    player = launch(*GRASP, *words)
     wait_for(lambda: b"player" in Path(f"/proc/{player.pid}/cmdline").read_bytes(), "the first one")
     found = command(*words)
     assert (found.returncode, found.stdout) == (2, "")
@@ -126,8 +119,7 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     plant = [*START, "plant", "--ros-args", "-p", "scene:=arm_alone", "-p", "paused:=true"]
     launch(*plant, stderr=subprocess.DEVNULL)
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
-    shell = launch(sys.executable, "-m", "grasp_ros.cli", "ctl", stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                   stderr=subprocess.PIPE)
+    shell = launch(*GRASP, "ctl", **PIPES)
 
     def ask(words: str) -> str:
         shell.stdin.write(f"{words}\n")
@@ -165,13 +157,12 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
 @pytest.mark.parametrize("words", ["yes help | head -n 5000 | {} | head -n 1", "{} <&-"])
 def test_a_shell_ends_with_its_reader_and_without_an_input(words: str) -> None:
     command = "set -o pipefail; " + words.format(f"{sys.executable} -m grasp_ros.cli ctl")
-    found = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    found = ran("bash", "-c", command)
     assert (found.returncode in (0, 141), found.stderr) == (True, "")  # 141: `yes`, which nobody reads any more
 
 
 def test_a_shell_that_waits_for_words_ends_with_a_signal(launch: Any) -> None:
-    shell = launch(sys.executable, "-m", "grasp_ros.cli", "ctl", stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                   stderr=subprocess.PIPE)
+    shell = launch(*GRASP, "ctl", **PIPES)
     shell.stdin.write("help\n")
     shell.stdin.flush()
     assert shell.stdout.readline().startswith("pause, resume")
@@ -182,7 +173,7 @@ def test_a_shell_that_waits_for_words_ends_with_a_signal(launch: Any) -> None:
 
 def test_an_output_that_is_full_is_a_sentence() -> None:
     command = f"{sys.executable} -m grasp_ros.cli ctl help >/dev/full"
-    found = subprocess.run(["bash", "-c", command], capture_output=True, text=True, timeout=DEADLINE, check=False)
+    found = ran("bash", "-c", command)
     assert (found.returncode, found.stderr) == (1, "standard input or output: No space left on device\n")
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rclpy
-from processes import DEADLINE, START, wait_for
+from processes import DEADLINE, GRASP, START, children, growing, node_command, ran, wait_for
 
 from grasp_ros import scene
 from grasp_ros.cli.graph import _report
@@ -45,17 +45,10 @@ def _words(process: str) -> str:
     [(signal.SIGINT, "recording"), (signal.SIGHUP, "recording"), (signal.SIGTERM, "starting"),
      (signal.SIGQUIT, "starting"), (signal.SIGINT, "waiting")],
 )
-def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signal.Signals, moment: str) -> None:
-    process = launch(
-        sys.executable, "-m", "grasp_ros.cli", "run", "case_01", "-o", str(tmp_path / "run"),
-        *(["--without", "left_controller"] if moment == "waiting" else []),
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-    )
-    recorded = tmp_path / "run" / "bag" / "bag.mcap"
-    if moment == "recording":
-        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 200_000, "a bag that grows")
-    elif moment == "waiting":  # for somebody else: there is a bag, without a tick
-        wait_for(lambda: recorded.exists() and recorded.stat().st_size > 0, "a bag")
+def test_interrupted_run_ends_cleanly(grasp_run: Any, tmp_path: Path, number: signal.Signals, moment: str) -> None:
+    process = grasp_run("case_01", *(["--without", "left_controller"] if moment == "waiting" else []))
+    if moment in ("recording", "waiting"):  # for somebody else: there is a bag, without a tick
+        growing(tmp_path / "run" / "bag", 200_000 if moment == "recording" else 0)
     else:
         wait_for(lambda: (tmp_path / "run" / "case_01.yaml").exists(), "the first process")
     process.send_signal(number)
@@ -63,16 +56,15 @@ def test_interrupted_run_ends_cleanly(launch: Any, tmp_path: Path, number: signa
     assert process.returncode == (0 if moment == "recording" else 130), err
     assert "Traceback" not in err + out
     if moment == "recording":
-        assert f"not verified and not drawn; `grasp verify` and `grasp plot` {recorded.parent}" in out
-        recording = bag.read(recorded.parent)
+        assert "not verified and not drawn; `grasp verify` and `grasp plot` run/bag" in out
+        recording = bag.read(tmp_path / "run" / "bag")
         ticks = len(recording.tick)
         assert 100 < ticks < 20001
         assert {recording.counts[topic.name] for topic in recording.scene.topics} == {ticks}
         assert np.array_equal(recording.tick, np.arange(ticks))
         full = simulate(scene.load("case_01"), sampled=True)
         assert full.state[:ticks].tobytes() == recording.state.tobytes()
-    left_behind = subprocess.run(["pgrep", "-f", str(tmp_path)], capture_output=True, text=True, check=False)
-    assert left_behind.stdout == ""
+    assert not children(tmp_path)
 
 
 @pytest.mark.parametrize("numbers", [STOP_SIGNALS, STOP_SIGNALS[::-1]], ids=["one way", "the other way"])
@@ -157,8 +149,8 @@ sys.exit(start.main("plant"))
 @pytest.mark.parametrize(("name", "status"), [("none", 2), ("case_01", 0)])
 def test_a_finished_node_keeps_its_status_where_dds_does_not_end(launch: Any, name: str, status: int) -> None:
     numbers = {"scene": name, "free_running": "true", "real_time_factor": "10.0", "time.duration_s": "0.1"}
-    words = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
-    process = launch(sys.executable, "-c", HANGING_END, "--ros-args", *words, stderr=subprocess.PIPE)
+    words = node_command("plant", **numbers)[len(START) + 1 :]
+    process = launch(sys.executable, "-c", HANGING_END, *words, stderr=subprocess.PIPE)
     _, err = process.communicate(timeout=DEADLINE)
     assert err.endswith("plant: has not ended within 0.5 s: ended by force\n"), err
     assert process.returncode == status
@@ -200,15 +192,14 @@ while not ends:
     pass
 print(ends, received)
 """
-    found = subprocess.run([sys.executable, "-c", script], stdout=-1, text=True, timeout=DEADLINE, check=False)
+    found = ran(sys.executable, "-c", script)
     assert found.stdout == "['node'] [2]\n"
 
 
 def test_a_thread_that_a_law_has_left_keeps_no_node() -> None:
     words = "import sys, threading; from grasp_ros.graph import __main__, stopping; stopping.GRACE_SECONDS = 0.5;" \
         "threading.Thread(target=threading.Event().wait).start(); sys.exit(__main__.start())"
-    command = [sys.executable, "-c", words, "plant", "--ros-args", "-p", "scene:=nowhere"]
-    found = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
+    found = ran(sys.executable, "-c", words, "plant", "--ros-args", "-p", "scene:=nowhere")
     assert found.returncode == 2
     assert found.stderr.endswith("plant: has not ended within 0.5 s: ended by force\n")
 
@@ -220,8 +211,7 @@ def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> Non
         "open('left', 'a').write(f'{left.pid} ')\nlaw = lambda tick, time, x, v: -x - v\n"
     )
     words = ["run", "arm_alone", "--set", "time.duration_s=0.1", "--controller", "left=laws:law", "--no-figure"]
-    found = subprocess.run([sys.executable, "-m", "grasp_ros.cli", *words, "-o", "run"], cwd=tmp_path, check=False,
-                           stdout=subprocess.DEVNULL, timeout=DEADLINE)
+    found = ran(*GRASP, *words, "-o", "run", cwd=tmp_path)
     assert found.returncode == 0
     left = (tmp_path / "left").read_text().split()
     assert len(left) == 2
@@ -232,6 +222,7 @@ def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> Non
     ("line", "options", "words"),
     [
         ("sys.exit(0)", [], r"left_controller: law: mine:law: SystemExit: 0, .*mine.py, line 4, at tick 50"),
+        ("1 / 0", ["--one-process"], r"left_controller: law: mine:law: ZeroDivisionError: .*, line 4, at tick 50"),
         ("sys.exit(0)", ["--one-process"], r"left_controller: law: mine:law: SystemExit: 0, .*, line 4, at tick 50"),
         ("rclpy.shutdown()", [], r"left_controller: law: mine:law: RuntimeError: .*, line 4, at tick 50"),
         ("rclpy.shutdown()", ["--one-process"], r"left_controller: law: mine:law: Runtime.*, line 4, at tick 50"),
@@ -240,31 +231,29 @@ def test_a_process_that_a_law_has_left_ends_with_its_node(tmp_path: Path) -> Non
     ],
 )
 def test_a_law_that_ends_its_process_has_ended_no_run(
-    launch: Any, tmp_path: Path, line: str, options: list[str], words: str
+    grasp_run: Any, tmp_path: Path, line: str, options: list[str], words: str
 ) -> None:
     (tmp_path / "mine.py").write_text("import os, rclpy, sys\ndef law(tick, t, x, v):\n    if tick == 50:\n"
                                       f"        {line}\n    return -5.0 * x - 0.5 * v\n")
-    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=mine:law", "-o", "run"]
-    process = launch(*command, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = grasp_run("arm_alone", "--controller", "left=mine:law", *options)
     out, err = process.communicate(timeout=DEADLINE)
     assert (process.returncode, out) == (1, "")
     assert re.search(rf"^grasp: {words}; run/bag has what was recorded$", err, re.M), err
     assert "Traceback" not in err
+    assert "_exit" in line or len(bag.read(tmp_path / "run" / "bag").tick) == 50
 
 
 @pytest.mark.parametrize("options", [[], ["--one-process"]])
 @pytest.mark.parametrize("tick", [-1, 0], ids=["import", "first answer"])
 def test_a_law_that_is_a_node_itself_disturbs_no_end(
-    launch: Any, tmp_path: Path, options: list[str], tick: int
+    grasp_run: Any, tmp_path: Path, options: list[str], tick: int
 ) -> None:
     """`rclpy.init` sets signal handlers that would end all contexts of the process."""
     begin = "node = rclpy.init() or rclpy.create_node('mine')"
     (tmp_path / "mine.py").write_text(f"import rclpy\ndef law(tick, t, x, v):\n    if tick == {tick}: {begin}\n"
                                       "    return -5.0 * x - 0.5 * v\nlaw(-1, 0.0, 0.0, 0.0)\n")
-    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "--controller", "left=mine:law", "-o", "run"]
-    process = launch(*command, *options, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    recorded = tmp_path / "run" / "bag" / "bag.mcap"
-    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 20_000, "a bag that grows")
+    process = grasp_run("arm_alone", "--controller", "left=mine:law", *options)
+    growing(tmp_path / "run" / "bag")
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=DEADLINE)
     assert (process.returncode, "a fault" in err) == (0, False), err
@@ -274,19 +263,14 @@ def test_a_law_that_is_a_node_itself_disturbs_no_end(
 def test_a_monitor_without_a_plant_leaves_nothing(tmp_path: Path) -> None:
     """It has looked whether its bag can be written; `grasp run` would take a directory for the begin of the bag."""
     numbers = {"bag": "new/bag", "peer_timeout_s": "0.1", "start_timeout_s": "0.1", "on_silence": "end"}
-    words = [word for key, value in numbers.items() for word in ("-p", f"{key}:={value}")]
-    found = subprocess.run([*START, "monitor", "--ros-args", *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
-                           timeout=DEADLINE, check=False)
+    found = ran(*node_command("monitor", **numbers), cwd=tmp_path)
     assert "nobody has come for 0.1 s" in found.stderr
     assert not [*tmp_path.iterdir()]
 
 
-def test_an_interrupted_run_whose_bag_cannot_be_closed_says_so(launch: Any, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "grasp_ros.cli", "run", "arm_alone", "-o", "run"]
-    process = launch(*command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    recorded = tmp_path / "run" / "bag" / "bag.mcap"
-    wait_for(lambda: recorded.exists() and recorded.stat().st_size > 20_000, "a bag that grows")
-    (recorded.parent / "metadata.part").mkdir()  # where its metadata are written first
+def test_an_interrupted_run_whose_bag_cannot_be_closed_says_so(grasp_run: Any, tmp_path: Path) -> None:
+    process = grasp_run("arm_alone")
+    (growing(tmp_path / "run" / "bag").parent / "metadata.part").mkdir()  # where its metadata are written first
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=DEADLINE)
     assert (process.returncode, out) == (1, "")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
-from processes import DEADLINE, START, wait_for
+from processes import DEADLINE, Terminals, growing, more_ticks
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import serialize_message
@@ -31,7 +31,6 @@ from lab.drills.nodes import plain_messages
 pytestmark = pytest.mark.slow
 
 PERIOD, END = 1_000_000, 10**10
-RUN = [sys.executable, "-m", "grasp_ros.cli", "run"]
 
 
 def state(tick: int, effort: float = 0.0) -> bytes:
@@ -115,14 +114,13 @@ print("done", flush=True)
 
 
 @pytest.mark.slow  # real processes
-def test_a_stray_with_the_stamp_of_the_state_neither_acts_nor_is_recorded(launch: Any, tmp_path: Path) -> None:
-    words = ["case_01", "--set", "time.duration_s=1000", "-o", "run", "--peer-timeout", "20"]
-    run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    file = tmp_path / "run" / "bag" / "bag.mcap"
-    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
+def test_a_stray_with_the_stamp_of_the_state_neither_acts_nor_is_recorded(
+    launch: Any, grasp_run: Any, tmp_path: Path
+) -> None:
+    run = grasp_run("case_01", "--set", "time.duration_s=1000", "--peer-timeout", "20")
+    file = growing(tmp_path / "run" / "bag")
     assert launch(sys.executable, "-c", STRAY, stdout=subprocess.PIPE).communicate(timeout=DEADLINE)[0] == "done\n"
-    size = file.stat().st_size
-    wait_for(lambda: file.stat().st_size > size + 20_000, "more ticks")
+    more_ticks(file)
     run.send_signal(signal.SIGINT)
     _, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err
@@ -165,9 +163,10 @@ rclpy.spin(node)
 @pytest.mark.slow  # real processes
 @pytest.mark.parametrize("kind", [[], ["--free-running"]], ids=["lockstep", "free-running"])
 @pytest.mark.thorough
-def test_a_command_beyond_the_actuator_is_named_and_does_not_act(launch: Any, tmp_path: Path, kind: list[str]) -> None:
-    words = ["saturation", "--set", "time.duration_s=3.0", "-o", "run", "--without", "left_controller", *kind]
-    run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+def test_a_command_beyond_the_actuator_is_named_and_does_not_act(
+    launch: Any, grasp_run: Any, tmp_path: Path, kind: list[str]
+) -> None:
+    run = grasp_run("saturation", "--set", "time.duration_s=3.0", "--without", "left_controller", *kind)
     launch(sys.executable, "-c", HARD, stderr=subprocess.DEVNULL)
     _, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err
@@ -179,7 +178,7 @@ def test_a_command_beyond_the_actuator_is_named_and_does_not_act(launch: Any, tm
 
 
 @pytest.mark.slow  # real processes
-def test_whom_dds_does_not_connect_holds_nobody_up(launch: Any, tmp_path: Path, node: tuple[Any, Any]) -> None:
+def test_whom_dds_does_not_connect_holds_nobody_up(grasp_run: Any, node: tuple[Any, Any]) -> None:
     """Readers and writers of another type, or of a quality of service that is not offered, from before the start on."""
     peer, _ = node
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -192,38 +191,28 @@ def test_whom_dds_does_not_connect_holds_nobody_up(launch: Any, tmp_path: Path, 
     for qos in (latched, often, lively):
         peer.create_subscription(JointState, JOINT_STATES.name, print, qos)
     peer.create_subscription(JointState, SCENE.name, print, 1)
-    words = ["arm_alone", "--set", "time.duration_s=1", "-o", "run", "--no-figure"]
-    run = launch(*RUN, *words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    run = grasp_run("arm_alone", "--set", "time.duration_s=1", "--no-figure")
     out, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err
-    assert "same without ROS          equal, bit for bit" in out
+    assert "1001 states follow from the recorded inputs, bit for bit" in out
 
 
 @pytest.mark.slow  # real processes
 def test_a_graph_that_slept_as_a_whole_goes_on(launch: Any, tmp_path: Path) -> None:
     """Nobody takes his own pause for the silence of others, although all end for silence."""
-    options = ["--ros-args", "-p", "peer_timeout_s:=0.6", "-p", "on_silence:=end"]
-    own = {"plant": ["-p", "scene:=case_01"], "monitor": ["-p", f"bag:={tmp_path / 'bag'}"]}
-    graph = {}
-    for name in ("monitor", "left_controller", "right_controller", "plant"):
-        words = own.get(name, []) + ([] if name == "monitor" else ["-p", "wait_for_monitor:=true"])
-        with (tmp_path / name).open("w") as log:
-            graph[name] = launch(*START, name, *options, *words, stderr=log)
-    file = tmp_path / "bag" / "bag.mcap"
-    wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a bag that grows")
-    for process in graph.values():
+    graph = Terminals(launch, tmp_path, "case_01", ["-p", "peer_timeout_s:=0.6", "-p", "on_silence:=end"])
+    processes = graph.processes.values()
+    for process in processes:
         process.send_signal(signal.SIGSTOP)
     with pytest.raises(subprocess.TimeoutExpired):  # longer than a slow one may take
-        graph["plant"].wait(3.0)
-    for process in graph.values():
+        graph.processes["plant"].wait(3.0)
+    for process in processes:
         process.send_signal(signal.SIGCONT)
-    size = file.stat().st_size
-    wait_for(lambda: file.stat().st_size > size + 20_000 or graph["plant"].poll() is not None, "more ticks")
-    said = "".join((tmp_path / name).read_text() for name in graph)
-    assert "this process was stopped for" in said
-    for process in graph.values():
+    more_ticks(graph.file)
+    assert "this process was stopped for" in graph.said()
+    for process in processes:
         process.send_signal(signal.SIGINT)
-    assert [process.wait(DEADLINE) for process in graph.values()] == [0, 0, 0, 0], said
+    assert [process.wait(DEADLINE) for process in processes] == [0, 0, 0, 0], graph.said()
     recording = bag.read(tmp_path / "bag")
     assert not any(recording.missing.values())
     assert verify(recording).holds

@@ -11,8 +11,6 @@ import re
 import select
 import signal
 import struct
-import subprocess
-import sys
 import termios
 import time
 from collections.abc import Callable
@@ -21,7 +19,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import DEADLINE, START, wait_for
+from graphs import call
+from processes import DEADLINE, GRASP, START, node_command, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rich.console import Console
 from sensor_msgs.msg import JointState
@@ -31,7 +30,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.cli.watch import HINT, moment_of
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.view import View
+from grasp_ros.graph.terminal import View
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene.topics import JOINT_STATES
 from grasp_ros.simulation import simulate
@@ -109,7 +108,7 @@ class Screen:
 
 def watch(path: Path, *options: str) -> list[str]:
     """The command for a bag."""
-    return [sys.executable, "-m", "grasp_ros.cli", "watch", str(path), *options]
+    return [*GRASP, "watch", str(path), *options]
 
 
 def time_in(picture: str) -> float:
@@ -144,9 +143,8 @@ def test_a_bag_is_shown_to_its_end(launch: Any, path: Path) -> None:
 
 
 def test_a_plant_that_was_paused_before_anybody_watched_is_said_to_be_and_steps(launch: Any) -> None:
-    launch(*START, "plant", "--ros-args", "-p", "scene:=friction_slide", "-p", "paused:=true")
-    ask = [sys.executable, "-m", "grasp_ros.cli", "ctl", "status"]
-    wait_for(lambda: "paused" in subprocess.run(ask, capture_output=True, text=True, check=False).stdout, "a pause")
+    launch(*node_command("plant", scene="friction_slide", paused="true"))
+    wait_for(lambda: "paused" in ran(*GRASP, "ctl", "status").stdout, "a pause")
     screen = Screen(launch, *START, "watch")
     wait_for(lambda: screen.shows("the plant is paused at tick 0; → steps it"), "what the plant is")
     screen.press(RIGHT)
@@ -225,15 +223,8 @@ def test_what_cannot_be_shown_is_refused(path: Path, command: Any, options: list
 def test_keys_pause_and_step_a_running_plant(
     launch: Any, tmp_path: Path, node: tuple[Any, SingleThreadedExecutor]
 ) -> None:
-    peer, executor = node
-    client = peer.create_client(Trigger, "plant/status")
-
     def status() -> dict[str, Any]:
-        assert client.wait_for_service(timeout_sec=DEADLINE)
-        future = client.call_async(Trigger.Request())
-        executor.spin_until_future_complete(future, timeout_sec=DEADLINE)
-        found: dict[str, Any] = json.loads(future.result().message)
-        return found
+        return json.loads(call("status", node).message)  # type: ignore[no-any-return]
 
     case = scenes.load("case_01", ["time.duration_s=1000"])
     graph = Graph(case, tmp_path / "run", ACCURACY, one_process=True)

@@ -14,7 +14,7 @@ import grasp_ros
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.verify import compare_recording
+from grasp_ros.graph.verify import verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene import SceneError, compose, load, parse
 from grasp_ros.scene.effects import BY_SECTION
@@ -190,4 +190,4 @@ def test_a_graph_runs_a_scene_with_sections_without_numbers(tmp_path: Path) -> N
     assert set(statuses.values()) == {0}
     recording = bag.read(graph.bag)
     assert recording.scene.values == scene.values
-    assert compare_recording(recording).equal
+    assert verify(recording).holds

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from grasp_ros.graph.health.heartbeat import ENDED, Heartbeats, digest
 from grasp_ros.graph.health.watchdog import Watchdog
 from grasp_ros.graph.parameters import PEER_SECONDS, START_SECONDS, check_timeouts
-from grasp_ros.graph.ros.node import PATIENCE_SECONDS, REPORT_SECONDS, GraspNode, Phase
+from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode, Phase
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
 from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
@@ -32,7 +32,6 @@ class Gone(Enum):
     ENDS = "ends"
     AS_TOLD = "ends or waits on, as on_silence says"
     STAYS = "waits for the next one"
-    NOTED = "says so"  # and does not end for it, either: another one does
 
 
 class Need(NamedTuple):
@@ -50,7 +49,6 @@ class Trouble(NamedTuple):
 
     words: str
     certain: bool  # whether it is more than slowness
-    announced: bool = False  # whether its source has said that it ends
 
 
 class PeerNode(GraspNode):
@@ -70,7 +68,6 @@ class PeerNode(GraspNode):
         self._left: tuple[Phase, str] | None = None  # what it did before a peer ended without which it stays
         self._gone: dict[Topic, float] = {}
         self._last: dict[Topic, list[str]] = {}  # names of the last sources
-        self._cached: dict[Topic, tuple[float, int, list[str]]] = {}
         self._texts: dict[Topic, list[tuple[float, str]]] = {}
         self._takers: dict[Topic, Callable[[str], None]] = {}
         self._taken: dict[Topic, tuple[str, str]] = {}  # digest, and who said it
@@ -99,9 +96,8 @@ class PeerNode(GraspNode):
 
     def report(self) -> None:
         """Publish the counters, and who publishes what somebody else does."""
-        several = [topic for topic in self.inputs
-                   if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1]
-        found = {topic.name: self.living(topic) for topic in several}
+        found = {topic.name: self.living(topic) for topic in self.inputs
+                 if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1}
         self.other_sources = "; ".join(
             f"{name} has the sources {' and '.join(names)}" for name, names in found.items() if len(names) > 1)
         if self.other_sources:
@@ -148,7 +144,7 @@ class PeerNode(GraspNode):
 
     def _trouble_with(self, need: Need, now: float) -> Trouble | None:
         """What is wrong with a topic; None if all is well."""
-        names = self._names(need.topic, now)
+        names = self.sources(need.topic)
         if not names:
             if need.topic not in self._last:  # it has not come yet
                 return None
@@ -157,7 +153,7 @@ class PeerNode(GraspNode):
             last = self._last[need.topic]
             said = [beat.ended for beat in self.heartbeats.of(last) if beat.ended]
             words = f"{need.topic.name}: {' and '.join(last)} has ended"
-            return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True, bool(said))
+            return Trouble(words + "".join(f": {why}" for why in said[-1:] if why != ENDED), True)
         self._gone.pop(need.topic, None)
         self._last[need.topic] = names
         patience = self.patience
@@ -175,15 +171,6 @@ class PeerNode(GraspNode):
             words = f"{need.topic.name}: no {need.what} of {' and '.join(names)} for {min(late, limit):.1f} s"
             return Trouble(f"{words}, although it lives" if living else words, late > limit)
         return None
-
-    def _names(self, topic: Topic, now: float) -> list[str]:
-        """Sources of a topic, as of the last second unless their number has changed: names cost more than numbers."""
-        when, number, names = self._cached.get(topic, (-math.inf, 0, []))
-        there = self.count_publishers(topic.name)
-        if now - when > REPORT_SECONDS or number != there:
-            names = self.sources(topic)
-            self._cached[topic] = now, there, names
-        return names
 
     def _note(self, need: Need, trouble: Trouble | None, now: float) -> None:
         """React to what is wrong with a topic, or to its end."""
@@ -203,13 +190,12 @@ class PeerNode(GraspNode):
                 self._left = self.phase, self.words
                 self.phase, self.words = Phase.IDLE, f"waiting for another one: {trouble.words}"
                 self.get_logger().info(self.words)
-        elif (gone and need.gone is Gone.ENDS) or (need.gone is not Gone.NOTED and self._ends and trouble.certain):
+        elif (gone and need.gone is Gone.ENDS) or (self._ends and trouble.certain):
             self.fail(trouble.words)
-        elif since is None and not (trouble.announced and need.gone is Gone.NOTED):
-            self._silent[name] = self._said = now
-            self.count("silent peers")
-            self.get_logger().error(f"{trouble.words}; waits on")
-        elif since is not None and now - self._said > PATIENCE_SECONDS:
+        elif since is None or now - self._said > PATIENCE_SECONDS:
+            if since is None:
+                self._silent[name] = now
+                self.count("silent peers")
             self._said = now
             self.get_logger().error(f"{trouble.words}; waits on")
         self.trouble = f"waits for {', '.join(self._silent)}" if self._silent else ""

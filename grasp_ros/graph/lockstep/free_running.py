@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -19,7 +20,6 @@ import numpy as np
 from grasp_ros.graph.health.peers import Gone, Need
 from grasp_ros.graph.lockstep.admission import Limits
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.lockstep.timing import Timing
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.rosbag2 import numbers_message
 from grasp_ros.graph.running import Running
@@ -37,6 +37,8 @@ GRACE = 0.75  # of a period: how long a late plant waits for an answer; the rest
 KEEPS_UP = 3  # periods that the last answer of a controller may be old for the next one to be waited for
 BURST_SECONDS = 0.003  # of catching up at a time, so that commands and services get their turn
 PATIENCE_SECONDS = 0.5  # further behind than this the plant gives up wall time, never a state
+PERCENTILE = 99.0
+OLDEST = 10_000  # periods that are told apart in the ages of commands
 
 
 @dataclass
@@ -179,3 +181,66 @@ class FreeRunning:
             time_ns = self._plant.tick * self._plant.scene.period_ns
             self._quality.publish(numbers_message(time_ns, values))
             self._plant.counters.update({name: f"{value:.6g}" for name, value in values.items()})
+
+
+class Timing:
+    """How well the plant keeps its time; `period` in s of wall time, `factor` as it is asked for."""
+
+    def __init__(self, sides: Sequence[str], period: float, factor: float) -> None:
+        self._period, self._factor = period, factor
+        self.lost = 0.0  # wall time given up, s; all from here on are since the start
+        self._overruns, self._spent, self._counted = 0, 0.0, 0  # the last two: time and number of all intervals
+        self._all: dict[str, Counter[int]] = {side: Counter() for side in sides}  # how often commands had an age
+        self._timed_out: Counter[str] = Counter()
+        self._ages: dict[str, Counter[int]] = {side: Counter() for side in sides}  # from here on since the last `take`
+        self._intervals: list[float] = []
+        self._lateness: list[float] = []
+        self._before = math.nan
+
+    def period(self, now: float, late: float) -> None:
+        """One control period, computed at a wall time in s, late by so much."""
+        if not math.isnan(self._before):
+            self._intervals.append(now - self._before)
+            self._spent, self._counted = self._spent + now - self._before, self._counted + 1
+        self._before = now
+        self._lateness.append(late)
+        self._overruns += late > self._period
+
+    def pause(self) -> None:
+        """The plant stands, as it was told to."""
+        self._before = math.nan
+
+    def age(self, side: str, periods: int, timed_out: bool) -> None:
+        """Age of the last command in control periods: how much older the state is that it answers."""
+        self._ages[side][min(periods, OLDEST)] += 1
+        self._timed_out[side] += timed_out
+
+    def take(self) -> dict[str, float]:
+        """What was collected since the last call, by name; nothing where there was no period.
+
+        `reached` are the simulated seconds in a second since the start, without pauses; `period_s` is the mean
+        interval, `jitter_s` its standard deviation, `late_p99_s` how late the periods were computed, `overruns` how
+        many were later than a whole period since the start, and `left_age_p99` and so on the age of the commands in
+        periods; `left_age_p99_all` and `left_age_max_all` are those since the start, and `left_timed_out_all` in how
+        many periods it was older than the timeout.
+        """
+        if not self._lateness or not self._intervals:
+            return {}
+        values = {
+            "period_s": float(np.mean(self._intervals)), "jitter_s": float(np.std(self._intervals)),
+            "late_p99_s": float(np.percentile(self._lateness, PERCENTILE)), "overruns": float(self._overruns),
+            "lost_s": self.lost, "reached": self._factor * self._period * self._counted / self._spent,
+        }
+        for side, ages in self._ages.items():
+            self._all[side].update(ages)
+            for end, found in (("", ages), ("_all", self._all[side])):
+                known, often = [*found], [*found.values()]
+                values[f"{side}_age_p99{end}"] = float(  # the smallest that PERCENTILE of them do not exceed
+                    np.percentile(known, PERCENTILE, weights=often, method="inverted_cdf")
+                )
+                values[f"{side}_age_max{end}"] = float(max(known))
+            values[f"{side}_timed_out_all"] = float(self._timed_out[side])
+            ages.clear()
+        self._intervals.clear()
+        self._lateness.clear()
+        return values

@@ -74,8 +74,6 @@ class Controller(PeerNode):
     def needs(self) -> Iterator[Need]:
         """The plant; a monitor is the plant's need."""
         yield Need(JOINT_STATES, Gone.STAYS)
-        if self._monitored:
-            yield Need(LYAPUNOV, Gone.NOTED)
 
     def progress(self) -> object:
         """The last state answered."""

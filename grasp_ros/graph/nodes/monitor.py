@@ -98,11 +98,8 @@ class Monitor(PeerNode):
         self.on_text(SCENE, self._on_scene)
 
     def needs(self) -> Iterator[Need]:
-        """The plant; in lockstep controllers too, but they are the plant's need."""
+        """The plant; controllers are the plant's need."""
         yield Need(JOINT_STATES, Gone.ENDS)
-        if self._running is not None and self._scene is not None and self._running.lockstep:
-            for topic in self._scene.controllers.values():
-                yield Need(topic, Gone.NOTED)
 
     def progress(self) -> object:
         """The ticks so far."""

@@ -21,11 +21,10 @@ from std_srvs.srv import Trigger
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.host import place
-from grasp_ros.graph.keys import Key, Keys
 from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
-from grasp_ros.graph.view import Moment, View, named
+from grasp_ros.graph.terminal import Key, Keys, Moment, View, named
 from grasp_ros.physics.errors import printable
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of

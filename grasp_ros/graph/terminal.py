@@ -1,9 +1,17 @@
-"""A graph or a bag in a terminal: the masses on their line, forces, energy, contacts and rates, at one moment."""
+"""A graph or a bag in a terminal: the masses on their line, forces, energy, contacts and rates, at one moment; keys."""
 
 from __future__ import annotations
 
+import os
+import re
+import select
+import sys
+import termios
+import tty
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from contextlib import suppress
+from enum import Enum
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Group, RenderableType
@@ -21,6 +29,9 @@ STYLES = {"left": "bold blue", "object": "bold white", "right": "bold red"}
 SIGNS = {"left": "[L]", "object": "(O)", "right": "[R]"}
 WIDEST, NARROW, LEAST = 80, 66, 40  # columns of the picture: at most, below which words are short, and at least
 CONTACT = {Mode.NONE: "none", Mode.LEFT: "left", Mode.RIGHT: "right", Mode.BOTH: "left and right"}
+_KEY = re.compile(rb"\x1b[\[O][CD]| |q")
+_BEGUN = re.compile(rb"\x1b[\[O]?$")  # of an arrow key whose end has not come yet
+KEY_BYTES = 1024  # taken at once
 
 
 class Moment(NamedTuple):
@@ -108,3 +119,49 @@ class View:
 def named(values: Iterable[float]) -> dict[str, float]:
     """What `lyapunov` carries, by name."""
     return dict(zip(LYAPUNOV_NAMES, (float(value) for value in values), strict=True))
+
+
+class Key(Enum):
+    """What a key asks for."""
+
+    PAUSE = b" "
+    FORWARD = b"C"
+    BACK = b"D"
+    QUIT = b"q"
+
+
+class Keys:
+    """Keys pressed on the standard input from `start` to `close`."""
+
+    def __init__(self) -> None:
+        # Whether there can be any: not without a terminal, nor in the background, where a terminal stops who sets it.
+        self.there, self._file, self._rest = False, 0, b""
+        self._before: list[Any] = []
+
+    def start(self) -> None:
+        """From now on keys come one by one and are not shown; Ctrl-C stays a signal."""
+        self._file = sys.stdin.fileno() if sys.stdin and not sys.stdin.closed else -1
+        with suppress(OSError):  # not a terminal, or not that of this session
+            if self._file >= 0 and os.tcgetpgrp(self._file) == os.getpgrp():
+                self._before = termios.tcgetattr(self._file)
+                self.there = True
+                tty.setcbreak(self._file)
+
+    def close(self) -> None:
+        """Give the terminal back; does nothing the second time."""
+        if self.there:
+            self.there = False
+            termios.tcsetattr(self._file, termios.TCSADRAIN, self._before)
+
+    def pressed(self, seconds: float = 0.0) -> list[Key]:
+        """Keys in their order; waits for the first one, at most so many seconds. A terminal that is gone is a QUIT."""
+        ready, _, _ = select.select([self._file] if self.there else [], [], [], seconds)
+        if not ready:
+            return []
+        came = os.read(self._file, KEY_BYTES)
+        if not came:
+            return [Key.QUIT]
+        came = self._rest + came
+        begun = _BEGUN.search(came)
+        self._rest = begun[0] if begun else b""
+        return [Key(word[-1:]) for word in _KEY.findall(came)]
