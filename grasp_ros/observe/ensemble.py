@@ -18,7 +18,7 @@ from grasp_ros.exact.compensated import write_penetrations
 from grasp_ros.exact.compilation.jit import address_of_code, kernel
 from grasp_ros.exact.compilation.jit import door as machine_door
 from grasp_ros.exact.driver.advance import advance
-from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, call
+from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, FINISH, call
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.integrator import BREATH, compile_kernels
 from grasp_ros.exact.records import (
@@ -31,7 +31,7 @@ from grasp_ros.exact.records import (
     new_run,
     one_interval,
 )
-from grasp_ros.observe.observe import BEGIN, FINISH
+from grasp_ros.observe.observe import BEGIN
 from grasp_ros.observe.observer import RunObserver
 from grasp_ros.observe.record import UNDECIDED, Memory, Seen, Switch, Wanted
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
