@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Any
 
 from numba import types
 
@@ -17,11 +16,7 @@ from grasp_ros.exact.compilation.jit import instruction
 REAL = types.float64
 
 
-def _code(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
-    return builder.fma(*arguments)
-
-
-@instruction(lambda _, a, b, c: (REAL(REAL, REAL, REAL), _code))
+@instruction(lambda _, a, b, c: (REAL(REAL, REAL, REAL), lambda _, builder, __, numbers: builder.fma(*numbers)))
 def fma(a: float, b: float, c: float) -> float:
     """The sum of a product, a b, and c."""
     if not math.isfinite(a * b + c):

@@ -18,7 +18,7 @@ from grasp_ros.exact.driver.callback import notify
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
 from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
 from grasp_ros.exact.driver.outputs import may_go_on, write_reached
-from grasp_ros.exact.driver.rest import keep_scale, rests, wake
+from grasp_ros.exact.driver.rest import SINCE, keep_scale, rests
 from grasp_ros.exact.driver.segment import deliver, move
 from grasp_ros.exact.flight.segment import cut_flight, flight_ends, fly_free
 from grasp_ros.exact.records import (
@@ -121,7 +121,7 @@ def advance(
         if rests(plant, state):
             rest(state, loop)
             continue
-        wake(state)
+        state.rest[SINCE] = math.inf  # a segment moves on
         modes = (state.mode[LEFT], state.mode[RIGHT])
         segment, ends = next_segment(tables, plant, state, settings, span, out.work)
         if math.isnan(segment.t):
