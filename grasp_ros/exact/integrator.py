@@ -106,7 +106,7 @@ class Integrator:
         self._max_events, self._max_work = whole("max_events", max_events, 0), whole("max_work", max_work, 0)
         bodies = system.closed_loop if continuous else system.bodies
         self._plant_block = _block_of(bodies, system.pairs, system.coulomb)
-        self._state_block, self._mode, self.records = new_state()
+        self._state_block, self.records = new_state()
         self.records.y[:] = *state, state[X.L] - state[X.O], state[X.O] - state[X.R]
         self.records.rest[SINCE] = math.inf
         self._events: list[Array] = []
@@ -226,8 +226,8 @@ class Integrator:
                 allowed = event_rows[: self._max_events - self._event_count + SPARE]
                 most = min(self._spent + BREATH, self._max_work)
                 outcome = advance(
-                    block, order, self._plant_block, self._state_block, self._mode, self._accuracy, most, grid, out,
-                    allowed, filled, self.work, observer, tuple(loop))
+                    block, order, self._plant_block, self._state_block, self.records.mode, self._accuracy, most, grid,
+                    out, allowed, filled, self.work, observer, tuple(loop))
                 if count := int(filled[_EVENTS]):
                     self._events.append(event_rows[:count].copy())
                     self._event_count += count

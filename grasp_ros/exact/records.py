@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from grasp_ros.physics.control import Column
-from grasp_ros.physics.layout import LANES, Kind, Pair, Place
+from grasp_ros.physics.layout import LANES, Kind, Pair
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -58,16 +58,16 @@ def state_of(block: Array, mode: Integers) -> State:
     return State(block[:8], mode, block[8:14], block[14:17], block[17:])
 
 
-def new_state() -> tuple[Array, Integers, State]:
-    """Where a run begins: a block of numbers, modes that are not known yet, and the record of both."""
-    block, mode = np.zeros(STATE_NUMBERS), np.array([Pair.UNKNOWN.value] * 3)
-    return block, mode, state_of(block, mode)
+def new_state() -> tuple[Array, State]:
+    """Where a run begins: a block of numbers, and its record, with modes that are not known yet."""
+    block = np.zeros(STATE_NUMBERS)
+    return block, state_of(block, np.array([Pair.UNKNOWN.value] * 3))
 
 
-def new_run() -> tuple[Array, Array, Integers, Plant, State]:
-    """What a run works on: blocks of plant and state, modes that are not known yet, and the records of these."""
-    plant, (state, mode, record) = np.zeros(PLANT_NUMBERS), new_state()
-    return plant, state, mode, plant_of(plant), record
+def new_run() -> tuple[Array, Array, Plant, State]:
+    """What a run works on: blocks of plant and state, and their records."""
+    plant, (state, record) = np.zeros(PLANT_NUMBERS), new_state()
+    return plant, state, plant_of(plant), record
 
 
 class Order(NamedTuple):
@@ -114,15 +114,9 @@ class Loop(NamedTuple):
     waiting: Array = np.zeros((0, 3))  # (delay, 3) commands on their way, N by body: a ring; updated in place
 
 
-_FIRST = np.array([-1 if entry == Place.FAILED else 0 for entry in Place])
-
-
 def new_place(tick: int = 0) -> Integers:
-    """Where a loop begins; the tick is that of its first interval."""
-    place = _FIRST.copy()
-    if tick:
-        place[Place.TICK] = tick
-    return place
+    """Where a loop begins, see `layout.Place`; the tick is that of its first interval."""
+    return np.array([0, 0, tick, -1])
 
 
 def one_interval(length: float, begin: float, outputs: int) -> Loop:

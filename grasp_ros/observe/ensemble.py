@@ -18,20 +18,11 @@ from grasp_ros.exact.compensated import write_penetrations
 from grasp_ros.exact.compilation.jit import address_of_code, kernel
 from grasp_ros.exact.compilation.jit import door as machine_door
 from grasp_ros.exact.driver.advance import advance
-from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, call
+from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, FINISH, call
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.integrator import BREATH, compile_kernels
-from grasp_ros.exact.records import (
-    COULOMB,
-    Array,
-    Integers,
-    Loop,
-    Plant,
-    State,
-    new_run,
-    one_interval,
-)
-from grasp_ros.observe.observe import BEGIN, FINISH
+from grasp_ros.exact.records import COULOMB, Array, Integers, Loop, Output, Plant, State, new_run, one_interval
+from grasp_ros.observe.observe import BEGIN
 from grasp_ros.observe.observer import RunObserver
 from grasp_ros.observe.record import UNDECIDED, Memory, Seen, Switch, Wanted
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
@@ -58,15 +49,9 @@ class Room(NamedTuple):
     order: int
     plant_block: Array
     state_block: Array
-    mode: Integers  # (3,)
     plant: Plant
     state: State
-    times: Array  # (0,)
-    rows: Array  # (0, 6)
-    events: Array  # (m, 5)
-    filled: Integers
-    work: Integers
-    observer: Integers  # (2,)
+    out: Output  # without output times
 
 
 class Limits(NamedTuple):
@@ -125,19 +110,20 @@ def load_row(rows: Rows, i: int, room: Room, memory: Memory) -> None:
     for place in range(6):
         room.state.y[place] = rows.state[i, place]
     room.plant_block[COULOMB] = rows.coulomb[i]
-    room.mode[:], room.state.clock[:], room.state.low[:], room.state.rest[:] = Pair.UNKNOWN.value, 0.0, 0.0, 0.0
-    room.filled[:], room.work[:] = 0, 0
-    write_penetrations(room.state)
+    state, out = room.state, room.out
+    state.mode[:], state.clock[:], state.low[:], state.rest[:] = Pair.UNKNOWN.value, 0.0, 0.0, 0.0
+    out.filled[:], out.work[:] = 0, 0
+    write_penetrations(state)
 
 
 @kernel
-def count_events(rows: Rows, i: int, room: Room) -> int:
-    """Count the touches among the events, and forget these; returns their number."""
-    count = room.filled[Filled.EVENTS]
+def count_events(touches: Array, out: Output) -> int:
+    """Count the touches (2,) among the events, and forget these; returns their number."""
+    count = out.filled[Filled.EVENTS]
     for k in range(count):
-        if room.events[k, Entry.KIND] == Transition.TOUCH.value:
-            rows.touches[i, int(room.events[k, Entry.BODY])] += 1.0
-    room.filled[Filled.EVENTS] = 0
+        if out.events[k, Entry.KIND] == Transition.TOUCH.value:
+            touches[int(out.events[k, Entry.BODY])] += 1.0
+    out.filled[Filled.EVENTS] = 0
     return int(count)
 
 
@@ -146,12 +132,12 @@ def run_row(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, 
     """Integrate a row over the interval of the loop; why it ended."""
     place = Loop(*driven).place
     place[Place.INTERVAL] = place[Place.BEGUN] = 0
-    outcome, events = np.int64(Outcome.EVENTS_FULL.value), 0
+    outcome, events, out = np.int64(Outcome.EVENTS_FULL.value), 0, room.out
     while outcome == Outcome.EVENTS_FULL and events <= limits.max_events:
         outcome = door(
-            room.block, room.order, room.plant_block, room.state_block, room.mode, limits.tolerance, limits.max_work,
-            room.times, room.rows, room.events, room.filled, room.work, room.observer, driven)
-        events += count_events(rows, i, room)
+            room.block, room.order, room.plant_block, room.state_block, room.state.mode, limits.tolerance,
+            limits.max_work, out.grid, out.rows, out.events, out.filled, out.work, out.observer, driven)
+        events += count_events(rows.touches[i], out)
     return int(outcome if events <= limits.max_events else Outcome.EVENTS_FULL.value)
 
 
@@ -166,7 +152,7 @@ def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, me
     while seen[Seen.SETTLED] == UNDECIDED and done < limits.horizons and outcome == Outcome.DONE:
         loop.begins[0] = done * loop.lengths[0]
         outcome = run_row(door, driven, rows, i, room, limits)
-        call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
+        call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
         done += 1
     loop.begins[0] = 0.0
     rows.touches[i, 0], rows.touches[i, 1] = left, right
@@ -185,13 +171,13 @@ def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory:
         if limits.stop[0] != 0:
             return i
         load_row(rows, i, room, memory)
-        if room.observer[ADDRESS] != 0:
-            call(room.observer[ADDRESS], room.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0)
+        if room.out.observer[ADDRESS] != 0:
+            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], BEGIN, limits.settled, 0.0, 0)
         outcome = run_row(door, driven, rows, i, room, limits)
         for place in range(6):
             rows.state[i, place] = room.state.y[place]
-        if room.observer[ADDRESS] != 0:
-            call(room.observer[ADDRESS], room.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
+        if room.out.observer[ADDRESS] != 0:
+            call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
             for place in range(memory.seen.shape[0]):
                 rows.seen[i, place] = memory.seen[place]
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
@@ -214,13 +200,14 @@ def integrate_rows(rows: Rows, duration: float, wanted: Wanted, limits: Limits) 
         `stop`, to have the rows stop.
     """
     run = new_run()
-    run_observer = RunObserver(*run[3:], wanted)
+    run_observer = RunObserver(*run[2:], wanted)
     driven = tuple(one_interval(duration, 0.0, 0))
     run_observer.memory.switches[Switch.CERTAIN] = 1
     limits = limits._replace(max_work=min(limits.max_work, BREATH))
     with workspace(limits.tolerance) as (block, order, tables, events):
         observer = run_observer.attach(tables) if wanted else np.zeros(2, dtype=np.int64)
-        room = Room(block, order, *run, np.zeros(0), np.zeros((0, 6)), events,
-                    np.zeros(len(Filled), dtype=np.int64), np.zeros(len(Work), dtype=np.int64), observer)
+        room = Room(block, order, *run, Output(
+            np.zeros(0), np.zeros((0, 6)), events, np.zeros(len(Filled), dtype=np.int64),
+            np.zeros(len(Work), dtype=np.int64), observer))
         done = run_rows(door(), driven, rows, room, run_observer.memory, limits)
     return int(done)

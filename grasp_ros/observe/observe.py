@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, inlined, kernel
-from grasp_ros.exact.driver.callback import call
+from grasp_ros.exact.driver.callback import FINISH, call
 from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.records import Array
 from grasp_ros.observe.flight_extremes import flight_ranges, owner, weights
@@ -29,7 +29,7 @@ from grasp_ros.observe.settling import settled_from, watch_bound
 from grasp_ros.observe.step_extremes import extremes_of, step_ranges
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Kind, Law, Of, Pair, U, X
 
-BEGIN, FINISH = -2, -1  # in place of a kind of segment
+BEGIN = -2  # in place of a kind of segment
 
 
 @kernel

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
-from grasp_ros.exact.compilation.jit import compiled_address
-from grasp_ros.exact.driver.callback import block_of
+from grasp_ros.exact.driver.callback import FINISH, address_of, block_of
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Integers, Plant, State, Tables
-from grasp_ros.observe.observe import BEGIN, FINISH, observe, observe_losses
+from grasp_ros.observe.observe import BEGIN, observe, observe_losses
 from grasp_ros.observe.record import UNDECIDED, Seen, Switch, Wanted, memory_of
-
-SIGNATURE = "int64(int64, int64, float64, float64, int64)"
 
 
 class RunObserver:
@@ -82,9 +76,3 @@ def watch(integrator: Integrator, wanted: Wanted, bound: float) -> RunObserver:
     run_observer.begin(bound)
     integrator.observer = run_observer
     return run_observer
-
-
-@cache
-def address_of(function: Any) -> int:
-    """Address of an observer, which is compiled where it has not been."""
-    return compiled_address(function, SIGNATURE)

@@ -106,7 +106,7 @@ def memory_of(plant: Plant, state: State) -> Memory:
         scratch, np.zeros(COUNTS, dtype=np.int64), np.zeros(len(Switch), dtype=np.int64))
 
 
-memory_at = reader(typeof(memory_of(*new_run()[3:])))
+memory_at = reader(typeof(memory_of(*new_run()[2:])))
 
 
 class SegmentRecord(NamedTuple):

@@ -11,16 +11,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
-from grasp_ros.exact.compilation.vectors import (
-    HALF,
-    add_product,
-    highest,
-    larger,
-    load,
-    load_half,
-    spread_half,
-    store,
-)
+from grasp_ros.exact.compilation.vectors import HALF, add_product, highest, larger, load, load_half, spread_half, store
 from grasp_ros.exact.numerics.polynomial import INVERSE
 from grasp_ros.exact.numerics.roots import value_and_rate
 from grasp_ros.exact.records import Array

@@ -14,6 +14,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
+from grasp_ros.exact.driver.callback import FINISH
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.roots import value_and_rate
@@ -36,7 +37,6 @@ from grasp_ros.sensitivity.tangents import (
     tangents_at,
 )
 
-FINISH = -1  # in place of a kind of segment
 GAP = 64.0 * EPS  # of the time: what is longer was rest, of which no segment tells
 
 

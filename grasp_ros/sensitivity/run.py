@@ -6,15 +6,14 @@ import math
 
 import numpy as np
 
-from grasp_ros.exact.driver.callback import block_of
+from grasp_ros.exact.driver.callback import FINISH, address_of, block_of
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.exact.records import Integers, Tables
-from grasp_ros.observe.observer import address_of
 from grasp_ros.physics.control import normals_over
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions, law_rows
-from grasp_ros.sensitivity.propagate import FINISH, propagate
+from grasp_ros.sensitivity.propagate import propagate
 from grasp_ros.sensitivity.tangents import Count, Number, tangents_of
 
 

@@ -17,6 +17,7 @@ from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.compilation.vectors import HALF
 from grasp_ros.exact.contact.step_order import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
+from grasp_ros.exact.driver.workspace import zeros
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.control import Column
@@ -33,7 +34,6 @@ WEIGHTS = HALF * TERMS
 ROOM = HALF * (TERMS + 3)  # of four series for `contact.multiply`
 COLUMNS = len(Column)
 UNSEEN = -1  # slide before the first segment
-LINE_BYTES = 64
 
 
 class Row(IntEnum):
@@ -142,14 +142,6 @@ class Tangents(NamedTuple):
     matrices: Array  # (5, 6, 6) scratch
 
 
-def zeros(*shape: int) -> Array:
-    """Zeros that begin on a line of the processor's cache: vectors that lie on two lines take twice as long."""
-    count = math.prod(shape)
-    whole = np.zeros(count + LINE_BYTES // 8)
-    first = -whole.ctypes.data % LINE_BYTES // whole.itemsize
-    return whole[first : first + count].reshape(shape)
-
-
 def _padded(array: Array) -> Array:
     """An array with zeros behind its last axis, up to a multiple of HALF."""
     n = array.shape[-1]
@@ -173,7 +165,7 @@ def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) ->
     return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)))
 
 
-tangents_at = reader(typeof(tangents_of(*new_run()[3:], no_directions(1), np.zeros(0))))
+tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0))))
 
 
 @kernel

@@ -8,9 +8,8 @@ import time
 import numpy as np
 from numba import cfunc, typeof
 
-from grasp_ros.exact.driver.callback import block_of, reader
+from grasp_ros.exact.driver.callback import SIGNATURE, block_of, reader
 from grasp_ros.exact.records import Integers, Tables
-from grasp_ros.observe.observer import SIGNATURE
 from grasp_ros.physics.model import Array
 from grasp_ros.scene.effects.base import NANOSECONDS
 

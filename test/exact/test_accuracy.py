@@ -17,7 +17,9 @@ from lab.reference import integrate
 pytestmark = pytest.mark.slow  # references with 20 and 25 digits
 
 LONG = ("case_01", "case_02", "case_03", "case_04", "case_06", "case_09")  # 20 s of reference; 5 s for the others
-FORGETFUL = ("case_03", "case_06", "case_09")  # these amplify most
+BOUNDS = {  # one rounding of one start velocity changes case 9 by 1.0e-9
+    "case_01": 1e-12, "case_02": 1e-11, "case_03": 1e-9, "case_06": 1e-9, "case_09": 5e-9,
+}
 TOUCHES = {"case_01": (22, 22), "case_02": (29, 25), "case_03": (27, 21)}
 
 
@@ -36,16 +38,7 @@ def horizon_of(name: str) -> float:
 def test_states_against_the_reference_at_default_accuracy(name: str) -> None:
     result = case(name)
     done(result)
-    # one rounding of one start velocity changes case 9 by 1.0e-9
-    bound = 5e-9 if name == "case_09" else 1e-9 if name in FORGETFUL else 3e-11
-    assert np.abs(result.states - reference_of(name, horizon_of(name)).as_array()).max() < bound
-
-
-@pytest.mark.parametrize(("name", "bound"), [("case_01", 1e-12), ("case_02", 1e-11), ("case_03", 1e-9)])
-def test_finest_accuracy_reaches_the_horizon_of_double_precision(name: str, bound: float) -> None:
-    result = case(name, accuracy=1e-16)
-    done(result)
-    assert np.abs(result.states - reference_of(name, horizon_of(name)).as_array()).max() < bound
+    assert np.abs(result.states - reference_of(name, horizon_of(name)).as_array()).max() < BOUNDS.get(name, 3e-11)
 
 
 @pytest.mark.parametrize("name", ["case_01", "case_04", "case_10"])
@@ -88,16 +81,3 @@ def test_random_clamped_scenes_against_the_reference(seed: int) -> None:
         assert len(begins) == len(reference.touches[side])
         assert len(ends) == len(reference.releases[side])
     assert np.abs(result.states - reference.as_array()).max() < 1e-10
-
-
-PUSHED = [0.0, 0.0, 0.0, 0.0, -0.01, -0.3]  # the left pair is at u = 0 and at rest, the pressed right pair closes it
-
-
-def test_a_pair_at_rest_that_the_other_one_closes() -> None:
-    grasp, grid = make_grasp(object_mass=2.0), np.linspace(0.0, 0.5, 21)
-    # continuity: a gap of 1e-9 m is closed after about 1e-5 s and matters as little
-    reference = integrate(grasp, [-1e-9, *PUSHED[1:]], grid.tolist(), digits=20)
-    result = run(grasp, PUSHED, 0.5, grid)
-    done(result)
-    assert np.abs(result.states - reference.as_array()).max() < 1e-6
-    assert np.abs(result.states[1] - PUSHED).max() > 1e-3

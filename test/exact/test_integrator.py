@@ -48,12 +48,6 @@ def test_repaired_v_never_rises(name: str) -> None:
     assert V_c[-1] < V_c[0] or name == "case_02"
 
 
-def test_elastic_energy_stays_for_2000_s_at_a_coarser_accuracy() -> None:
-    scene, grid = scenes.load("case_02"), np.linspace(0, 2000, 2001)
-    V_c = energy(scene.grasp, run(scene.grasp, scene.initial_state, 2000.0, grid, accuracy=1e-14).states).V_c
-    assert np.abs(V_c / V_c[0] - 1.0).max() < 1e-10  # measured: 2.7e-11
-
-
 @pytest.mark.parametrize("name", [name for name in CASES if name not in ("case_01", "case_09", "case_10")])
 def test_the_decaying_tail_ends_properly(name: str) -> None:
     result = run(scenes.load(name).grasp, scenes.load(name).initial_state, 1000.0, [500.0, 1000.0])
@@ -184,37 +178,14 @@ def test_bad_accuracies_are_refused(accuracy: float) -> None:
         Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
 
 
-SCRIPT = """
-import sys, numpy as np
-from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Integrator
-for name in ("case_01", "case_05"):
-    scene = scenes.load(name)
-    integrator = Integrator(scene.system, continuous=True)
-    states = integrator.advance(scene.duration if len(sys.argv) > 1 else 2.0, np.linspace(0.0, 2.0, 21))
-    print(*(value.hex() for value in states.ravel().tolist()))
-    print(*(event.time.hex() for event in integrator.events))
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.thorough
-def test_uncompiled_source_gives_the_same_numbers() -> None:
-    outputs = []
-    for disabled in ("0", "1"):
-        environment = {**os.environ, "NUMBA_DISABLE_JIT": disabled}
-        command = [sys.executable, "-W", "ignore", "-c", SCRIPT]
-        finished = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120, check=True)
-        outputs.append([float.fromhex(word) for word in finished.stdout.split()])
-    assert len(outputs[0]) == len(outputs[1]) > 250
-    assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
-
-
 EVERYTHING = """
 import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.losses import losses
+for name in ("case_01", "case_05"):
+    run = simulate(scenes.load(name, ["time.duration_s=1"]), grid=np.linspace(0.0, 1.0, 11))
+    print(*run.state.ravel().tolist(), *(event.time for event in run.events))
 scene = scenes.load("case_01", ["time.duration_s=0.02", "left_arm.position_m=-0.01", "left_arm.velocity_m_per_s=2"])
 nothing = ("stiffness_N_per_m", "damping_Ns_per_m", "position_gain_N_per_m", "velocity_gain_Ns_per_m", "position_m")
 free = {f"{section}.{key}": 0.0 for section, keys in scene.values.items() for key in keys if key in nothing}
@@ -237,7 +208,7 @@ def test_everything_runs_uncompiled() -> None:
         finished = subprocess.run([sys.executable, "-W", "ignore", "-c", EVERYTHING], env=environment,
                                   capture_output=True, text=True, timeout=120, check=True)
         outputs.append([float(word) for word in finished.stdout.split()])
-    assert len(outputs[0]) > 150
+    assert len(outputs[0]) > 250
     assert outputs[0] == pytest.approx(outputs[1], rel=0, abs=1e-12)
 
 

@@ -69,10 +69,10 @@ def test_arrow(side: Body, kind: Transition, before: Pair, after: Pair, u: float
     assert b.state.y[U.L + other(side)] == 0.2
 
 
-def clamp(b: Bench, side: Body) -> None:
-    """What follows when u' of a pair comes to -1/p."""
-    crossing, none = Candidate(1.0, Transition.CLAMP), Candidate(math.inf, Transition.TOUCH)
-    left, right = (crossing, none) if side == LEFT else (none, crossing)
+def clamp(b: Bench, side: Body, at: float = 1.0) -> None:
+    """What follows when u' of a pair comes to -1/p, at 1 s or later."""
+    crossing = Candidate(at, Transition.CLAMP)
+    left, right = (crossing, NEVER) if side == LEFT else (NEVER, crossing)
     make_transitions(b.plant, b.state, Ends(left, right, NO_SLIDE, 1.0), 1.0, b.out)
 
 
@@ -169,9 +169,7 @@ def test_a_stuck_object_is_asked_again_when_a_pair_has_lost_its_force(side: Body
     b = bench(side, 1.0, -2.0, Pair.CONTACT, coulomb=5.0, slide=Slide.STUCK, object_push=push, push=-1.0)
     b.plant.pairs[side, Law.HERTZIAN] = 1e12
     apply_friction(b.plant, b.state.mode)
-    crossed = Candidate(at, Transition.CLAMP)
-    left, right = (crossed, NEVER) if side == LEFT else (NEVER, crossed)
-    make_transitions(b.plant, b.state, Ends(left, right, NO_SLIDE, 1.0), 1.0, b.out)
+    clamp(b, side, at)
     clamps = [(side, Transition.CLAMP)] if at == 1.0 else []
     slips = abs(push) > 5.0 and clamps
     assert b.events == clamps + ([(OBJECT, Transition.SLIP)] if slips else [])
@@ -181,9 +179,7 @@ def test_a_stuck_object_is_asked_again_when_a_pair_has_lost_its_force(side: Body
 @SIDES
 def test_no_event_of_a_pair_asks_a_sliding_object(side: Body) -> None:
     b = bench(side, 1.0, -2.0, Pair.CONTACT, coulomb=5.0, slide=toward(side, Slide.RIGHTWARD), push=-1.0)
-    crossed = Candidate(1.0, Transition.CLAMP)
-    left, right = (crossed, NEVER) if side == LEFT else (NEVER, crossed)
-    make_transitions(b.plant, b.state, Ends(left, right, NO_SLIDE, 1.0), 1.0, b.out)
+    clamp(b, side)
     assert b.events == [(side, Transition.CLAMP)]
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from grasp_ros.exact.contact.series import expand_one
 from grasp_ros.exact.contact.step_order import higher_order, lower_order, series_order
 from grasp_ros.exact.contact.step_unit import impact_scales, new_settings, new_step
 from grasp_ros.exact.contact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length, pulls
@@ -147,66 +146,6 @@ def test_coefficients_against_picard_iteration(name: str) -> None:
             scale = max(abs(other[k]) for other in expected.values())
             assert abs(table[k, row] - series[k]) <= mpf("1e-13") * scale + mpf("1e-15") * abs(series[k]), (row, k)
     assert any(abs(series[n]) > 0 for series in expected.values())
-
-
-@pytest.mark.parametrize("name", START)
-def test_the_table_solves_its_equation(name: str) -> None:
-    n, s = 30, 0.05
-    left, right = sides(name)
-    c = expand(name, n)
-    value = at(c, s)
-    rate = np.array([np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(lane)) for lane in c.T])
-    w_l, w_r = value[Z.L] if left else 1.0, value[Z.R] if right else 1.0
-    d_l, d_r = value[V.L] - value[V.O], value[V.O] - value[V.R]
-    g = w_l * w_r
-    clock = 2.0 * g
-    assert value[Lane.TIME] > 0.0
-    assert rate[Lane.TIME] == pytest.approx(clock, rel=1e-12)
-    assert value[Lane.CHECK] == pytest.approx(g if left and right else g**2, rel=1e-12)
-    assert rate[Z.L] == pytest.approx((g / w_l if left else clock) * d_l, rel=1e-12)
-    assert rate[Z.R] == pytest.approx((g / w_r if right else clock) * d_r, rel=1e-12)
-    force_l = PAIRS[LEFT, Law.HERTZIAN] * w_l**3 * (1.0 + PAIRS[LEFT, Law.DISSIPATION] * d_l) if left else 0.0
-    force_r = PAIRS[RIGHT, Law.HERTZIAN] * w_r**3 * (1.0 + PAIRS[RIGHT, Law.DISSIPATION] * d_r) if right else 0.0
-    x_o = value[X.O]
-    x_l, x_r = x_o + (w_l**2 if left else value[Z.L]), x_o - (w_r**2 if right else value[Z.R])
-    a_l = (0.4 - 15.0 * x_l - 0.7 * value[V.L] - force_l) / 1.0
-    a_r = (-0.3 - 12.0 * x_r - 1.1 * value[V.R] + force_r) / 2.0
-    a_o = (0.2 - 3.0 * x_o - 0.9 * value[V.O] + force_l - force_r) / 5.0
-    got = [rate[row] / clock for row in (V.L, V.R, V.O, X.O)]
-    assert got == pytest.approx([a_l, a_r, a_o, value[V.O]], rel=1e-11, abs=1e-12)
-
-
-@pytest.mark.parametrize("other", ["left", "right"])
-def test_one_and_both_agree_if_the_other_pair_has_no_force(other: str) -> None:
-    n, tau = 30, 0.01
-    pairs = PAIRS.copy()
-    pairs[LEFT if other == "right" else RIGHT, Law.HERTZIAN] = 0.0
-    left = other == "left"
-    ends = []
-    for touching, high, start in (((True, True), 1.0, expand("both", n, pairs)), ((left, not left), 0.15, None)):
-        if start is None:
-            tables = new_start("both", n)
-            tables.c[Z.R if left else Z.L] = START["both"][5 if left else 4]
-            expand_one(tables.c, tables.f, BODIES, PAIRS, LEFT if left else RIGHT, 1.0, n)
-            start = tables.c[: LANES * (n + 1)].reshape(n + 1, LANES)
-        step = Step(Order(n, 0.0, n), 1.0, *touching)
-        s = invert_time(tables_of(start), step, tau, high, at(start, high)[Lane.TIME])
-        end = at(start, s)
-        end[[Z.L, Z.R]] **= np.where(touching, 2, 1)
-        ends.append(end[[V.L, X.O, V.O, V.R, Z.L, Z.R]])
-    assert ends[0] == pytest.approx(ends[1], rel=1e-12, abs=1e-14)
-    assert abs(ends[0][0] - START["both"][1]) > 1e-3
-
-
-@pytest.mark.parametrize("name", START)
-@pytest.mark.parametrize("n", [6, 8, 12])
-def test_order_by_slope(name: str, n: int) -> None:
-    best, table = expand(name, 46), expand(name, n)
-    largest = 0.24 if "both" not in name else 1.0
-    errors = [np.abs(at(table, s) - at(best, s))[[V.L, V.O, V.R]].max() for s in (largest, largest / 4.0)]
-    slope = math.log(errors[0] / max(errors[1], 1e-17), 4.0)
-    # coefficients have gaps at a touch: the next one present may be up to five orders later
-    assert n + 0.2 < slope < n + 6.5
 
 
 def motion(name: str) -> tuple[Plant, State]:

@@ -77,11 +77,6 @@ def test_only_a_door_has_machine_code() -> None:
 
 
 @pytest.mark.parametrize("path", ROOM, ids=lambda path: f"{path.parent.stem}.{path.stem}")
-def test_files_are_small(path: Path) -> None:
-    assert len(path.read_text().splitlines()) <= LINES
-
-
-@pytest.mark.parametrize("path", ROOM, ids=lambda path: f"{path.parent.stem}.{path.stem}")
 def test_functions_have_few_parameters(path: Path) -> None:
     for function in functions(path):
         arguments = function.args

@@ -8,28 +8,18 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Any
 
-import numba
 from numba import types
-from numba.extending import intrinsic
+
+from grasp_ros.exact.compilation.jit import instruction
+
+REAL = types.float64
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def _fused(_: Any, a: Any, b: Any, c: Any) -> Any:
-    """The instruction."""
-    def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
-
-    return types.float64(types.float64, types.float64, types.float64), code
-
-
-def _exact(a: float, b: float, c: float) -> float:
-    """The same without a compiler."""
+@instruction(lambda _, a, b, c: (REAL(REAL, REAL, REAL), lambda _, builder, __, numbers: builder.fma(*numbers)))
+def fma(a: float, b: float, c: float) -> float:
+    """The sum of a product, a b, and c."""
     if not math.isfinite(a * b + c):
         return a * b + c
     exact = Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c))
     return float(exact) if exact else a * b + c
-
-
-fma = _exact if numba.config.DISABLE_JIT else _fused

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba.extending import intrinsic
 
 from grasp_ros.exact.compilation.kernel_cache import cache_directory
 from grasp_ros.exact.compilation.numba_internals import Kernel, KernelCache
@@ -22,7 +24,6 @@ numba.config.SLP_VECTORIZE = 1
 K = TypeVar("K", bound=Callable[..., Any])  # a kernel has the types of its source
 
 COMPILED = not numba.config.DISABLE_JIT
-_UNCOMPILED: dict[int, Any] = {}
 DEEP_STACK = 70_000  # slots; more than half a megabyte
 
 
@@ -61,6 +62,24 @@ def allocating(function: K) -> K:
     return _compiled(function, door=True, counts=True)
 
 
+def instruction(typing: Callable[..., Any]) -> Callable[[K], K]:
+    """A function that kernels call as a few instructions; as it stands it is what runs where nothing is compiled.
+
+    `typing` is for `numba.extending.intrinsic`: from the types of the arguments to a signature, and to what emits code.
+    """
+    def replace(plain: Any) -> Any:
+        return intrinsic(typing) if COMPILED else plain
+
+    return replace
+
+
+def code_of_call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """Emit a call of the C function at an address, the first argument, with the others."""
+    kinds = [context.get_value_type(kind) for kind in (signature.return_type, *signature.args[1:])]
+    function = ir.FunctionType(kinds[0], kinds[1:])
+    return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
+
+
 @cache
 def _door(function: Callable[..., Any]) -> Any:
     return door(function)
@@ -89,27 +108,9 @@ def compiling(function: Callable[[], None]) -> Callable[[], None]:
     return compile_all
 
 
-def compiled_address(function: Any, signature: str) -> int:
-    """Where the machine code of a kernel begins, for calls from C; it is compiled where it has not been.
-
-    Where nothing is compiled it is a number that `function_at` knows.
-    """
-    if not COMPILED:
-        _UNCOMPILED[id(function)] = function
-        return id(function)
-    function.compile(signature)
-    (result,) = function.overloads.values()
-    return address_of_code(result)
-
-
 def address_of_code(result: Any) -> int:
     """Where the machine code of one compilation of a door begins, for calls from C."""
     return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
-
-
-def function_at(address: int) -> Any:
-    """The function of an address, where nothing is compiled."""
-    return _UNCOMPILED[address]
 
 
 def _compiled(function: K, *, door: bool, counts: bool = False, inline: bool = False) -> K:

@@ -16,13 +16,7 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
-from grasp_ros.exact.compilation.kernel_cache import (
-    code_file,
-    read_checked,
-    say_compiling,
-    say_damaged,
-    write_checked,
-)
+from grasp_ros.exact.compilation.kernel_cache import code_file, read_checked, say_compiling, say_damaged, write_checked
 
 
 class Part(JITCodeLibrary):

@@ -16,10 +16,10 @@ from llvmlite import ir
 from numba import types
 from numba.core.cgutils import get_or_insert_function
 from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, models, register_model
+from numba.extending import lower_builtin, models, register_model
 
 from grasp_ros.exact.compilation.fma import fma
-from grasp_ros.exact.compilation.jit import COMPILED
+from grasp_ros.exact.compilation.jit import instruction
 from grasp_ros.exact.records import Array, Lanes
 
 WIDTH, HALF = 8, 4
@@ -88,78 +88,6 @@ def _code_of_store(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
     return context.get_dummy_value()
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def load(_: Any, array: Any, index: Any) -> Any:
-    """The eight numbers of an array (n,) from an index on."""
-    return KINDS[WIDTH](array, types.intp), _code_of_load
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def load_half(_: Any, array: Any, index: Any) -> Any:
-    """The four numbers of an array (n,) from an index on."""
-    return KINDS[HALF](array, types.intp), _code_of_load
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def store(_: Any, array: Any, index: Any, vector: Any) -> Any:
-    """Write a vector to an array (n,) from an index on."""
-    return types.void(array, types.intp, vector), _code_of_store
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def spread(_: Any, number: Any) -> Any:
-    """A vector of eight times one number."""
-    return KINDS[WIDTH](REAL), _emit(lambda _, vector: vector)
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def spread_half(_: Any, number: Any) -> Any:
-    """A vector of four times one number."""
-    return KINDS[HALF](REAL), _emit(lambda _, vector: vector)
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def vector_of(_: Any, numbers: Any) -> Any:
-    """A vector of eight numbers."""
-    def code(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
-        found = ir.Constant(kinds.return_type.lanes, ir.Undefined)
-        for i in range(WIDTH):
-            found = builder.insert_element(found, builder.extract_value(values[0], i), INDEX(i))
-        return found
-
-    return KINDS[WIDTH](numbers), code
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def numbers_of(_: Any, vector: Any) -> Any:
-    """The eight numbers of a vector."""
-    def code(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-        return context.make_tuple(builder, kinds.return_type, _numbers(builder, values[0]))
-
-    return types.UniTuple(REAL, WIDTH)(vector), code
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def add_product(_: Any, total: Any, vector: Any, factor: Any) -> Any:
-    """A total and the product of a vector with another one or a number, with one rounding."""
-    fused = _of_llvm("fma")
-    kind = next(kind for kind in (total, vector, factor) if isinstance(kind, Vector))
-    return kind(total, vector, factor), _emit(lambda builder, c, a, b: fused(builder, a, b, c))
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def sizes(_: Any, vector: Any) -> Any:
-    """The absolute numbers of a vector."""
-    return vector(vector), _emit(_of_llvm("fabs"))
-
-
-@intrinsic  # type: ignore[untyped-decorator]
-def larger(_: Any, first: Any, second: Any) -> Any:
-    """The larger of two sizes, number by number."""
-    size, most = _of_llvm("fabs"), _of_llvm("maxnum")
-    return first(first, second), _emit(lambda builder, a, b: most(builder, size(builder, a), size(builder, b)))
-
-
 def _numbers(builder: Any, vector: Any) -> list[Any]:
     return [builder.extract_element(vector, INDEX(i)) for i in range(vector.type.count)]
 
@@ -172,10 +100,95 @@ def _code_of_highest(_: Any, builder: Any, __: Any, values: Any) -> Any:
     return found[0]
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def highest(_: Any, vector: Any) -> Any:
+def _code_of_numbers(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+    return context.make_tuple(builder, kinds.return_type, _numbers(builder, values[0]))
+
+
+def _code_of_vector(_: Any, builder: Any, kinds: Any, values: Any) -> Any:
+    found = ir.Constant(kinds.return_type.lanes, ir.Undefined)
+    for i in range(WIDTH):
+        found = builder.insert_element(found, builder.extract_value(values[0], i), INDEX(i))
+    return found
+
+
+def _code_of_sum(builder: Any, total: Any, vector: Any, factor: Any) -> Any:
+    return _of_llvm("fma")(builder, vector, factor, total)
+
+
+def _code_of_larger(builder: Any, first: Any, second: Any) -> Any:
+    size = _of_llvm("fabs")
+    return _of_llvm("maxnum")(builder, size(builder, first), size(builder, second))
+
+
+def _vector_among(*kinds: Any) -> Any:
+    return next(kind for kind in kinds if isinstance(kind, Vector))
+
+
+@instruction(lambda _, array, index: (KINDS[WIDTH](array, types.intp), _code_of_load))
+def load(array: Array, index: int) -> Array:
+    """The eight numbers of an array (n,) from an index on."""
+    return array[index : index + WIDTH].copy()
+
+
+@instruction(lambda _, array, index: (KINDS[HALF](array, types.intp), _code_of_load))
+def load_half(array: Array, index: int) -> Array:
+    """The four numbers of an array (n,) from an index on."""
+    return array[index : index + HALF].copy()
+
+
+@instruction(lambda _, array, index, vector: (types.void(array, types.intp, vector), _code_of_store))
+def store(array: Array, index: int, vector: Array) -> None:
+    """Write a vector to an array (n,) from an index on."""
+    array[index : index + len(vector)] = vector
+
+
+@instruction(lambda _, number: (KINDS[WIDTH](REAL), _emit(lambda _, vector: vector)))
+def spread(number: float) -> Array:
+    """A vector of eight times one number."""
+    return np.full(WIDTH, number)
+
+
+@instruction(lambda _, number: (KINDS[HALF](REAL), _emit(lambda _, vector: vector)))
+def spread_half(number: float) -> Array:
+    """A vector of four times one number."""
+    return np.full(HALF, number)
+
+
+@instruction(lambda _, numbers: (KINDS[WIDTH](numbers), _code_of_vector))
+def vector_of(numbers: Lanes) -> Array:
+    """A vector of eight numbers."""
+    return np.array(numbers)
+
+
+@instruction(lambda _, vector: (types.UniTuple(REAL, WIDTH)(vector), _code_of_numbers))
+def numbers_of(vector: Array) -> Lanes:
+    """The eight numbers of a vector."""
+    return tuple(vector)
+
+
+@instruction(lambda _, total, vector, factor: (
+    _vector_among(total, vector, factor)(total, vector, factor), _emit(_code_of_sum)))
+def add_product(total: Array, vector: Array, factor: float | Array) -> Array:
+    """A total and the product of a vector with another one or a number, with one rounding."""
+    return np.array([*map(fma, *np.broadcast_arrays(vector, factor, total))])
+
+
+@instruction(lambda _, vector: (vector(vector), _emit(_of_llvm("fabs"))))
+def sizes(vector: Array) -> Array:
+    """The absolute numbers of a vector."""
+    return abs(vector)
+
+
+@instruction(lambda _, first, second: (first(first, second), _emit(_code_of_larger)))
+def larger(first: Array, second: Array) -> Array:
+    """The larger of two sizes, number by number."""
+    return np.fmax(abs(first), abs(second))
+
+
+@instruction(lambda _, vector: (REAL(vector), _code_of_highest))
+def highest(vector: Array) -> float:
     """The highest number of a vector."""
-    return REAL(vector), _code_of_highest
+    return float(np.fmax.reduce(vector))
 
 
 for operation, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul")):
@@ -189,50 +202,3 @@ for operation, name in ((operator.add, "fadd"), (operator.sub, "fsub"), (operato
 
     for case in Kinds.cases:
         lower_builtin(operation, *case.args)(_emit(getattr(ir.IRBuilder, name)))
-
-
-if not COMPILED:
-
-    def load(array: Array, index: int) -> Array:
-        """The eight numbers of an array (n,) from an index on."""
-        return array[index : index + WIDTH].copy()
-
-    def load_half(array: Array, index: int) -> Array:
-        """The four numbers of an array (n,) from an index on."""
-        return array[index : index + HALF].copy()
-
-    def store(array: Array, index: int, vector: Array) -> None:
-        """Write a vector to an array (n,) from an index on."""
-        array[index : index + len(vector)] = vector
-
-    def spread(number: float) -> Array:
-        """A vector of eight times one number."""
-        return np.full(WIDTH, number)
-
-    def spread_half(number: float) -> Array:
-        """A vector of four times one number."""
-        return np.full(HALF, number)
-
-    def vector_of(numbers: Lanes) -> Array:
-        """A vector of eight numbers."""
-        return np.array(numbers)
-
-    def numbers_of(vector: Array) -> Lanes:
-        """The eight numbers of a vector."""
-        return tuple(vector)
-
-    def sizes(vector: Array) -> Array:
-        """The absolute numbers of a vector."""
-        return abs(vector)
-
-    def add_product(total: Array, vector: Array, factor: float | Array) -> Array:
-        """A total and the product of a vector with another one or a number, with one rounding."""
-        return np.array([*map(fma, *np.broadcast_arrays(vector, factor, total))])
-
-    def larger(first: Array, second: Array) -> Array:
-        """The larger of two sizes, number by number."""
-        return np.fmax(abs(first), abs(second))
-
-    def highest(vector: Array) -> float:
-        """The highest number of a vector."""
-        return float(np.fmax.reduce(vector))

@@ -10,23 +10,13 @@ from grasp_ros.exact.compensated import add, move_arm_in_contact, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
 from grasp_ros.exact.contact.step_unit import new_step
 from grasp_ros.exact.contact.taylor_step import accepted_length, fitted_step
-from grasp_ros.exact.flight.closed_form import fly, free_flights
+from grasp_ros.exact.flight.closed_form import flights_of, fly
 from grasp_ros.exact.impact import damping_factor
 from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.numerics.polynomial import invert_time, lane_range, values
 from grasp_ros.exact.numerics.powers_of_two import power_of_two
 from grasp_ros.exact.numerics.roots import first_rise
-from grasp_ros.exact.records import (
-    Array,
-    Candidate,
-    Ends,
-    Integers,
-    Plant,
-    Segment,
-    Settings,
-    State,
-    Tables,
-)
+from grasp_ros.exact.records import Array, Candidate, Ends, Integers, Plant, Segment, Settings, State, Tables
 from grasp_ros.exact.tolerances import CANCELS, NOISE, TOGETHER
 from grasp_ros.physics.layout import (
     EPS,
@@ -132,7 +122,7 @@ def press(tables: Tables, plant: Plant, state: State, settings: Settings, span: 
     work[Work.CONTACT_STEPS] += 1
     step, h = fitted_step(tables, plant, state, settings, new_step(plant, state, settings, span), span)
     h = accepted_length(tables, step, h, settings, work)
-    return Segment(Kind.CONTACT, tables.at[Lane.TIME], h, step, free_flights(plant, state.y, step.left, step.right))
+    return Segment(Kind.CONTACT, tables.at[Lane.TIME], h, step, flights_of(plant, state.y, step.left, step.right))
 
 
 @inlined

@@ -10,17 +10,16 @@ import math
 from typing import Any
 
 from grasp_ros.exact.automaton.modes import make_transitions, settle_pairs
-from grasp_ros.exact.compensated import tick, until
+from grasp_ros.exact.compensated import keep_together, tick, until, write_penetrations
 from grasp_ros.exact.compilation.jit import door, inlined
-from grasp_ros.exact.contact.segment import cut_step, press, step_ends
+from grasp_ros.exact.contact.segment import cut_step, move_by_step, press, state_in_step, step_ends
 from grasp_ros.exact.contact.step_unit import new_settings, within_decay
 from grasp_ros.exact.driver.callback import notify
 from grasp_ros.exact.driver.energy_check import check_segment, energy_level
 from grasp_ros.exact.driver.intervals import answer_end, close_interval, enter_interval, open_interval, rest
-from grasp_ros.exact.driver.outputs import may_go_on, write_reached
-from grasp_ros.exact.driver.rest import keep_scale, rests, wake
-from grasp_ros.exact.driver.segment import deliver, move
-from grasp_ros.exact.flight.segment import cut_flight, flight_ends, fly_free
+from grasp_ros.exact.driver.outputs import due, may_go_on, write_reached, write_row
+from grasp_ros.exact.driver.rest import SINCE, keep_scale, rests
+from grasp_ros.exact.flight.segment import cut_flight, flight_ends, fly_free, move_by_flight, state_in_flight
 from grasp_ros.exact.records import (
     Array,
     Ends,
@@ -37,7 +36,7 @@ from grasp_ros.exact.records import (
     state_of,
     tables_of,
 )
-from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Outcome, Pair, Place
+from grasp_ros.physics.layout import LEFT, RIGHT, Filled, Kind, Outcome, Pair, Place
 
 plant_in, state_in, tables_in = inlined(plant_of), inlined(state_of), inlined(tables_of)
 
@@ -54,6 +53,35 @@ def next_segment(tables: Tables, plant: Plant, state: State, settings: Settings,
     segment = fly_free(plant, state, span, work)
     ends = flight_ends(tables.row, plant, state, segment, work)
     return cut_flight(segment, ends), ends
+
+
+@inlined
+def move(tables: Tables, plant: Plant, segment: Segment, state: State) -> None:
+    """Move the state on to the end of a segment."""
+    if segment.kind == Kind.FLIGHT:
+        move_by_flight(plant, segment, state)
+    else:
+        move_by_step(tables, segment, state)
+        for side in (LEFT, RIGHT):
+            if state.mode[side] == Pair.RESTING:
+                keep_together(state, side)
+    write_penetrations(state)
+
+
+@inlined
+def deliver(tables: Tables, plant: Plant, segment: Segment, state: State, settings: Settings, out: Output) -> None:
+    """Write the states at the output times before the end of a segment."""
+    expanded = -1.0
+    tau = due(state, out)
+    while tau < segment.t:
+        row = out.filled[Filled.OUTPUTS]
+        if segment.kind == Kind.FLIGHT:
+            expanded = state_in_flight(tables, plant, segment, settings, tau, expanded)
+            write_row(out, row, tables.at)
+        else:
+            state_in_step(tables, segment, tau, out.rows[row])
+        out.filled[Filled.OUTPUTS] = row + 1
+        tau = due(state, out)
 
 
 @inlined
@@ -121,7 +149,7 @@ def advance(
         if rests(plant, state):
             rest(state, loop)
             continue
-        wake(state)
+        state.rest[SINCE] = math.inf  # a segment moves on
         modes = (state.mode[LEFT], state.mode[RIGHT])
         segment, ends = next_segment(tables, plant, state, settings, span, out.work)
         if math.isnan(segment.t):

@@ -8,30 +8,38 @@ called when the segment is over and before its transitions, so that modes and bo
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 from weakref import finalize
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
+from numba.core.types import float64, int64
 
-from grasp_ros.exact.compilation.jit import COMPILED, function_at, inlined
+from grasp_ros.exact.compilation.jit import COMPILED, address_of_code, code_of_call, inlined, instruction
 from grasp_ros.exact.records import Integers, Segment
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
+FINISH = -1  # in place of a kind of segment, after a run
+SIGNATURE = int64(int64, int64, float64, float64, int64)
+_FUNCTIONS: dict[int, Any] = {}  # where nothing is compiled
+_RECORDS: dict[int, Any] = {}  # likewise
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def call(_: Any, address: Any, context: Any, kind: Any, t: Any, s: Any, degree: Any) -> Any:
+@instruction(lambda _, address, context, kind, t, s, degree: (int64(int64, *SIGNATURE.args), code_of_call))
+def call(address: int, context: int, kind: int | np.int64, t: float, s: float, degree: int) -> int:
     """Call the function int64(int64, int64, float64, float64, int64) at an address."""
-    def code(__: Any, builder: Any, ___: Any, arguments: Any) -> Any:
-        whole, real = ir.IntType(64), ir.DoubleType()
-        function = ir.FunctionType(whole, (whole, whole, real, real, whole)).as_pointer()
-        return builder.call(builder.inttoptr(arguments[0], function), arguments[1:])
+    return int(_FUNCTIONS[int(address)](int(context), kind, t, s, degree))
 
-    whole, real = types.int64, types.float64
-    return whole(whole, whole, whole, real, real, whole), code
+
+@cache
+def address_of(function: Any) -> int:
+    """Address of an observer, which is compiled where it has not been; where nothing is, a number that `call` knows."""
+    if not COMPILED:
+        _FUNCTIONS[id(function)] = function
+        return id(function)
+    function.compile(SIGNATURE)
+    (result,) = function.overloads.values()
+    return address_of_code(result)
 
 
 def block_of(record: Any) -> Integers:
@@ -53,23 +61,14 @@ def _words(record: Any) -> Iterator[int]:
 
 def reader(kind: Any) -> Any:
     """A function that kernels call for the record of this type behind an address."""
-    @intrinsic  # type: ignore[untyped-decorator]
-    def read(_: Any, address: Any) -> Any:
-        def code(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
-            return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
+    def code(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        return builder.load(builder.inttoptr(arguments[0], context.get_value_type(kind).as_pointer()))
 
-        return kind(types.int64), code
+    @instruction(lambda _, address: (kind(int64), code))
+    def read(address: int) -> Any:
+        return _RECORDS[int(address)]
 
-    return read if COMPILED else lambda address: _RECORDS[int(address)]
-
-
-_RECORDS: dict[int, Any] = {}  # where nothing is compiled
-
-if not COMPILED:
-
-    def call(address: int, context: int, kind: int, t: float, s: float, degree: int) -> int:
-        """Call the function at an address."""
-        return int(function_at(int(address))(int(context), kind, t, s, degree))
+    return read
 
 
 @inlined

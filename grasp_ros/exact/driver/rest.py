@@ -5,8 +5,6 @@ Positions and velocities are relative to the largest position and the largest en
 
 from __future__ import annotations
 
-import math
-
 from grasp_ros.exact.automaton.friction import impact_on_object
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
@@ -25,12 +23,6 @@ def keep_scale(state: State, begin: Level) -> None:
     y, rest = state.y, state.rest
     rest[ENERGY] = max(rest[ENERGY], begin.size)
     rest[LENGTH] = max(rest[LENGTH], abs(y[X.L]), abs(y[X.O]), abs(y[X.R]))
-
-
-@inlined
-def wake(state: State) -> None:
-    """A segment moves on: nothing has been at rest since before it."""
-    state.rest[SINCE] = math.inf
 
 
 @inlined

@@ -15,29 +15,24 @@ from functools import lru_cache
 from typing import Any
 
 import numba
-from llvmlite import ir
 from numba.core.ccallback import CFunc
 from numba.core.errors import NumbaError
 from numba.core.types import float64, int64
-from numba.extending import intrinsic, is_jitted
+from numba.extending import is_jitted
 
+from grasp_ros.exact.compilation.jit import code_of_call, instruction
 from grasp_ros.physics.control import Law, command_of
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked
 
 SIGNATURE = float64(int64, float64, float64, float64)
 PROTOTYPE = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_int64, ctypes.c_double, ctypes.c_double, ctypes.c_double)
-DOUBLE, WORD = ir.DoubleType(), ir.IntType(64)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def call(_: Any, address: Any, tick: Any, time: Any, x: Any, v: Any) -> Any:
+@instruction(lambda _, address, tick, time, x, v: (float64(int64, *SIGNATURE.args), code_of_call))
+def call(address: int, tick: int, time: float, x: float, v: float) -> float:
     """The command of the function at an address."""
-    def emit(_: Any, builder: Any, __: Any, arguments: Any) -> Any:
-        function = ir.FunctionType(DOUBLE, [WORD, DOUBLE, DOUBLE, DOUBLE])
-        return builder.call(builder.inttoptr(arguments[0], function.as_pointer()), arguments[1:])
-
-    return float64(int64, int64, float64, float64, float64), emit
+    return float(PROTOTYPE(int(address))(tick, time, x, v))
 
 
 @lru_cache(maxsize=64)
@@ -52,13 +47,6 @@ def _compiled(law: Any) -> Any:
             return math.nan
 
     return numba.cfunc(SIGNATURE)(command)
-
-
-if numba.config.DISABLE_JIT:
-
-    def call(address: int, tick: int, time: float, x: float, v: float) -> float:
-        """The command of the function at an address."""
-        return float(PROTOTYPE(int(address))(tick, time, x, v))
 
 
 class UserController:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,14 @@ from grasp_ros.exact.records import Array, Tables, numbers_of_tables, tables_of
 
 EVENT_ROWS = 1024
 CACHE_LINE = 8  # numbers
+
+
+def zeros(*shape: int) -> Array:
+    """Zeros that begin on a line of the processor's cache: vectors that lie on two lines take twice as long."""
+    count = math.prod(shape)
+    room = np.zeros(count + CACHE_LINE)
+    first = -(room.ctypes.data // room.itemsize) % CACHE_LINE
+    return room[first : first + count].reshape(shape)
 
 
 class Workspace(NamedTuple):
@@ -27,11 +36,9 @@ _FREE: dict[float, list[Workspace]] = {}  # by accuracy; what nobody uses
 
 
 def new_workspace(order: int) -> Workspace:
-    """Memory for steps of this order and of `higher_order`; it begins at a cache line, which vector loads want."""
+    """Memory for steps of this order and of `higher_order`."""
     highest = max(higher_order(order), int(FLIGHT_ORDER))
-    room = np.zeros(numbers_of_tables(highest) + CACHE_LINE)
-    first = -(room.ctypes.data // 8) % CACHE_LINE
-    block = room[first : first + numbers_of_tables(highest)]
+    block = zeros(numbers_of_tables(highest))
     return Workspace(block, highest, tables_of(block, highest), np.empty((EVENT_ROWS, 5)))
 
 

@@ -36,21 +36,13 @@ def launch(body: Array, x: float, v: float) -> Flight:
 
 
 @inlined
-def flights_of(plant: Plant, y: Array) -> Flights:
-    """Flights of all bodies from y."""
-    return Flights(
-        launch(plant.bodies[LEFT], y[X.L], y[V.L]), launch(plant.bodies[RIGHT], y[X.R], y[V.R]),
-        launch(plant.bodies[OBJECT], y[X.O], y[V.O]),
-    )
-
-
-@inlined
-def free_flights(plant: Plant, y: Array, left: bool, right: bool) -> Flights:
-    """Flights of the arms that touch nothing while another one does; the others are of no use."""
+def flights_of(plant: Plant, y: Array, left: bool, right: bool) -> Flights:
+    """Flights from y of all bodies that take no part in a contact on the left or right; the others are of no use."""
     still = Flight(Regime.DRIFT, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     return Flights(
         still if left else launch(plant.bodies[LEFT], y[X.L], y[V.L]),
-        still if right else launch(plant.bodies[RIGHT], y[X.R], y[V.R]), still,
+        still if right else launch(plant.bodies[RIGHT], y[X.R], y[V.R]),
+        still if left or right else launch(plant.bodies[OBJECT], y[X.O], y[V.O]),
     )
 
 

@@ -89,7 +89,7 @@ def pair_candidate(row: Array, plant: Plant, state: State, flights: Flights, sid
 def fly_free(plant: Plant, state: State, span: float, work: Integers) -> Segment:
     """A flight over the span, or until all has died out, where it may rest."""
     work[Work.FLIGHTS] += 1
-    flights = flights_of(plant, state.y)
+    flights = flights_of(plant, state.y, False, False)
     settled = max(settling_time(flights.left, span), settling_time(flights.right, span),
                   settling_time(flights.object, span))
     return Segment(Kind.FLIGHT, settled if 0.0 < settled < span else span, 0.0, NO_STEP, flights)
