@@ -117,7 +117,10 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
 
 def describe_verification(verification: Verification, answers: Mapping[str, Answers]) -> list[Row]:
     """Whose commands a bag has, and whether its numbers follow from them."""
-    return [*((f"{side} controller", str(found)) for side, found in answers.items()), ("verified", verification.words)]
+    rows = [*((f"{side} controller", str(found)) for side, found in answers.items()), ("verified", verification.words)]
+    if verification.same is not None:
+        rows.append(("same without ROS", "equal, bit for bit" if verification.same else "NOT EQUAL"))
+    return rows
 
 
 def _messages(topics: dict[str, dict[str, float]]) -> str:

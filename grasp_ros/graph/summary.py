@@ -67,7 +67,7 @@ def verified(verification: Verification, answers: dict[str, Answers]) -> dict[st
     difference = verification.difference
     return {
         "holds": verification.holds, "states_compared": verification.ticks, "problem": verification.problem or None,
-        "difference": difference._asdict() if difference else None,
+        "difference": difference._asdict() if difference else None, "same_without_ROS": verification.same,
         "controllers": {side: {"commands": found.commands, "of_the_scene": found.own, "announcements_lost": found.lost}
                         for side, found in answers.items()},
     }

@@ -63,6 +63,9 @@ def test_an_input_that_differs_is_found_and_a_bag_may_end_early_but_lack_no_tick
     found = verify(replace(recording, effort=effort)).difference
     assert found is not None
     assert found[:3] in ((300, "joint_states", "left velocity"), (300, "joint_states", "left effort"))
+    state = recording.state.copy()
+    state[300, 2] = np.nextafter(state[300, 2], np.inf)
+    assert verify(replace(recording, state=state)).same is False
     cut = {name: getattr(recording, name)[:500] for name in ("tick", "state", "effort", "command", "lyapunov")}
     begin = replace(recording, **cut)
     assert np.isnan(begin.inputs[-1]).all()
@@ -151,7 +154,8 @@ def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Pa
 
 def test_run_reports_and_draws(two_runs: tuple[Path, Path]) -> None:
     printed = (two_runs[0].parent / "stdout").read_text()
-    for row in ("lost +nothing", "right controller +the scene's law", "verified +3001 states follow from the recorded"):
+    for row in ("lost +nothing", "right controller +the scene's law", "verified +3001 states follow from the recorded",
+                "same without ROS +equal, bit for bit"):
         assert re.search(f"^{row}", printed, re.M)
     assert (two_runs[0] / "figure.png").read_bytes().startswith(b"\x89PNG")
 
@@ -228,7 +232,7 @@ def test_numbers_set_on_a_running_controller_are_recorded_and_replayed(
     assert list(recording.changes.values()) == [{gain: 9.0}]
     simulated = simulate(recording.scene, sampled=True, grid=recording.t, changes=recording.changes)
     assert recording.state.tobytes() == simulated.state.tobytes()
-    assert verify(recording).holds
+    assert verify(recording).same
     assert set(laws_of(recording).values()) == {"the scene's law"}
     tick = next(iter(recording.changes))
     x, v = recording.state[tick, :2]
