@@ -71,8 +71,8 @@ def draw(
     Raises
     ------
     Refused
-        If a motion is empty, the width is not allowed, matplotlib does not know the format, or the file cannot be
-        written.
+        If a motion is empty, the width or the span is not allowed, matplotlib does not know the format, or the file
+        cannot be written.
     """
     several = motions if isinstance(motions, Sequence) else [motions]
     save(compose(several, captions, width_mm=width_mm, span=span), path)
