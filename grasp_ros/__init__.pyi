@@ -23,8 +23,7 @@ from grasp_ros.simulation.trajectory_file import load as load_run
 
 __all__ = [
     "LEFT", "OBJECT", "RIGHT", "Refused", "Scene", "Status", "Trajectory", "Transition", "compose", "design", "draw",
-    "ensemble", "fit", "load", "load_run", "names", "parse", "read_bag", "simulate",
-    "spectrum",
+    "ensemble", "fit", "load", "load_run", "names", "parse", "read_bag", "simulate", "spectrum",
 ]
 
 CONFIG: Path

@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
     sub.add_argument("bag", type=Path)
     add_json(sub)
     add_file(sub, "FILE.csv", "write states, forces and V as a table; - is the standard output")
-    sub.add_argument("--replay", action="store_true", help="verify it, too")
+    sub.add_argument("--replay", action="store_true", help="also verify it, as `grasp verify` does")
     add_limits(sub)
     sub = add_command(commands, "verify", _verify)
     sub.add_argument("bag", type=Path)

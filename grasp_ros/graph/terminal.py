@@ -1,4 +1,4 @@
-"""A graph or a bag in a terminal: the masses on their line, forces, energy, contacts and rates, at one moment; keys."""
+"""A graph or a bag in a terminal: a picture of one moment (masses, forces, energy, contacts, rates), and its keys."""
 
 from __future__ import annotations
 

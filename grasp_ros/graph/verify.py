@@ -46,7 +46,7 @@ class Verification(NamedTuple):
     ticks: int  # whose states were compared
     difference: Difference | None  # the first
     problem: str  # why not all of the bag could be compared; empty if all was
-    same: bool | None  # whether `simulate` gives its states and commands; None: it had other laws, or no lockstep
+    same: bool | None  # whether `simulate` gives its states and commands; None: other laws, a reset, or no lockstep
 
     @property
     def holds(self) -> bool:

@@ -44,7 +44,7 @@ def product_2x3(a: Array, b: Array, out: Array, steady: float) -> None:
 
 @kernel
 def write_map(out: Array, x: tuple[float, float, float], v: tuple[float, float, float]) -> None:
-    """Write the rows of an affine map of the plane."""
+    """Write an affine map of the plane, (2, 3): its rows for x and for v."""
     for j in range(3):
         out[0, j], out[1, j] = x[j], v[j]
 

@@ -154,7 +154,7 @@ def ensemble(
         check_keys(scene, keys, setup.sampled)
     found: dict[str, Array] = {column.name: np.full(variants.rows, np.nan) for column in columns}
     status, stops = np.zeros(variants.rows, dtype=np.int8), dict[int, str]()
-    spans = chunks(variants.rows, chunk_rows(scene, setup))
+    spans = chunks(variants.rows, 1 if keys else chunk_rows(scene, setup))  # derivatives take longer than a run
 
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         part = variants.part(*span)

@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.given import instance, names, number, rows
+from grasp_ros.physics.given import ascending, instance, names, number, rows
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -71,8 +71,8 @@ def draw(
     Raises
     ------
     Refused
-        If a motion is empty, the width is not allowed, matplotlib does not know the format, or the file cannot be
-        written.
+        If a motion is empty, the width or the span is not allowed, matplotlib does not know the format, or the file
+        cannot be written.
     """
     several = motions if isinstance(motions, Sequence) else [motions]
     save(compose(several, captions, width_mm=width_mm, span=span), path)
@@ -92,7 +92,7 @@ def compose(
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
     width = usual if width_mm is None else number("--width", width_mm)
-    first_last = None if span is None else rows("span", span, 2)
+    first_last = None if span is None else ascending("span", rows("span", span, 2), np.inf, strictly=True)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
         raise Refused(f"--width {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
