@@ -103,12 +103,16 @@ def sizes(detail: Detail) -> Sizes:
 
 
 def _at_rest(detail: Detail) -> tuple[Array, Array]:
-    """Changes of position and velocity, (k, 1, 3), with which a piece may come to rest, see `exact.driver.rest`."""
+    """Changes of position and velocity, (k, 1, 3), with which a piece may come to rest, see `exact.driver.rest`.
+
+    As there, the energy of a spring has the distance to the object among the sizes of its terms.
+    """
     x, v = np.nan_to_num(np.abs(detail.x)), np.nan_to_num(np.abs(detail.v))
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
     finite = np.where(np.isfinite(mass) & (mass > 0.0), mass, 1.0)
     with np.errstate(over="ignore"):
-        energy = (finite * v * v + np.abs(stiffness) * x * x + 2.0 * np.abs(force) * x).sum(axis=-1).max(initial=0.0)
+        springs = np.abs(stiffness) * x * (x + x[..., [OBJECT]])
+        energy = (finite * v * v + springs + 2.0 * np.abs(force) * x).sum(axis=-1).max(initial=0.0)
     slow = REST * np.sqrt(energy / finite)
     rests = v.max(axis=1, keepdims=True) <= slow
     far = REST * float(x.max(initial=0.0))

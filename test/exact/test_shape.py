@@ -13,7 +13,7 @@ from grasp_ros import exact
 from grasp_ros.exact.compilation import jit
 from grasp_ros.exact.compilation.numba_internals import InlinedPart, Part
 
-PARAMETERS, BODY, LINES = 8, 40, 300
+PARAMETERS, BODY = 8, 40
 DOORS = {"advance": 16}  # blocks of numbers, see its docstring
 # The recurrences of `series` are written out for the compiler's vectors; a test by Picard iteration watches them.
 ROOM = sorted(Path(exact.__file__).parent.rglob("*.py"))
