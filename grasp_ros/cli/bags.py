@@ -76,7 +76,7 @@ def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.summary import summary, verified
-    from grasp_ros.graph.verify import answers_of, verify
+    from grasp_ros.graph.verify import verify
 
     check_output(options.output, (".csv",), options.force, [options.bag])
     recording = bag.read(options.bag)
@@ -86,9 +86,9 @@ def _inspect(options: argparse.Namespace) -> int:
     rows = report.describe_recording(recording, found)
     if options.replay:
         prepare()
-        verification, answers = verify(recording), answers_of(recording)
-        rows, holds = rows + report.describe_verification(verification, answers), verification.holds
-        found["replay"] = verified(verification, answers)
+        verification = verify(recording)
+        rows, holds = rows + report.describe_verification(verification), verification.holds
+        found["replay"] = verified(verification)
     show(options, report.table(rows), found)
     if options.output is not None:
         with destination(options.output) as file:
@@ -100,14 +100,14 @@ def _verify(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.summary import verified
-    from grasp_ros.graph.verify import answers_of, verify
+    from grasp_ros.graph.verify import verify
 
     recording = bag.read(options.bag)
     prepare()
-    found, answers = verify(recording), answers_of(recording)
+    found = verify(recording)
     rows = [("bag", str(recording.path)), ("run", recording.running.words),
             ("recorded", f"{recording.t[-1]:g} s of {recording.scene.duration:g} s; end: {recording.lost['end']}"),
-            *report.describe_verification(found, answers)]
+            *report.describe_verification(found)]
     show(options, report.table(rows), {"bag": str(recording.path), "lockstep": recording.running.lockstep,
-                                       **verified(found, answers)})
+                                       **verified(found)})
     return 0 if found.holds else 1

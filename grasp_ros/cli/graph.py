@@ -174,7 +174,7 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
     from grasp_ros.cli import report
     from grasp_ros.graph import bag
     from grasp_ros.graph.summary import summary
-    from grasp_ros.graph.verify import answers_of, verify
+    from grasp_ros.graph.verify import verify
 
     recording = bag.read(graph.bag)
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
@@ -189,7 +189,7 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
     if not (stopped or options.no_check):
         verification = verify(recording)
         whole = whole and verification.holds
-        rows += report.describe_verification(verification, answers_of(recording))
+        rows += report.describe_verification(verification)
         spent.append((time.monotonic(), "check"))
     if not (stopped or options.no_figure):
         from grasp_ros.simulation import plots

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.verify import Answers, Verification
+from grasp_ros.graph.verify import Verification
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
@@ -115,9 +115,10 @@ def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]
     return _with_words(recording.scene, rows, other=not recording.closed or bool(recording.changes))
 
 
-def describe_verification(verification: Verification, answers: Mapping[str, Answers]) -> list[Row]:
+def describe_verification(verification: Verification) -> list[Row]:
     """Whose commands a bag has, and whether its numbers follow from them."""
-    rows = [*((f"{side} controller", str(found)) for side, found in answers.items()), ("verified", verification.words)]
+    rows = [(f"{side} controller", str(found)) for side, found in verification.answers.items()]
+    rows.append(("verified", verification.words))
     if verification.same is not None:
         rows.append(("same without ROS", "equal, bit for bit" if verification.same else "NOT EQUAL"))
     return rows

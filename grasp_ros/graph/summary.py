@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros.graph.recording import Recording, check_recording
-from grasp_ros.graph.verify import Answers, Verification
+from grasp_ros.graph.verify import Verification
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
@@ -62,12 +62,12 @@ def _beginnings(mode: Array, flag: Mode) -> int:
     return int(np.count_nonzero(touching[1:] & ~touching[:-1]) + touching[0])
 
 
-def verified(verification: Verification, answers: dict[str, Answers]) -> dict[str, Any]:
+def verified(verification: Verification) -> dict[str, Any]:
     """What became of a bag that was simulated again, as data; `difference` is the first number that differs."""
     difference = verification.difference
     return {
         "holds": verification.holds, "states_compared": verification.ticks, "problem": verification.problem or None,
         "difference": difference._asdict() if difference else None, "same_without_ROS": verification.same,
         "controllers": {side: {"commands": found.commands, "of_the_scene": found.own, "announcements_lost": found.lost}
-                        for side, found in answers.items()},
+                        for side, found in verification.answers.items()},
     }

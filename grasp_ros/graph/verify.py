@@ -46,6 +46,7 @@ class Verification(NamedTuple):
     ticks: int  # whose states were compared
     difference: Difference | None  # the first
     problem: str  # why not all of the bag could be compared; empty if all was
+    answers: dict[str, Answers]  # whose commands these are, by side
     same: bool | None  # whether `simulate` gives its states and commands; None: other laws, a reset, or no lockstep
 
     @property
@@ -80,7 +81,8 @@ def verify(recording: Recording) -> Verification:
         if found:
             first = min(found, key=lambda difference: difference.tick)
             break
-    return Verification(ticks, first, problem, _same_without_ros(recording))
+    answers = answers_of(recording)
+    return Verification(ticks, first, problem, answers, _same_without_ros(recording, answers))
 
 
 class Answers(NamedTuple):
@@ -125,11 +127,9 @@ def answers_of(recording: Recording) -> dict[str, Answers]:
     return found
 
 
-def _same_without_ros(recording: Recording) -> bool | None:
+def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool | None:
     """Whether the scene with its own laws has the recorded states and commands, without a graph."""
-    if not recording.running.lockstep or len(recording.starts) > 1:
-        return None
-    if any(found.differs for found in answers_of(recording).values()):
+    if not recording.running.lockstep or len(recording.starts) > 1 or any(found.differs for found in answers.values()):
         return None
     run = simulate(recording.scene, sampled=True, grid=recording.t, accuracy=recording.running.accuracy,
                    changes=recording.changes)

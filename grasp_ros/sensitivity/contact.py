@@ -196,7 +196,8 @@ def variable_at(c: Array, n: int, s: float, total: float, tau: float) -> float:
     """
     slope, low, high = c[LANES + Lane.TIME], 0.0, s
     bend = (total - slope * s) / (s * s)
-    at = 2.0 * tau / (slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0)))
+    root = slope + math.sqrt(max(slope * slope + 4.0 * bend * tau, 0.0))
+    at = 2.0 * tau / root if root > 0.0 else high  # 0 at the begin of a touch
     if not at < high:
         at = 0.5 * high
     for _ in range(MOST_HALVINGS):

@@ -105,7 +105,7 @@ def sizes(detail: Detail) -> Sizes:
 def _at_rest(detail: Detail) -> tuple[Array, Array]:
     """Changes of position and velocity, (k, 1, 3), with which a piece may come to rest, see `exact.driver.rest`.
 
-    As there, the energy of a spring has the distance to the object among the sizes of its terms.
+    As there, a spring counts k x (x + x_o): an arm that touches the object takes its place, with its roundings.
     """
     x, v = np.nan_to_num(np.abs(detail.x)), np.nan_to_num(np.abs(detail.v))
     mass, stiffness, _, force = np.moveaxis(detail.bodies[:, None], -1, 0)
