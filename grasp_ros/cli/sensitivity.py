@@ -24,12 +24,13 @@ WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
     """Derivatives of the last state, of V_c there, and of the times of the last events, number by number."""
+    level_rates = found.V_c_rates[-1]
     for place, key in enumerate(found.keys):
         yield f"d / d {key}", f"at t = {found.t[-1]:.6g} s, by its unit"
         for body in found.scene.system.present:
             x, v = found.state_rates[-1, COLUMN[body] : COLUMN[body] + 2, place]
             yield f"  {NAMES[body]} position, velocity", f"{x:.12g} m, {v:.12g} m/s"
-        yield "  V_c", f"{found.V_c_rates[-1, place]:.12g} J"
+        yield "  V_c", f"{level_rates[place]:.12g} J"
         for event, rate in zip(found.event_table[-LAST:], found.event_rates[-LAST:, place], strict=True):
             kind, body = Transition(int(event[Entry.KIND])), Body(int(event[Entry.BODY]))
             yield f"  {kind.name.lower()} {body.name.lower()} at {event[Entry.TIME]:.6g} s", f"{rate:.12g} s"
@@ -39,8 +40,9 @@ def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
 
 def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
     """Derivatives as data, number by number: at the last time of the state (6,) and V_c, and of the times of events."""
+    level_rates = found.V_c_rates[-1]
     return {
-        key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": found.V_c_rates[-1, place],
+        key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": level_rates[place],
               "corner": found.corner, "events": [
                   {"time_s": event[Entry.TIME], "kind": Transition(int(event[Entry.KIND])).name,
                    "body": Body(int(event[Entry.BODY])).name, "rate": rate}

@@ -7,7 +7,7 @@ from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.compilation.vectors import HALF, add_product, load_half, spread_half, store
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Lane, Law, Pair, V, X, Z
-from grasp_ros.sensitivity.tangents import WEIGHTS, Motion, Row, Table, Weight
+from grasp_ros.sensitivity.tangents import AHEAD, WEIGHTS, Motion, Row, Table, Weight
 
 
 @kernel
@@ -18,24 +18,21 @@ def touches(motion: Motion, body: Body) -> bool:
 
 @kernel
 def multiply(f: Array, g: Array, out: Array, n: int) -> None:
-    """Write the products of four series with four others up to the order n; coefficients k stand from 4 k on.
+    """Write the products of four series with four others up to the order n.
 
-    Four orders at a time: one sum alone would wait for each addition before the next. Behind n there must be room for
-    three.
+    Coefficients k stand from 4 k on, those of g behind zeros. Eight orders at a time: one sum alone would wait for each
+    addition before the next, and where its last products are over, the others go on with zeros.
     """
-    for k in range(0, n + 1, 4):
-        a = b = c = d = spread_half(0.0)
-        place = HALF * k
-        for i in range(0, place + HALF, HALF):
-            x, j = load_half(f, i), place - i
-            a, b = add_product(a, x, load_half(g, j)), add_product(b, x, load_half(g, j + HALF))
-            c, d = add_product(c, x, load_half(g, j + 2 * HALF)), add_product(d, x, load_half(g, j + 3 * HALF))
-        x, y, z = load_half(f, place + HALF), load_half(f, place + 2 * HALF), load_half(f, place + 3 * HALF)
-        first, second, third = load_half(g, 0), load_half(g, HALF), load_half(g, 2 * HALF)
-        store(out, place, a)
-        store(out, place + HALF, add_product(b, x, first))
-        store(out, place + 2 * HALF, add_product(add_product(c, x, second), y, first))
-        store(out, place + 3 * HALF, add_product(add_product(add_product(d, x, third), y, second), z, first))
+    for k in range(0, n + 1, AHEAD):
+        a_0 = a_1 = a_2 = a_3 = a_4 = a_5 = a_6 = a_7 = spread_half(0.0)
+        for i in range(k + AHEAD):
+            x, j = load_half(f, HALF * i), HALF * (AHEAD + k - i)
+            a_0, a_1 = add_product(a_0, x, load_half(g, j)), add_product(a_1, x, load_half(g, j + HALF))
+            a_2, a_3 = add_product(a_2, x, load_half(g, j + 2 * HALF)), add_product(a_3, x, load_half(g, j + 3 * HALF))
+            a_4, a_5 = add_product(a_4, x, load_half(g, j + 4 * HALF)), add_product(a_5, x, load_half(g, j + 5 * HALF))
+            a_6, a_7 = add_product(a_6, x, load_half(g, j + 6 * HALF)), add_product(a_7, x, load_half(g, j + 7 * HALF))
+        for order, total in enumerate((a_0, a_1, a_2, a_3, a_4, a_5, a_6, a_7)):
+            store(out, HALF * (k + order), total)
 
 
 @inlined
@@ -60,18 +57,18 @@ def pair_series(motion: Motion, table: Table, n: int) -> None:
         w_l, w_r = c[i + Z.L] if left else 0.0, c[i + Z.R] if right else 0.0
         pace[k] = (k + 1) * c[i + LANES + Lane.TIME] if k < n else 0.0
         put(a, k, w_l, w_r, w_l, w_r)
-        put(b, k, w_l, w_r, pace[k], pace[k])
+        put(b, AHEAD + k, w_l, w_r, pace[k], pace[k])
     multiply(a, b, first, n)
     for k in range(n + 1):
         i, j, one = LANES * k, HALF * k, 1.0 if k == 0 else 0.0
         u_l, u_r, s_l, s_r = first[j], first[j + 1], first[j + 2], first[j + 3]
         put(a, k, s_l, s_r, u_l, u_r)
-        put(b, k, one + loss_l * (c[i + V.L] - c[i + V.O]), one + loss_r * (c[i + V.O] - c[i + V.R]), s_l, s_r)
+        put(b, AHEAD + k, one + loss_l * (c[i + V.L] - c[i + V.O]), one + loss_r * (c[i + V.O] - c[i + V.R]), s_l, s_r)
     multiply(a, b, second, n)
     for k in range(n + 1):
         i, j = LANES * k, HALF * k
         put(a, k, second[j + 2], second[j + 3], c[i + X.O] + first[j], c[i + X.O] - first[j + 1])
-        put(b, k, c[i + V.L] - c[i + V.O], c[i + V.O] - c[i + V.R], pace[k], pace[k])
+        put(b, AHEAD + k, c[i + V.L] - c[i + V.O], c[i + V.O] - c[i + V.R], pace[k], pace[k])
     multiply(a, b, third, n)
 
 

@@ -20,7 +20,8 @@ from grasp_ros.sensitivity.base_series import base_series, touches
 from grasp_ros.sensitivity.tangents import BLOCK, ODD, STATES, STEP, SUMS, WEIGHTS, Motion, Rates, Row, Table, Weight
 
 MOST_HALVINGS = 200
-NEGLECTED = 128.0 * EPS
+NEGLECTED = 4096.0 * EPS  # 1e-12 for a step; one digit more costs 5 %, as more steps are made in parts
+ROUGHLY = 2.0**-28  # of a step: what follows by Newton's iteration is below rounding
 FIRST = 6  # terms of a series, one of which is about its size
 
 
@@ -116,10 +117,12 @@ def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
     """Write the series of the tangents over a Taylor step of even degree n."""
     base_series(motion, table, n)
     left, right, nothing = touches(motion, LEFT), touches(motion, RIGHT), spread_half(0.0)
-    for block in range(rates.x.shape[1] // HALF):
+    blocks = rates.x.shape[1] // HALF
+    for block in range(blocks):
         for lane in range(STATES):
             store(table.series, BLOCK * block + HALF * lane, load_half(rates.x[lane], HALF * block))
-        for k in range(n):
+    for k in range(n):
+        for block in range(blocks):  # within: while one waits for its newest coefficient, the next one sums
             on_l = on_r = nothing
             for side in (LEFT, RIGHT):
                 if touches(motion, side) and k % 2 == 0:
@@ -139,15 +142,26 @@ def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
 def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) -> None:
     """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""
     for block in range(rates.x.shape[1] // HALF):
-        for body in (LEFT, OBJECT, RIGHT):
-            if touches(motion, body):
-                lane, x, v = velocity_lane(body) - 1, spread_half(0.0), spread_half(0.0)
-                for k in range(n, -1, -1):
-                    place = BLOCK * block + STEP * k + HALF * lane
-                    x = add_product(load_half(table.series, place), x, s)
-                    v = add_product(load_half(table.series, place + HALF), v, s)
-                store(rates.at[lane], HALF * block, x)
-                store(rates.at[lane + 1], HALF * block, v)
+        x_l = v_l = x_o = v_o = x_r = v_r = spread_half(0.0)
+        for i in range(BLOCK * block + STEP * n, BLOCK * block - STEP, -STEP):  # six sums: none waits for another
+            x_l = add_product(load_half(table.series, i + HALF * X.L), x_l, s)
+            v_l = add_product(load_half(table.series, i + HALF * V.L), v_l, s)
+            x_o = add_product(load_half(table.series, i + HALF * X.O), x_o, s)
+            v_o = add_product(load_half(table.series, i + HALF * V.O), v_o, s)
+            x_r = add_product(load_half(table.series, i + HALF * X.R), x_r, s)
+            v_r = add_product(load_half(table.series, i + HALF * V.R), v_r, s)
+        store_body(rates.at, block, OBJECT, x_o, v_o)
+        if touches(motion, LEFT):
+            store_body(rates.at, block, LEFT, x_l, v_l)
+        if touches(motion, RIGHT):
+            store_body(rates.at, block, RIGHT, x_r, v_r)
+
+
+@inlined
+def store_body(at: Array, block: int, body: Body, x: Array, v: Array) -> None:
+    """Write the tangents of a body, of four directions."""
+    store(at[velocity_lane(body) - 1], HALF * block, x)
+    store(at[velocity_lane(body)], HALF * block, v)
 
 
 @kernel
@@ -209,7 +223,7 @@ def variable_at(c: Array, n: int, s: float, total: float, tau: float) -> float:
         following = at + (tau - time) / pace if pace > 0.0 else math.inf
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        if abs(following - at) <= 4.0 * EPS * s:
+        if abs(following - at) <= ROUGHLY * s:
             return following
         at = following
     return at

@@ -106,14 +106,17 @@ def check_glide(motion: Motion, rates: Rates, outputs: Outputs) -> None:
 
 @kernel
 def write_output(motion: Motion, outputs: Outputs, rates: Rates) -> None:
-    """Write what stands in `at` to the next output, and the forces that act."""
-    row, n = outputs.counts[Count.FILLED], outputs.out.shape[2]
+    """Write what stands in `at` to the next output, and the forces that act where they are wanted."""
+    row = outputs.rows[outputs.counts[Count.FILLED]]
+    copy_matrix(outputs.out[row], rates.at)
+    outputs.counts[Count.FILLED] += 1
+    row -= outputs.out.shape[0] - outputs.forces.shape[0]
+    if row < 0:
+        return
     for body in (LEFT, RIGHT, OBJECT):
         outputs.forces[row, body, 0] = motion.bodies[body, Of.FORCE]
-        for j in range(n):
+        for j in range(outputs.out.shape[2]):
             outputs.forces[row, body, 1 + j] = rates.acting[body, Of.FORCE, j]
-    copy_matrix(outputs.out[row], rates.at)
-    outputs.counts[Count.FILLED] = row + 1
 
 
 @kernel

@@ -24,8 +24,10 @@ class Carrier:
     ----------
     integrator : Integrator
     directions : Directions
-    grid : array (m,), s
-        Ascending output times.
+    times : array (m,), s
+        Output times, in any order.
+    e : int
+        How many of them, the last ones, are times of events.
 
     Attributes
     ----------
@@ -33,12 +35,12 @@ class Carrier:
         Derivatives of the state now.
     out : array (m, 6, n)
         At the output times.
-    forces : array (m, 3, 1 + n)
-        Constant forces that act on the bodies there, N, and behind them their derivatives.
+    forces : array (e, 3, 1 + n)
+        Constant forces that act on the bodies at events, N, and behind them their derivatives.
     """
 
-    def __init__(self, integrator: Integrator, directions: Directions, grid: Array) -> None:
-        self._tangents = tangents_of(integrator.plant, integrator.records, directions, grid)
+    def __init__(self, integrator: Integrator, directions: Directions, times: Array, e: int = 0) -> None:
+        self._tangents = tangents_of(integrator.plant, integrator.records, directions, times, e)
         rates, outputs = self._tangents.rates, self._tangents.outputs
         self.x, self.out, self.forces = rates.x[:, : directions.state.shape[1]], outputs.out, outputs.forces
 

@@ -31,7 +31,8 @@ BLOCK = STEP * TERMS
 ODD = LANES * HALF  # sums of one coefficient: of the states, and of the two pairs
 SUMS = 2 * ODD  # of one of even order and of the next one
 WEIGHTS = HALF * TERMS
-ROOM = HALF * (TERMS + 3)  # of four series for `contact.multiply`
+AHEAD = 8  # orders that `base_series.multiply` finds at a time
+ROOM = HALF * (TERMS + 2 * AHEAD)  # of four series for it
 COLUMNS = len(Column)
 UNSEEN = -1  # slide before the first segment
 
@@ -104,7 +105,7 @@ class Table(NamedTuple):
     rows: Array  # (ROWS, TERMS) of the run, see `Row`
     weights: Array  # (5 WEIGHTS,) of the run, see `Weight`
     factors: Array  # (2, ROOM)
-    products: Array  # (3, ROOM) see `contact.pair_series`
+    products: Array  # (3, ROOM) see `base_series.pair_series`
     sums: Array  # (N / HALF SUMS,) of products
 
 
@@ -126,9 +127,10 @@ class Outputs(NamedTuple):
 
     counts: Integers  # see `Count`
     numbers: Array  # see `Number`
-    grid: Array  # (m,) output times, s
+    grid: Array  # (m,) output times, s, ascending
+    rows: Integers  # (m,) where each is written
     out: Array  # (m, 6, n)
-    forces: Array  # (m, 3, 1 + n) constant forces that act on the bodies, N, and their derivatives
+    forces: Array  # (e, 3, 1 + n) constant forces that act on the bodies in the last e rows, N, and their derivatives
 
 
 class Tangents(NamedTuple):
@@ -150,9 +152,12 @@ def _padded(array: Array) -> Array:
     return wide
 
 
-def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) -> Tangents:
-    """The tangents of a run that begins, without held commands, for output times (m,) in s."""
-    n, m, x = changes.state.shape[1], len(grid), _padded(changes.state)
+def tangents_of(plant: Plant, state: State, changes: Directions, times: Array, e: int) -> Tangents:
+    """The tangents of a run that begins, without held commands, for output times (m,) in s, in any order.
+
+    The forces that act are kept at the last e of them.
+    """
+    n, m, order, x = changes.state.shape[1], len(times), np.argsort(times, kind="stable"), _padded(changes.state)
     wide, counts, numbers = x.shape[1], np.zeros(len(Count), dtype=np.int64), np.zeros(len(Number))
     counts[Count.TICK], counts[Count.SLIDE], numbers[Number.CORNER] = -1, UNSEEN, math.inf
     motion = Motion(np.zeros(0), state.y, state.mode, state.clock, plant.bodies, plant.pairs, state.y.copy())
@@ -161,11 +166,11 @@ def tangents_of(plant: Plant, state: State, changes: Directions, grid: Array) ->
                   zeros(3, ROOM), zeros(wide // HALF * SUMS))
     inputs = Inputs(changes.bodies, np.zeros((3, n)), changes.coulomb[0], np.zeros((2, COLUMNS)),
                     np.zeros((2, COLUMNS, n)), np.zeros((1, 2, 2)), np.zeros((0, 2, n)), changes.external)
-    outputs = Outputs(counts, numbers, grid, np.zeros((m, STATES, n)), np.zeros((m, 3, 1 + n)))
+    outputs = Outputs(counts, numbers, times[order], order, np.zeros((m, STATES, n)), np.zeros((e, 3, 1 + n)))
     return Tangents(motion, rates, table, inputs, outputs, np.zeros((5, STATES, STATES)))
 
 
-tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0))))
+tangents_at = reader(typeof(tangents_of(*new_run()[2:], no_directions(1), np.zeros(0), 0)))
 
 
 @kernel

@@ -41,7 +41,6 @@ class Sensitivity(Frozen):
         As in a trajectory: time in s, body, kind, u in m and u' in m/s.
     state_rates : array (m, 6, n)
         Derivatives of the states at fixed times.
-    V_c_rates : array (m, n)
     event_rates : array (e, n), s
         Derivatives of the times of the events; infinite at a touch without speed, 0 where an input that changes makes
         the event.
@@ -57,7 +56,6 @@ class Sensitivity(Frozen):
     state: Array
     event_table: Array
     state_rates: Array
-    V_c_rates: Array
     event_rates: Array
     corner: float | None
 
@@ -65,6 +63,13 @@ class Sensitivity(Frozen):
     def V_c(self) -> Array:
         """Twice the energy (m,) in J, with continuous feedback."""
         return energy(self.scene.system, self.state).V_c
+
+    @property
+    def V_c_rates(self) -> Array:
+        """Derivatives (m, n) of V_c."""
+        system = self.scene.system
+        changes = directions(self.scene, self.keys, False).closed_loop(system)
+        return level_rates(system, changes, self.state, self.state_rates)
 
 
 def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
@@ -79,36 +84,36 @@ def differentiate(run: Trajectory, keys: Sequence[str]) -> Sensitivity:
     if run.method != EXACT or run.controllers:
         raise Refused(f"{scene.name}: derivatives: allowed: a run of {EXACT} with the scene's own controllers")
     changes, grid, events = directions(scene, keys, sampled), run.t, run.event_table
-    both = np.concatenate([grid, events[:, Entry.TIME]])
-    order = np.argsort(both, kind="stable")
+    times = np.concatenate([grid, events[:, Entry.TIME]])
     integrator = integrator_of(run)
-    carrier = carry(scene, integrator, changes, both[order], sampled)
-    states = complete(scene, integrator, sampled, both[order])
+    carrier = carry(scene, integrator, changes, times, sampled, len(events))
+    states = complete(scene, integrator, sampled, times)
     carrier.finish(scene.duration)
-    back = np.argsort(order, kind="stable")
-    at, late = back[: len(grid)], back[len(grid) :]
-    rates = carrier.out[at]
-    levels = level_rates(system, changes.closed_loop(system), states[at], rates)
-    times = event_rates(scene, changes, sampled, events, Moments(states[late], carrier.out[late], carrier.forces[late]))
+    m = len(grid)
+    at_events = event_rates(scene, changes, sampled, events, Moments(states[m:], carrier.out[m:], carrier.forces))
     states[:, system.absent_columns] = np.nan
-    check_same(run, grid, states[at], integrator.event_table)
-    return Sensitivity(scene, tuple(keys), grid, states[at], events, rates, levels, times, carrier.corner)
+    check_same(run, grid, states[:m], integrator.event_table)
+    return Sensitivity(scene, tuple(keys), grid, states[:m], events, carrier.out[:m], at_events, carrier.corner)
 
 
-def carry(scene: Scene, integrator: Integrator, changes: Directions, grid: Array, sampled: bool) -> Carrier:
-    """Let a run carry its tangents along, for output times (m,) in s."""
-    carrier = Carrier(integrator, changes if sampled else changes.closed_loop(scene.system), grid)
+def carry(scene: Scene, integrator: Integrator, changes: Directions, times: Array, sampled: bool, e: int = 0
+          ) -> Carrier:
+    """Let a run carry its tangents along, for output times (m,) in s, in any order; the last e are those of events."""
+    carrier = Carrier(integrator, changes if sampled else changes.closed_loop(scene.system), times, e)
     if sampled or scene.system.external:
         carrier.drive_by(scene, changes, sampled)
     integrator.observer = carrier
     return carrier
 
 
-def complete(scene: Scene, integrator: Integrator, sampled: bool, grid: Array) -> Array:
-    """Run a scene to its end, as `simulate` does, or refuse; states (m, 6) at the output times."""
-    states = drive(scene, integrator, sampled, grid)
+def complete(scene: Scene, integrator: Integrator, sampled: bool, times: Array) -> Array:
+    """Run a scene to its end, as `simulate` does, or refuse; states (m, 6) at output times (m,) in s, in any order."""
+    order = np.argsort(times, kind="stable")
+    ascending = drive(scene, integrator, sampled, times[order])
     if integrator.status is not Status.DONE:
         raise Refused(f"{scene.name}: no derivatives of a run that {integrator.stop}")
+    states = np.empty_like(ascending)
+    states[order] = ascending
     return states
 
 
