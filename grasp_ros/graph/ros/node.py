@@ -245,9 +245,5 @@ class GraspNode(ParameterNode):
         """Do in place of a spin what has an order of its own, until something is received; whether there is any."""
         return False
 
-    def behind(self) -> object:
-        """What changes while it takes what had arrived before a signal; None: nothing that must be taken."""
-        return None
-
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""
