@@ -48,7 +48,6 @@ class Heartbeat:
 
     node: str  # full name
     identity: str  # of the process: who takes the place of a node has another one
-    turn: int  # how often it has put its time back
     texts: list[str]  # digests of what it says on `scene` and `run`
     ended: str  # its last words; empty while it lives
     process: str  # its number and beginning, as the kernel has them
@@ -83,7 +82,7 @@ class Heartbeats:
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
         self._heard = heard  # called after each one of another node
         process = _process(str(os.getpid()))[1]
-        self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
+        self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, [], "", process, False)
         self._beats: dict[str, Heartbeat] = {}
         self._last = 0.0  # wall time of the last own one
         self.prepared = 0.0  # that of the last one of a node that is not ready
@@ -103,7 +102,7 @@ class Heartbeats:
 
     def _beat(self) -> None:
         own, self._last = self.own, time.monotonic()
-        content = [own.node, own.identity, own.turn, own.texts, own.ended, own.process, own.ready]
+        content = [own.node, own.identity, own.texts, own.ended, own.process, own.ready]
         self.publisher.publish(messages.text(json.dumps(content)))
 
     def tell(self) -> None:
@@ -183,10 +182,11 @@ def _parsed(text: str) -> Heartbeat | None:
     if len(text) > MOST_BYTES:
         return None
     try:
-        node, identity, turn, texts, ended, process, ready = json.loads(text)
+        node, identity, texts, ended, process, ready = json.loads(text)
     except (ValueError, TypeError, RecursionError):
         return None
-    kinds = isinstance(texts, list) and isinstance(turn, int)
-    if not kinds or not all(isinstance(word, str) for word in (node, identity, ended, process, *texts)):
+    if not isinstance(texts, list) or not all(
+        isinstance(word, str) for word in (node, identity, ended, process, *texts)
+    ):
         return None
-    return Heartbeat(node, identity, turn, texts, ended, process, ready is True)
+    return Heartbeat(node, identity, texts, ended, process, ready is True)

@@ -204,11 +204,6 @@ class PeerNode(GraspNode):
         """Sources of a topic without processes that are known to be dead."""
         return self.heartbeats.living(self.sources(topic), time.monotonic() - self.patience)
 
-    def turn(self, topic: Topic) -> int:
-        """How often the source of a topic has put its time back, as far as it says so."""
-        beats = self.heartbeats.of(self._last.get(topic) or self.sources(topic))
-        return beats[-1].turn if beats else 0
-
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; it counts when a living node vouches for it, or when nobody here says such texts."""
         self._texts[topic], self._takers[topic] = [], take

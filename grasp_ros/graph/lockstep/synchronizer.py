@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -54,22 +54,19 @@ class Synchronizer:
     not come at all.
 
     `topics` are, beside `joint_states`, those with a message for every state; `names` those that every state has. Every
-    stamp is a multiple of `period_ns` and not above `end_ns`. `turn` says how often the plant was reset: the first
-    state may come again for that reason or another. A command acts `delay` control periods after its arrival.
+    stamp is a multiple of `period_ns` and not above `end_ns`. A command acts `delay` control periods after its arrival.
     """
 
     def __init__(
-        self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, turn: Callable[[], int],
-        delay: int = 0,
+        self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, delay: int = 0
     ) -> None:
-        self._reader, self._period_ns, self.end_ns, self._turn = StateReader(names), period_ns, end_ns, turn
+        self._reader, self._period_ns, self.end_ns = StateReader(names), period_ns, end_ns
         self._ahead_ns = PATIENCE_TICKS * period_ns
         self._states: deque[tuple[bool, State, bytes]] = deque()  # whether time went back; as read; as it came
         self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
         self._uncertain: dict[Topic, dict[int, list[bytes]]] = {topic: {} for topic in topics}
         self._wait = delay + 1  # ticks until the effort has a command
-        self._newest, self._newest_turn = -1, 0
-        self._before = -1  # last state taken
+        self._newest = self._before = -1  # last states put, and taken
 
     def put(self, topic: Topic, cdr: bytes, sure: bool = True) -> Arrival:
         """Add a serialized message, if it can be true; a command may not be sure to be of the right source."""
@@ -84,18 +81,15 @@ class Synchronizer:
             return Arrival.REFUSED
 
     def _put_state(self, stamp: int, cdr: bytes) -> Arrival:
-        if stamp == self._newest and (stamp or self._turn() == self._newest_turn):
+        if stamp == self._newest:
             return Arrival.REPEATED if self._states else Arrival.AGAIN
         if 0 < stamp < self._newest:
             return Arrival.STAMP
         message = self._reader.read(cdr)
         if message is None:
             return Arrival.REFUSED
-        restarted = stamp <= self._newest
-        if restarted or self._newest < 0:
-            self._newest_turn = self._turn()
+        self._states.append((stamp < self._newest, message, cdr))
         self._newest = stamp
-        self._states.append((restarted, message, cdr))
         return Arrival.TAKEN
 
     def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:

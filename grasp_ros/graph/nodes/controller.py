@@ -57,12 +57,10 @@ class Controller(PeerNode):
         self._scene: Scene | None = None
         self._staged: dict[str, float] = {}
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
-        self._turn = 0  # how often the plant had been reset then
         self._force = 0.0  # that answer
         self._number = 0  # of the last announcement for this scene
-        self._ready_to_answer = self._listening = False
+        self._ready_to_answer = False
         self._reader = StateReader(())  # before a scene
-        self._held: State | None = None  # the state that came before this node was ready
         self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0, "skipped states": 0})
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._stage)
@@ -84,11 +82,11 @@ class Controller(PeerNode):
 
     def _on_scene(self, text: str) -> None:
         """A plant has come: the first one, or one after another."""
-        first, self._scene = not self._listening, None
+        self._scene = None
         try:
             self._take(scenes.parse(text, SCENE.name, f"topic {SCENE.name}"))
         except Refused as error:
-            if first:
+            if not self.begun:
                 raise
             self._left = None  # a living plant is no reason to go on with the last scene
             self.phase, self.words = Phase.IDLE, f"waits for another scene: {error}"
@@ -142,22 +140,16 @@ class Controller(PeerNode):
     def _start(self) -> None:
         self.phase = Phase.RUNNING
         self.words = f"running with {self._own.words}" if self._own else "running"
-        self.begun, self.concern = True, ""
         self.take_priority(self._priority)
-        if not self._listening:  # this tells the plant that the controller is ready, so it comes last
-            self._listening = True
+        if not self.begun:  # this tells the plant that the controller is ready, so it comes last
             self._states = self.subscribe(JOINT_STATES, self._on_state, read=lambda cdr: self._reader.read(cdr))
-        self._ready_to_answer = True
-        if self._held is not None:
-            held, self._held = self._held, None
-            self._on_state(held)
+        self.begun, self._ready_to_answer, self.concern = True, True, ""
 
     def _begin(self, time_ns: int) -> None:
         """Let the numbers that were set act from a time on, and let all know before the command does."""
         assert self._scene is not None
         if time_ns <= self._answered and self._own:
             self._own.reset()
-        self._turn = self.turn(JOINT_STATES)
         before, self._scene = self._scene, self._scene.changed(self._staged)
         for warning in self._scene.warnings:
             if warning not in before.warnings:
@@ -181,15 +173,13 @@ class Controller(PeerNode):
         return False
 
     def _on_state(self, state: State | None) -> None:
-        if not self._ready_to_answer:
-            self._held = state
-            return
-        if self._scene is None or not self._admits(state):  # the scene of a new plant may still be on its way
+        # A plant that has just come may be sooner than its scene, or than what listens to this node; it asks again.
+        if not self._ready_to_answer or self._scene is None or not self._admits(state):
             return
         if self._free:
             state = self._newest(state)
         time_ns = state.time_ns
-        if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
+        if time_ns == self._answered:
             self.count("repeated states")  # it, or what answered it, was lost on the way
             self._answer(time_ns)
             return
@@ -224,6 +214,7 @@ class Controller(PeerNode):
             before, state = state, newer
             self.count("skipped states")
             if state.time_ns < before.time_ns:
+                self._answered = before.time_ns  # for the reset to be seen, whatever was answered before it
                 break
         return state
 

@@ -146,7 +146,7 @@ class Monitor(PeerNode):
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
-            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
+            scene.period_ns, scene.ticks * scene.period_ns, scene.system.delay,
         )
         self._limits = Limits(self, scene)
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)

@@ -220,8 +220,6 @@ class Plant(PeerNode):
         self._begin = time.monotonic()
         with suppress(OSError):
             self._bar.reset()
-        self.heartbeats.own.turn = self.resets
-        self.heartbeats.tell()  # with the stamp of the first state this one is otherwise a repetition
         self.publish_state()
 
     def finish(self) -> None:
