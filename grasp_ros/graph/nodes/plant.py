@@ -60,7 +60,7 @@ class Plant(PeerNode):
         self.resets, self.asked = 0, math.inf  # how often it was put back; wall time of the current state
         self._recorded, self.heard_of_record = -1, -math.inf  # last tick that the monitor has; wall time of its word
         self._begin = math.nan  # wall time of the first state
-        self.counters.update(tick=0, resets=0, **{"refused records": 0})
+        self.counters["refused records"] = 0
         # On a terminal alone: a file or a journal gets no bar.
         self._bar = tqdm(
             total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True
@@ -124,6 +124,7 @@ class Plant(PeerNode):
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant."""
+        self.counters.update(tick=self.tick, resets=self.resets)
         super().report()
         self._insist()
         self.loop.report()
@@ -208,7 +209,6 @@ class Plant(PeerNode):
         if self._plant.status is not Status.DONE:
             self.fail(self._plant.stop)
             return
-        self.counters["tick"] = self._plant.tick
         self.publish_state()
 
     def restart(self) -> None:
@@ -216,7 +216,6 @@ class Plant(PeerNode):
         self.get_logger().info(f"reset at tick {self.tick}")
         self._plant, self._recorded = self._new_plant(), -1
         self.resets += 1
-        self.counters.update(tick=0, resets=self.resets)
         self._begin = time.monotonic()
         with suppress(OSError):
             self._bar.reset()
