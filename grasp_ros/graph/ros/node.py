@@ -63,7 +63,6 @@ class GraspNode(ParameterNode):
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
-        self.other_sources = ""  # who publishes what somebody else does
         self.phase = Phase.WAITING
         # What it does or waits for: the message of its /diagnostics.
         self.words = f"waiting for peers {place(os.environ, self.get_namespace())}"
@@ -195,10 +194,10 @@ class GraspNode(ParameterNode):
     def report(self) -> None:
         """Publish the counters."""
         lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
-        failed, uncertain = self.exit_code or self.trouble, lost or self.concern or self.other_sources
+        failed, uncertain = self.exit_code or self.trouble, lost or self.concern
         status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="grasp_ros")
         status.level = status.ERROR if failed else status.WARN if uncertain else status.OK
-        status.message = "; ".join(filter(None, (self.words, self.trouble, self.concern, self.other_sources)))
+        status.message = "; ".join(filter(None, (self.words, self.trouble, self.concern)))
         values = {"phase": self.phase.value, **self.counters}
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
