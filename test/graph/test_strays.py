@@ -134,6 +134,7 @@ def test_a_stray_with_the_stamp_of_the_state_neither_acts_nor_is_recorded(
     found = verify(replace(recording, command=command))
     assert not found.holds
     assert found.words.endswith("; the bag lacks left/effort_command of 1 ticks, the first 300")
+    assert (str(found.answers["left"]), found.same) == ("the scene's law", None)  # and of nobody else
 
 
 HARD = """
