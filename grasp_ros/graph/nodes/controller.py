@@ -38,7 +38,7 @@ class Controller(PeerNode):
     in a free run the newest one that has come. It announces the numbers of its law before the first command that rests
     on them: at the beginning, after a reset, and when they were set while it runs. With a law of the user's own it
     announces nothing, and takes no other numbers. When a plant comes with another scene it goes on with that. Other
-    parameters are `real_time_priority` and the numbers of the scene.
+    parameters are the numbers of the scene.
     """
 
     why_read_only = "it is fixed for a run, so that the bag and a replay agree; set it in the scene"
@@ -49,7 +49,6 @@ class Controller(PeerNode):
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor", False)
-        self._priority = self.read_priority()
         law = self.read_only("law", "")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
@@ -140,7 +139,6 @@ class Controller(PeerNode):
     def _start(self) -> None:
         self.phase = Phase.RUNNING
         self.words = f"running with {self._own.words}" if self._own else "running"
-        self.take_priority(self._priority)
         if not self.begun:  # this tells the plant that the controller is ready, so it comes last
             self._states = self.subscribe(JOINT_STATES, self._on_state, read=lambda cdr: self._reader.read(cdr))
         self.begun, self._ready_to_answer, self.concern = True, True, ""

@@ -47,7 +47,6 @@ class Plant(PeerNode):
         progress = self.read_only("progress", False)
         free = self.read_only("free_running", False)
         waits = free and self.read_only("wait_for_controllers", False)
-        self._priority = self.read_priority() if free else 0
         steering = Steering(self)
         scene = scenes.load(name)
         running = self._read_running(free, list(scene.controllers.values()))
@@ -179,7 +178,6 @@ class Plant(PeerNode):
         self.begun, self.concern = True, ""
         self.heartbeats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
-        self.take_priority(self._priority)
         self.publish_state()
         self.loop.start()
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from enum import Enum
 from functools import partial
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -33,7 +31,6 @@ PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0
 LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
 SWEEP = 100  # messages of one topic at a time
-PRIORITY, MOST_PRIORITY = "real_time_priority", 99  # of Linux
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 NEW = "a node whose name is not known yet"
 
@@ -150,27 +147,6 @@ class GraspNode(ParameterNode):
             if not any((writer.node_namespace, writer.node_name) in listening for writer in self.writers(source)):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
-
-    def read_priority(self) -> int:
-        """Parameter real_time_priority: that of this process once it runs, SCHED_RR; 0: that of every process.
-
-        Between equals a thread waits some milliseconds for its turn when all processors are busy, several periods of a
-        fast loop. Linux gives this priority to whoever has the right, by CAP_SYS_NICE or a limit `rtprio`.
-        """
-        wanted = self.read_only(PRIORITY, 0)
-        if not 0 <= wanted <= MOST_PRIORITY:
-            raise Refused(f"{PRIORITY}: {wanted} is not allowed; allowed: 0 to {MOST_PRIORITY}")
-        return int(wanted)
-
-    def take_priority(self, wanted: int) -> None:
-        """Give it to all threads of this process; those that they start inherit it. Without the right, say so."""
-        try:
-            for thread in Path("/proc/self/task").iterdir() if wanted else ():
-                with suppress(ProcessLookupError):  # it has just ended
-                    os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(wanted))
-        except OSError as error:
-            self.get_logger().info(f"{PRIORITY}: {wanted} is not to be had here ({error.strerror}):"
-                                   " goes on without, and commands get older on busy processors")
 
     def count(self, counter: str, number: int = 1) -> None:
         """Add to a counter."""
