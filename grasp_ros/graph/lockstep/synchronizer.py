@@ -94,10 +94,7 @@ class Synchronizer:
             return Arrival.REPEATED if self._states else Arrival.AGAIN
         if 0 < stamp < self._newest:
             return Arrival.STAMP
-        message = self._reader.read(cdr)
-        if message is None:
-            return Arrival.REFUSED
-        self._states.append((stamp < self._newest, message, cdr))
+        self._states.append((stamp < self._newest, self._reader.read(cdr), cdr))
         self._newest = stamp
         return Arrival.TAKEN
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from typing import Any, TypeGuard
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -160,19 +159,18 @@ class Controller(PeerNode):
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
 
-    def _admits(self, state: State | None) -> TypeGuard[State]:
-        """Whether a message can be a state of this run."""
+    def _admits(self, time_ns: int) -> bool:
+        """Whether a state can be one of this run."""
         assert self._scene is not None
-        if state is not None and state.time_ns % self._scene.period_ns == 0 and (
-            state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * self._scene.period_ns
-        ):
+        period_ns, ticks = self._scene.period_ns, self._scene.ticks
+        if time_ns % period_ns == 0 and (time_ns == 0 or self._answered <= time_ns <= ticks * period_ns):
             return True
         self.refuse("refused states", JOINT_STATES)
         return False
 
-    def _on_state(self, state: State | None) -> None:
+    def _on_state(self, state: State) -> None:
         # A plant that has just come may be sooner than its scene, or than what listens to this node; it asks again.
-        if not self._ready_to_answer or self._scene is None or not self._admits(state):
+        if not self._ready_to_answer or self._scene is None or not self._admits(state.time_ns):
             return
         if self._free:
             state = self._newest(state)
@@ -204,10 +202,12 @@ class Controller(PeerNode):
     def _newest(self, state: State) -> State:
         """The last state that waits here, or the first after a reset."""
         for cdr in self.waiting(self._states):
-            newer = None
-            with suppress(*messages.UNREADABLE):
+            try:
                 newer = self._reader.read(cdr)
-            if not self._admits(newer):
+            except messages.UNREADABLE:
+                self.refuse("malformed messages", JOINT_STATES)
+                continue
+            if not self._admits(newer.time_ns):
                 continue
             before, state = state, newer
             self.count("skipped states")

@@ -76,8 +76,6 @@ class Plant(PeerNode):
         if self.monitored:
             self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
-        if progress:
-            self.wall_timer(0.1, self._show)
         self.when(self._ready, self._start)
 
     def _read_running(self, free: bool, topics: Sequence[Any]) -> Running:
@@ -143,6 +141,7 @@ class Plant(PeerNode):
     def look(self) -> None:
         """See to it that everybody is there; ask again what has not been answered."""
         super().look()
+        self._show()
         if self.begun and not self.finished:
             self.loop.ask_again(time.monotonic())
 
