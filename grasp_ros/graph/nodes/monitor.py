@@ -26,7 +26,7 @@ from grasp_ros.graph.nodes.lyapunov_monitor import Announcement, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
+from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
@@ -189,8 +189,7 @@ class Monitor(PeerNode):
             self.count("lost announcements", self._numbers[side].take(message))
             self._lyapunov.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
-            self.refuse("refused announcements", CHANGES[side])
-            self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
+            self.refuse("refused announcements", CHANGES[side], str(error))
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?

@@ -152,14 +152,15 @@ class GraspNode(ParameterNode):
         """Add to a counter."""
         self.counters[counter] = int(self.counters.get(counter, 0)) + number
 
-    def refuse(self, counter: str, topic: Topic) -> None:
-        """Count a message that cannot be true, and say every few seconds whose it may be."""
+    def refuse(self, counter: str, topic: Topic, why: str = "") -> None:
+        """Count a message that cannot be true, and say every few seconds whose it may be, and why."""
         self.count(counter)
         now = time.monotonic()
         if now >= self._complaints.get((counter, topic), 0.0):
             self._complaints[counter, topic] = now + PATIENCE_SECONDS
             names = " and ".join(self.sources(topic)) or "none any more"
-            self.get_logger().warning(f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}")
+            words = f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}"
+            self.get_logger().warning(f"{words}; {why}" if why else words)
 
     def flush(self, *publishers: Publisher) -> None:
         """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
