@@ -16,7 +16,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -101,9 +101,8 @@ class Heartbeats:
                 action()
 
     def _beat(self) -> None:
-        own, self._last = self.own, time.monotonic()
-        content = [own.node, own.identity, own.texts, own.ended, own.process, own.ready]
-        self.publisher.publish(messages.text(json.dumps(content)))
+        self._last = time.monotonic()
+        self.publisher.publish(messages.text(json.dumps(asdict(self.own))))
 
     def tell(self) -> None:
         """Let all know what has changed, before what is published next."""
@@ -182,11 +181,8 @@ def _parsed(text: str) -> Heartbeat | None:
     if len(text) > MOST_BYTES:
         return None
     try:
-        node, identity, texts, ended, process, ready = json.loads(text)
+        beat = Heartbeat(**json.loads(text))
+        words = [beat.node, beat.identity, beat.ended, beat.process, *beat.texts]
     except (ValueError, TypeError, RecursionError):
         return None
-    if not isinstance(texts, list) or not all(
-        isinstance(word, str) for word in (node, identity, ended, process, *texts)
-    ):
-        return None
-    return Heartbeat(node, identity, texts, ended, process, ready is True)
+    return beat if isinstance(beat.texts, list) and all(isinstance(word, str) for word in words) else None
