@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 from array import array
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -42,13 +43,27 @@ def read(path: str | os.PathLike[str]) -> Recording:
     """
     opened = Opened(path)
     with decoding_bag(opened.path):
-        content = _Content(opened)
+        scene, changes, timing = opened.scene, _Changes(), list[Any]()
+        columns = {topic: _Columns(opened.names[topic], topic, scene) for topic in scene.topics
+                   if topic not in opened.held}  # with one message for each tick
+        takers: dict[Topic, Callable[[Stored], object]] = {
+            **{topic: column.add for topic, column in columns.items()},
+            **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
+            TIMING: lambda stored: timing.append(decode(TIMING, stored.cdr)),
+        }
+        counts = dict.fromkeys(opened.names, 0)
+        known = {(name, topic.type): (topic, takers.get(topic)) for topic, name in opened.names.items()}
         for stored in opened.messages:
-            content.take(stored)
-        if not content.columns[JOINT_STATES].times:
+            topic, take = known.get((stored.topic, stored.type), (None, None))
+            if topic is None:
+                raise BagError(f"{opened.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+            counts[topic] += 1
+            if take is not None:
+                take(stored)
+        if not columns[JOINT_STATES].times:
             raise BagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)
-        return content.recording()
+        return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, timing)
 
 
 def _check_metadata(path: Path, storage: Storage) -> None:
@@ -59,61 +74,32 @@ def _check_metadata(path: Path, storage: Storage) -> None:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
 
-class _Content:
-    """What of a bag comes into its recording."""
+def _recording(
+    opened: Opened, columns: Mapping[Topic, _Columns], changes: _Changes, counts: dict[str, int], timing: Sequence[Any]
+) -> Recording:
+    """All of it, as arrays."""
+    scene, states = opened.scene, columns[JOINT_STATES]
+    ticks, rows, stamps = states.of()
+    lists = dict(zip(("position", "velocity", "effort"), np.split(rows.T, 3), strict=True))
+    state, inputs = (values.T for values in state_of(SimpleNamespace(name=states.names, **lists), ticks.shape))
+    effort = np.ascontiguousarray(inputs[:, [LEFT, RIGHT]])
 
-    def __init__(self, opened: Opened) -> None:
-        self._bag, self._changes, self._timing = opened, _Changes(), list[Any]()
-        self.columns = {topic: _Columns(name, topic, opened.scene) for topic, name in opened.names.items()}
-        self._counts = dict.fromkeys(opened.names, 0)
-        self._takers = {(name, topic.type): (topic, self._taker(topic)) for topic, name in opened.names.items()}
+    def aligned(topic: Topic) -> Array:
+        found, values, _ = columns[topic].of()
+        result = np.full((len(ticks), values.shape[1]), np.nan)
+        _, here, there = np.intersect1d(ticks, found, return_indices=True)
+        result[here] = values[there]
+        return result
 
-    def _taker(self, topic: Topic) -> Callable[[Stored], object]:
-        """What is done with the messages of a topic."""
-        scene = self._bag.scene
-        if topic in CHANGES.values():
-            return lambda stored: self._changes.add(topic, stored, scene)
-        if topic == TIMING:
-            return lambda stored: self._timing.append(decode(topic, stored.cdr))
-        one_a_tick = topic in scene.topics and topic not in self._bag.held  # the others as they came
-        return self.columns[topic].add if one_a_tick else lambda _: None
-
-    def take(self, stored: Stored) -> None:
-        """Take a message."""
-        known = self._takers.get((stored.topic, stored.type))
-        if known is None:
-            raise BagError(f"{self._bag.path}: {stored.topic}: {stored.type} is not a topic of its scene")
-        topic, taker = known
-        self._counts[topic] += 1
-        taker(stored)
-
-    def recording(self) -> Recording:
-        """All of it, as arrays."""
-        scene = self._bag.scene
-        ticks, rows, stamps = self.columns[JOINT_STATES].of()
-        lists = dict(zip(("position", "velocity", "effort"), np.split(rows.T, 3), strict=True))
-        named = SimpleNamespace(name=self.columns[JOINT_STATES].names, **lists)
-        state, inputs = (values.T for values in state_of(named, ticks.shape))
-        effort = np.ascontiguousarray(inputs[:, [LEFT, RIGHT]])
-
-        def aligned(topic: Topic) -> Array:
-            found, values, _ = self.columns[topic].of()
-            result = np.full((len(ticks), values.shape[1]), np.nan)
-            _, here, there = np.intersect1d(ticks, found, return_indices=True)
-            result[here] = values[there]
-            return result
-
-        command, held = np.zeros((len(ticks), 2)), self._bag.held
-        for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
-            command[:, side] = acted_from(ticks, effort[:, side]) if topic in held else aligned(topic)[:, 0]
-        return Recording(
-            self._bag.path, scene, self._bag.versions,
-            {topic.name: count for topic, count in self._counts.items()}, ticks, np.ascontiguousarray(state), effort,
-            command,
-            {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
-            dict(self._changes), self._bag.running, ticks[stamps == 0], _lost(self._bag.storage),
-            _table(self._timing), dict(+self._changes.unheard),
-        )
+    command = np.zeros((len(ticks), 2))
+    for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
+        command[:, side] = aligned(topic)[:, 0] if topic in columns else acted_from(ticks, effort[:, side])
+    return Recording(
+        opened.path, scene, opened.versions, counts, ticks, np.ascontiguousarray(state), effort, command,
+        {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
+        dict(changes), opened.running, ticks[stamps == 0], _lost(opened.storage), _table(timing),
+        dict(+changes.unheard),
+    )
 
 
 class _Columns:
@@ -167,7 +153,7 @@ class _Changes(dict[int, dict[str, float]]):
         self._numbers = {topic: Numbers() for topic in CHANGES.values()}
         self.unheard: Counter[str] = Counter()
 
-    def add(self, topic: Topic, stored: Stored, scene: scenes.Scene) -> None:
+    def add(self, topic: Topic, scene: scenes.Scene, stored: Stored) -> None:
         message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
         self.unheard[topic.name] += self._numbers[topic].take(message)

@@ -11,34 +11,26 @@ RESERVE_BYTES = 4 * CHUNK_BYTES  # kept free for the last chunk, its index, and 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-class Reserve:
-    """Space on the disk that is given back when it is needed."""
+class Sink:
+    """Unbuffered output file, and space on the disk that is given back when it is needed: the disk is full, say."""
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._size = path, 0
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
+    def __init__(self, path: Path, reserve: Path) -> None:
+        self.file, self._spare = (os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644) for new in (path, reserve))
+        self._reserve, self._held, self._size = reserve, 0, 0
+        self.full = 0  # the error, one of FULL
 
     def hold(self, size: int) -> None:
-        """Have at least this many bytes; grows in steps."""
-        if size > self._size:
-            os.posix_fallocate(self._file, 0, size + RESERVE_BYTES)
-            self._size = size + RESERVE_BYTES
+        """Have at least this many bytes in reserve; grows in steps."""
+        if size > self._held:
+            os.posix_fallocate(self._spare, 0, size + RESERVE_BYTES)
+            self._held = size + RESERVE_BYTES
 
     def release(self) -> None:
-        """Give the space back; does nothing the second time."""
-        if self._file >= 0:
-            os.close(self._file)
-            self._path.unlink(missing_ok=True)
-            self._file = -1
-
-
-class Sink:
-    """Unbuffered output file that takes the reserve when the disk is full."""
-
-    def __init__(self, path: Path, reserve: Reserve) -> None:
-        self.file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o644)
-        self._reserve, self._size = reserve, 0
-        self.full = 0  # the error, one of FULL
+        """Give the reserve back; does nothing the second time."""
+        if self._spare >= 0:
+            os.close(self._spare)
+            self._reserve.unlink(missing_ok=True)
+            self._spare = -1
 
     def write(self, data: bytes) -> int:
         """Write all of it."""
@@ -50,7 +42,7 @@ class Sink:
                 if self.full or error.errno not in FULL:
                     raise
                 self.full = error.errno
-                self._reserve.release()
+                self.release()
                 continue
             self._size += done
             rest = rest[done:]
@@ -64,7 +56,8 @@ class Sink:
         """Nothing waits here."""
 
     def close(self) -> None:
-        """Close the file; does nothing the second time."""
+        """Close the file, and give the reserve back; does nothing the second time."""
+        self.release()
         if self.file >= 0:
             os.close(self.file)
             self.file = -1

@@ -14,7 +14,6 @@ PEERS = {
     "on_silence": "what is done when a peer is gone or silent: end or wait (wait)",
 }
 MONITORED = {"wait_for_monitor": "start only when a monitor listens; a plant never outruns it (false)"}
-PRIORITY = {"real_time_priority": "SCHED_RR, 1 to 99, once it runs with the wall clock; 0: none (0)"}
 TIMEOUTS = {
     name: text for side in ("left", "right") for name, text in (
         (f"{side}_timeout_s", "age of the state that the last command answers, s of simulated time (0.1)"),
@@ -22,7 +21,7 @@ TIMEOUTS = {
     )
 }
 FREE = {  # exist with the wall clock
-    **PRIORITY, "real_time_factor": "simulated seconds in a second (1)",
+    "real_time_factor": "simulated seconds in a second (1)",
     "wait_for_controllers": "start only when somebody sends the commands of each controller (false)", **TIMEOUTS,
 }
 PLANT = {
@@ -33,7 +32,7 @@ PLANT = {
     "free_running": "follow the wall clock instead of waiting for the commands (false)", **FREE, **PEERS,
 }
 CONTROLLER = {
-    **MONITORED, "law": "a law of your own in place of the scene's, module:object", **PRIORITY, **PEERS,
+    **MONITORED, "law": "a law of your own in place of the scene's, module:object", **PEERS,
 }
 NODES = {
     "plant": PLANT, "left_controller": CONTROLLER, "right_controller": CONTROLLER,

@@ -30,7 +30,7 @@ POLL_SECONDS = 0.02
 # For the nodes to say it themselves, which know more; they cannot while a lock of shared memory is held by the one that
 # was stopped.
 NODES_SECONDS = 0.4
-MONITOR_NICE = 10
+MONITOR_NICE, PRIORITY = 10, 1  # of Linux: the monitor of a free run may be late, the others may not
 LONGEST = 2**16  # bytes of last words
 
 
@@ -121,8 +121,6 @@ class Graph:
                 self.processes[name] = subprocess.Popen(
                     command, env=environment, start_new_session=True, stdin=end.fileno(), stderr=self.errors
                 )
-            if "free_running" in self.plant and not self.one_process:  # the monitor may be late, the others may not
-                os.setpriority(os.PRIO_PROCESS, self.processes["monitor"].pid, MONITOR_NICE)
         finally:
             end.close()
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
@@ -134,7 +132,7 @@ class Graph:
         shared = {
             "on_silence": self.on_silence, "peer_timeout_s": repr(self.peer_timeout), "start_timeout_s": repr(patience)
         }
-        settings = {
+        return {
             "monitor": {"bag": quoted(str(self.bag.absolute())), **shared},
             **{
                 name: {**shared, "wait_for_monitor": "true", "law": quoted(self.laws.get(name, ""))}
@@ -149,10 +147,6 @@ class Graph:
                 **self.plant,
             },
         }
-        if "free_running" in self.plant:
-            for name in settings.keys() - {"monitor"}:
-                settings[name]["real_time_priority"] = "1"
-        return settings
 
     def _commands(self, settings: Mapping[str, Mapping[str, str]]) -> dict[str, list[str]]:
         """Command lines by the names of the processes."""
@@ -182,11 +176,30 @@ class Graph:
             self._check()
             if self.begun is None and self.bag.exists():
                 self.begun = time.monotonic()
+                if "free_running" in self.plant:
+                    self._set_priorities()
             time.sleep(POLL_SECONDS)
         if not received:
             self._check()
             if not (self.bag / "metadata.yaml").exists():  # a law can end its process, and all nodes with it
                 raise GraphError(f"{awaited[0]}: ended with exit status 0 before the run was over")
+
+    def _set_priorities(self) -> None:
+        """Let a free run have its turn at once: between equals on busy processors it comes some milliseconds later.
+
+        Those threads inherit it that are still to come.
+        """
+        try:
+            for name, process in self.processes.items():
+                for thread in Path(f"/proc/{process.pid}/task").iterdir():
+                    with suppress(ProcessLookupError):  # it has just ended
+                        if name == "monitor":
+                            os.setpriority(os.PRIO_PROCESS, int(thread.name), MONITOR_NICE)
+                        else:
+                            os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(PRIORITY))
+        except OSError as error:
+            print(f"grasp: real-time priority is not to be had here ({error.strerror}): goes on without, and commands"
+                  " get older on busy processors", file=sys.stderr)
 
     def _check(self) -> None:
         """Nobody has failed, or stands still; the one to name is the first that has said why, or that was killed."""

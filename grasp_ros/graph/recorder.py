@@ -20,7 +20,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 
 from grasp_ros.graph import rosbag2
 from grasp_ros.graph.chunks import Messages
-from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Reserve, Sink
+from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
 from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
 from grasp_ros.scene import Scene
@@ -78,8 +78,7 @@ class Recorder:
         self._clock = rosbag2.clock_template()
         with writing(path, BagError):
             path.mkdir(parents=True)
-            self._reserve = Reserve(path / ".reserve")
-            self._sink = Sink(path / f"{path.name}.mcap", self._reserve)
+            self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")
             self._begin()
         if self._error:
             raise BagError(self._error)
@@ -162,7 +161,7 @@ class Recorder:
         index = INDEX_BYTES * self._chunks
         try:
             if not self._sink.full:
-                self._reserve.hold(RESERVE_BYTES + 2 * index)
+                self._sink.hold(RESERVE_BYTES + 2 * index)
         except OSError as error:
             if error.errno not in FULL:
                 raise
@@ -218,7 +217,6 @@ class Recorder:
                     self._finish("closed", {name: str(value) for name, value in (counters or {}).items()})
         finally:
             self._closed = True
-            self._reserve.release()
             self._sink.close()
         if self._error:
             raise BagError(self._error)
@@ -226,7 +224,7 @@ class Recorder:
     def _finish(self, why: str, counters: Mapping[str, str]) -> None:
         """Write what was lost, the index, and the metadata."""
         self._closed = True
-        self._reserve.release()
+        self._sink.release()
         counts = {topic: self._messages.counts[channel] for topic, channel in self._channels.items()}
         document = rosbag2.metadata(f"{self._path.name}.mcap", counts, self._names, self._last_ns, self._custom)
         text = dump(document)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.graph.recorder import NOT_RECORDED
 from grasp_ros.graph.running import Running
-from grasp_ros.physics.control import Law
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
@@ -167,7 +166,9 @@ class Recording(Tabular, Frozen):
         numbers = {"time.duration_s": float(self.t[-1])}
         if self.scene.system.delay:
             numbers["loop.delay_ticks"] = 0  # the forces have been delayed
-        laws = {side: _recorded(acted[:, body]) for side, body in SIDES.items() if body in self.scene.system.laws}
+        forces = np.vstack([acted[:-1], np.zeros(2)]).T.tolist()  # from the last tick on nothing acts
+        laws = {side: partial(_recorded, forces[body]) for side, body in SIDES.items()
+                if body in self.scene.system.laws}
         return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, accuracy=self.running.accuracy)
 
     @property
@@ -264,11 +265,6 @@ def acted_from(ticks: np.ndarray, effort: Array) -> Array:
     return acted
 
 
-def _recorded(acted: Array) -> Law:
-    """A law that answers each tick with the force that acted from it on; nothing acts from the last one."""
-    forces: list[float] = [*acted[:-1].tolist(), 0.0]
-
-    def recorded(tick: int, t: float, x: float, v: float) -> float:
-        return forces[tick]
-
-    return recorded
+def _recorded(forces: list[float], tick: int, t: float, x: float, v: float) -> float:
+    """A law that answers each tick with the force that acted from it on."""
+    return forces[tick]

@@ -29,6 +29,7 @@ MAGIC = b"\x89MCAP0\r\n"
 MESSAGE = struct.Struct("<H4xQ8x")  # channel and time of a message; the library's reader takes ten times as long
 SUM = struct.Struct("<I")
 DATA_END_BYTES = HEAD.size + SUM.size
+FOOTER_HEAD = HEAD.pack(Opcode.FOOTER, 20)
 FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
 CHUNK_MARK, CHUNK_MARK_AT = b"\x04\x00\x00\x00zstd", HEAD.size + 28  # how a chunk of the recorder is found again
 RECORD_BYTES = 2**23  # no record of a bag is larger, packed or unpacked
@@ -79,7 +80,8 @@ class Storage:
                     raise EOFError("the rest of a record is missing")
                 opcode, body = data[offset], data[offset + HEAD.size : end]
                 if opcode == Opcode.DATA_END:
-                    self._check_end(offset, end)
+                    if data[-FOOTER_BYTES:][: HEAD.size] == FOOTER_HEAD and not self.closed and not self._salvage:
+                        self._refuse("its last bytes are not the end of an MCAP file")
                     return
                 yield from self._read(opcode, body)
                 offset = end
@@ -175,18 +177,6 @@ class Storage:
                  (data[: end - DATA_END_BYTES], SUM.unpack_from(data, end - SUM.size)[0]))
         if any(stored and zlib.crc32(part) != stored for part, stored in parts):  # 0: its writer has made none
             self._refuse("a checksum is wrong")
-
-    def _check_end(self, offset: int, end: int) -> None:
-        """The end of the data; a file that was killed while it was closed has all of them."""
-        data = self._data
-        with_footer = data[-FOOTER_BYTES : HEAD.size - FOOTER_BYTES] == HEAD.pack(Opcode.FOOTER, 20)
-        if with_footer and not self.closed and not self._salvage:
-            self._refuse("its last bytes are not the end of an MCAP file")
-        (stored,) = SUM.unpack_from(data, end - SUM.size)
-        if stored and zlib.crc32(memoryview(data)[:offset]) != stored:
-            if not self._salvage:
-                self._refuse("a checksum is wrong")
-            self.left_out.append((end, len(data) - end, "the checksum of all data is wrong"))
 
     def _refuse(self, why: str) -> NoReturn:
         raise BagError(f"{self.path}: damaged: {why}; `grasp recover` makes a new bag of what is whole")

@@ -47,7 +47,8 @@ class Verification(NamedTuple):
     difference: Difference | None  # the first
     problem: str  # why not all of the bag could be compared; empty if all was
     answers: dict[str, Answers]  # whose commands these are, by side
-    same: bool | None  # whether `simulate` gives its states and commands; None: other laws, a reset, or no lockstep
+    # Whether `simulate` gives its states and commands; None: other laws, a reset, no lockstep, or missing commands.
+    same: bool | None
 
     @property
     def holds(self) -> bool:
@@ -123,13 +124,15 @@ def answers_of(recording: Recording) -> dict[str, Answers]:
             given = zip(recording.scene_tick[rows].tolist(), states.tolist(), recording.command[rows, body].tolist(),
                         strict=True)
             equal += sum(bool(law.command(tick, x, v) == force) for tick, (x, v), force in given)
-        found[side] = Answers(len(recording.tick), equal, recording.unheard.get(CHANGES[side].name, 0), topic.name)
+        there = int(np.count_nonzero(~np.isnan(recording.command[:, body])))
+        found[side] = Answers(there, equal, recording.unheard.get(CHANGES[side].name, 0), topic.name)
     return found
 
 
 def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool | None:
     """Whether the scene with its own laws has the recorded states and commands, without a graph."""
-    if not recording.running.lockstep or len(recording.starts) > 1 or any(found.differs for found in answers.values()):
+    others = any(found.differs or found.commands < len(recording.tick) for found in answers.values())
+    if others or not recording.running.lockstep or len(recording.starts) > 1:
         return None
     run = simulate(recording.scene, sampled=True, grid=recording.t, accuracy=recording.running.accuracy,
                    changes=recording.changes)
@@ -212,8 +215,8 @@ def _first(
     """The first number whose bits differ; NaN, in place of what the bag has lost, is left out, and named by `_gap`."""
     recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (recorded, computed))
     lost = np.isnan(recorded) | np.isnan(computed)
-    differ = (recorded.view(np.int64) != computed.view(np.int64)) & ~lost
-    if not differ.any():
+    differ = np.flatnonzero((recorded.view(np.int64) != computed.view(np.int64)) & ~lost)
+    if not len(differ):
         return None
-    place = int(np.argmax(differ))
+    place = int(differ[0])
     return Difference(int(recording.tick[rows[place]]), topic, name, float(recorded[place]), float(computed[place]))

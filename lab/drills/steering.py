@@ -151,22 +151,27 @@ def _act(plant: Plant, action: str, draw: random.Random) -> bool:
         elif not refused:
             plant.let_go_on(draw.randint(1, MOST_STEPS))
     elif action == "reset":
-        _reset(plant)
-        refused = False
+        refused = _reset(plant)
     else:
         refused = _step(plant, action, draw)
     return refused
 
 
-def _reset(plant: Plant) -> None:
-    """A reset ends a run with the tick that it names."""
+def _reset(plant: Plant) -> bool:
+    """A reset ends a run with the tick that it names; returns whether it must be refused: at the beginning."""
+    if not plant.paused:
+        plant.let_go_on(1)
+    refused = plant.paused and not plant.tick
+    said = plant.expect("reset", "already at the beginning" if refused else "")
+    if refused:
+        return True
     plant.resets += 1
-    said = plant.expect("reset")
     last = said["last_tick"]
     if said["goal"]["resets"] != plant.resets or (plant.paused and last != plant.tick):
         raise Wrong(f"{said!r}; expected: reset {plant.resets}, tick {plant.tick}")
     plant.lengths.append(last + 1)
     plant.tick = 0
+    return False
 
 
 def _step(plant: Plant, action: str, draw: random.Random) -> bool:

@@ -36,8 +36,8 @@ def command(tick: int, force: float = 1.0) -> bytes:
     return serialize_message(plain_messages.wrench(tick * PERIOD, force))
 
 
-def ticks(turn: list[int]) -> Synchronizer:
-    return Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END, lambda: turn[0])
+def ticks() -> Synchronizer:
+    return Synchronizer([LEFT_COMMAND], ["left"], PERIOD, END)
 
 
 def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:
@@ -48,7 +48,7 @@ def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:
 
 
 def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
-    found = ticks([0])
+    found = ticks()
     assert found.put(JOINT_STATES, state(0)) is Arrival.TAKEN
     strange = plain_messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
     strange.velocity = array("d", [1.0, 2.0])
@@ -77,8 +77,7 @@ def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
 
 
 def test_a_state_that_comes_again_is_one_tick_and_a_reset_is_two() -> None:
-    turn = [0]
-    found = ticks(turn)
+    found = ticks()
     for tick in (0, 0, 1, 1):
         found.put(JOINT_STATES, state(tick))
         found.put(LEFT_COMMAND, command(tick))
@@ -87,14 +86,12 @@ def test_a_state_that_comes_again_is_one_tick_and_a_reset_is_two() -> None:
     assert [row.time_ns for row in iter(found.take, None)] == [PERIOD]
     assert found.put(JOINT_STATES, state(1)) is Arrival.AGAIN
     found.put(LEFT_COMMAND, command(1, 3.0))  # of the repetition, or the first of another run that has come this far
-    turn[0] = 1
     for tick in (0, 1):
         assert found.put(LEFT_COMMAND, command(tick, 7.0)) is Arrival.TAKEN
         assert found.put(JOINT_STATES, state(tick)) is Arrival.TAKEN
     rows = list(iter(found.take, None))
     assert [(row.time_ns, row.restarted) for row in rows] == [(0, True), (PERIOD, False)]
     assert [messages.raw_force(row.found[LEFT_COMMAND]) for row in rows] == [7.0, 7.0]
-    turn[0] = 2
     assert found.put(JOINT_STATES, state(0)) is Arrival.TAKEN
     found.put(LEFT_COMMAND, command(0))
     assert found.take() is not None
@@ -102,7 +99,7 @@ def test_a_state_that_comes_again_is_one_tick_and_a_reset_is_two() -> None:
 
 
 def test_what_is_kept_is_bounded() -> None:
-    found = ticks([0])
+    found = ticks()
     for tick in range(4 * PATIENCE_TICKS):
         found.put(LEFT_COMMAND, command(tick % (PATIENCE_TICKS + 1)))
         found.put(LEFT_COMMAND, command(tick))

@@ -16,7 +16,7 @@ import pytest
 from graphs import call
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
-from processes import DEADLINE, node_command, wait_for
+from processes import DEADLINE, children, growing, node_command, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import JointState
 
@@ -153,23 +153,11 @@ def test_a_plant_that_is_faster_than_its_monitor_waits_for_it(
     assert ticks == list(range(len(ticks)))
 
 
-def test_a_plant_takes_the_priority_that_it_is_given_or_says_why_not(launch: Any, tmp_path: Path) -> None:
-    errors = tmp_path / "errors"
-    with errors.open("w") as file:
-        plant = launch(*node_command("plant", **FREE, real_time_factor=20, real_time_priority=3), stderr=file)
-
-    def policies() -> set[tuple[int, int]]:
-        threads = [int(thread.name) for thread in Path(f"/proc/{plant.pid}/task").iterdir()]
-        return {(os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority) for thread in threads}
-
-    try:
-        os.sched_setscheduler(plant.pid, os.SCHED_OTHER, os.sched_param(0))
-        os.sched_setscheduler(plant.pid, os.SCHED_RR, os.sched_param(1))  # until it takes its own
-    except PermissionError:
-        wait_for(lambda: "real_time_priority: 3 is not to be had here" in errors.read_text(), "its reason")
-    else:
-        wait_for(lambda: policies() == {(os.SCHED_RR, 3)}, "its priority")
-    assert plant.wait(DEADLINE) == 0
-    refused = launch(*node_command("left_controller", real_time_priority=100), stderr=subprocess.PIPE)
-    assert "real_time_priority: 100 is not allowed; allowed: 0 to 99" in refused.communicate(timeout=DEADLINE)[1]
-    assert refused.returncode == 2
+def test_a_free_run_has_a_priority_or_says_why_not(grasp_run: Any, tmp_path: Path) -> None:
+    run = grasp_run("arm_alone", "--free-running", "--set", "time.duration_s=60")
+    growing(tmp_path / "run" / "bag")
+    nodes = children(tmp_path)
+    found = {name: os.sched_getscheduler(pid) for name, pid in nodes.items()}
+    run.terminate()
+    given = "real-time priority is not to be had here" not in run.communicate(timeout=DEADLINE)[1]
+    assert found == {name: os.SCHED_RR if given and name != "monitor" else os.SCHED_OTHER for name in nodes}

@@ -259,10 +259,10 @@ def test_one_that_has_just_come_is_not_silent_as_the_one_before_it(node: tuple[A
     peer, _ = node
     waiting = GraspNode("waiting", context=peer.context)
     heartbeats = Heartbeats(waiting, lambda: None, lambda: None)
-    sign = ["/plant", "first", 0, [], "", "", True]
+    sign = {"node": "/plant", "identity": "first", "texts": [], "ended": "", "process": "", "ready": True}
     heartbeats._on_beat(String(data=json.dumps(sign)))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == ["/plant"]
-    heartbeats._on_beat(String(data=json.dumps([*sign[:4], "ended", *sign[5:]])))
+    heartbeats._on_beat(String(data=json.dumps({**sign, "ended": "ended"})))
     assert heartbeats.quiet(["/plant"], time.monotonic()) == []  # whom DDS lists by now is another one
     heartbeats.end("")
     end_nodes(waiting)

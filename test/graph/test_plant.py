@@ -38,7 +38,6 @@ REFUSED = [
     ("plant", "-p scene:=1", "scene: 1 is not allowed; allowed: a text"),
     ("plant", "-p scene:=''", "'': no such scene; allowed: a path that ends in .yaml, or one of "),
     ("plant", "-p paused:=1", "paused: 1 is not allowed; allowed: true or false"),
-    ("left_controller", "-p real_time_priority:=1.5", "real_time_priority: 1.5 is not allowed; allowed: a whole"),
     ("plant", "-p object.mas_kg:=4.0", "object.mas_kg: no such parameter"),
     ("plant", "-p tilt.angle_rad:=0.3", "tilt.angle_rad: no such parameter"),
     ("plant", "-p object.mass_kg:=-4.0", "object.mass_kg"),

@@ -16,7 +16,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,6 @@ class Heartbeat:
 
     node: str  # full name
     identity: str  # of the process: who takes the place of a node has another one
-    turn: int  # how often it has put its time back
     texts: list[str]  # digests of what it says on `scene` and `run`
     ended: str  # its last words; empty while it lives
     process: str  # its number and beginning, as the kernel has them
@@ -83,7 +82,7 @@ class Heartbeats:
     def __init__(self, node: GraspNode, heard: Callable[[], None], watch: Callable[[], None]) -> None:
         self._heard = heard  # called after each one of another node
         process = _process(str(os.getpid()))[1]
-        self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, 0, [], "", process, False)
+        self.own = Heartbeat(node.get_fully_qualified_name(), uuid.uuid4().hex, [], "", process, False)
         self._beats: dict[str, Heartbeat] = {}
         self._last = 0.0  # wall time of the last own one
         self.prepared = 0.0  # that of the last one of a node that is not ready
@@ -102,9 +101,8 @@ class Heartbeats:
                 action()
 
     def _beat(self) -> None:
-        own, self._last = self.own, time.monotonic()
-        content = [own.node, own.identity, own.turn, own.texts, own.ended, own.process, own.ready]
-        self.publisher.publish(messages.text(json.dumps(content)))
+        self._last = time.monotonic()
+        self.publisher.publish(messages.text(json.dumps(asdict(self.own))))
 
     def tell(self) -> None:
         """Let all know what has changed, before what is published next."""
@@ -183,10 +181,8 @@ def _parsed(text: str) -> Heartbeat | None:
     if len(text) > MOST_BYTES:
         return None
     try:
-        node, identity, turn, texts, ended, process, ready = json.loads(text)
+        beat = Heartbeat(**json.loads(text))
+        words = [beat.node, beat.identity, beat.ended, beat.process, *beat.texts]
     except (ValueError, TypeError, RecursionError):
         return None
-    kinds = isinstance(texts, list) and isinstance(turn, int)
-    if not kinds or not all(isinstance(word, str) for word in (node, identity, ended, process, *texts)):
-        return None
-    return Heartbeat(node, identity, turn, texts, ended, process, ready is True)
+    return beat if isinstance(beat.texts, list) and all(isinstance(word, str) for word in words) else None

@@ -20,7 +20,6 @@ from grasp_ros.scene.topics import ALIVE, DIAGNOSTICS, JOINT_STATES, Topic
 
 LOOK_SECONDS = 0.25
 STILL_SECONDS = 1.0  # between two looks: this thread was busy
-SWEEPS = 4  # looks without progress that sweep, each of them at first and then one of as many
 GONE_SECONDS = 0.7  # without a source: its last messages are on the way
 SLOW = 4  # times longer who shows that it lives may take
 MOST_TEXTS = 8  # that wait for somebody to vouch for them
@@ -78,8 +77,7 @@ class PeerNode(GraspNode):
         self.heartbeats = Heartbeats(self, self.heard, self._watchdog.beat)
         self._looked = self._excused = time.monotonic()
         self._first_look = 0.0  # wall time of the first look: all that may take long is done
-        self._before: object = None
-        self._still = 0  # looks in a row without progress
+        self._before: object = None  # progress at the last look
         self.wall_timer(LOOK_SECONDS, self.look)
 
     @abstractmethod
@@ -95,13 +93,10 @@ class PeerNode(GraspNode):
         """Something that changes while all is well."""
 
     def report(self) -> None:
-        """Publish the counters, and who publishes what somebody else does."""
-        found = {topic.name: self.living(topic) for topic in self.inputs
-                 if topic not in (ALIVE, DIAGNOSTICS) and self.count_publishers(topic.name) > 1}
-        self.other_sources = "; ".join(
-            f"{name} has the sources {' and '.join(names)}" for name, names in found.items() if len(names) > 1)
-        if self.other_sources:
-            self.count("second sources")
+        """Publish the counters; say who publishes what somebody else does."""
+        for topic in self.inputs:
+            if topic not in (ALIVE, DIAGNOSTICS) and len(self.living(topic)) > 1:
+                self.refuse("second sources", topic)
         super().report()
 
     def look(self) -> None:
@@ -123,9 +118,7 @@ class PeerNode(GraspNode):
         self._offer()
         if self.finished:
             return
-        progress = self.progress()
-        self._still = self._still + 1 if progress == self._before else 0
-        if 0 < self._still <= SWEEPS or (self._still and self._still % SWEEPS == 0):
+        if (progress := self.progress()) == self._before:
             self.sweep()
         self._before = progress
         if not self.begun:
@@ -203,11 +196,6 @@ class PeerNode(GraspNode):
     def living(self, topic: Topic) -> list[str]:
         """Sources of a topic without processes that are known to be dead."""
         return self.heartbeats.living(self.sources(topic), time.monotonic() - self.patience)
-
-    def turn(self, topic: Topic) -> int:
-        """How often the source of a topic has put its time back, as far as it says so."""
-        beats = self.heartbeats.of(self._last.get(topic) or self.sources(topic))
-        return beats[-1].turn if beats else 0
 
     def on_text(self, topic: Topic, take: Callable[[str], None]) -> None:
         """Subscribe to a text; it counts when a living node vouches for it, or when nobody here says such texts."""

@@ -17,7 +17,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.subscription import Subscription
 
 from grasp_ros.graph.ros.messages import Command
-from grasp_ros.graph.ros.node import PATIENCE_SECONDS, GraspNode
+from grasp_ros.graph.ros.node import GraspNode
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
 
@@ -51,11 +51,8 @@ class Limits:
         """The same, and what it cannot do is counted."""
         if self.allow(topic, command):
             return True
-        self._node.refuse("commands beyond a limit", topic)
-        self._node.get_logger().warning(
-            f"{topic.name}: {command[1]:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N",
-            throttle_duration_sec=PATIENCE_SECONDS,
-        )
+        why = f"{command[1]:g} N; allowed by the actuator of the scene: {self._limits[topic]:g} N"
+        self._node.refuse("commands beyond a limit", topic, why)
         return False
 
 

@@ -176,11 +176,8 @@ class FreeRunning:
         """Publish the quality of the last second; say whose commands are missing."""
         late = [f"no young command of {side}" for side, held in self._held.items() if held.late]
         self._plant.concern = "; ".join(late)
-        values = self._timing.take()
-        if values:
-            time_ns = self._plant.tick * self._plant.scene.period_ns
-            self._quality.publish(numbers_message(time_ns, values))
-            self._plant.counters.update({name: f"{value:.6g}" for name, value in values.items()})
+        if values := self._timing.take():
+            self._quality.publish(numbers_message(self._plant.tick * self._plant.scene.period_ns, values))
 
 
 class Timing:

@@ -83,6 +83,8 @@ class Steering:
     def _reset(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         if self.reset_due:
             return self._answer(response, "a reset is already on its way")
+        if not self._plant.tick:  # its first state again would be a repetition to whoever has answered it
+            return self._answer(response, "already at the beginning")
         self.reset_due = True
         number, tick = self._plant.resets + 1, self._plant.tick  # which may be over when `advance` returns
         self._plant.advance()

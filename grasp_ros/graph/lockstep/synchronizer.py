@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -31,6 +31,13 @@ class Arrival(Enum):
     REFUSED = "malformed messages"
 
 
+class Candidates(NamedTuple):
+    """What may be the message of a topic with a stamp."""
+
+    found: list[bytes]  # serialized
+    sure: bool  # whether it is: that of the right source
+
+
 class Tick(NamedTuple):
     """What belongs to one state."""
 
@@ -41,6 +48,9 @@ class Tick(NamedTuple):
     lost: int  # how many are not
     dropped: int  # messages that belong to no state
     restored: int = 0  # commands that were made from the force that acted
+
+
+NOTHING = Candidates([], False)
 
 
 class Synchronizer:
@@ -54,22 +64,18 @@ class Synchronizer:
     not come at all.
 
     `topics` are, beside `joint_states`, those with a message for every state; `names` those that every state has. Every
-    stamp is a multiple of `period_ns` and not above `end_ns`. `turn` says how often the plant was reset: the first
-    state may come again for that reason or another. A command acts `delay` control periods after its arrival.
+    stamp is a multiple of `period_ns` and not above `end_ns`. A command acts `delay` control periods after its arrival.
     """
 
     def __init__(
-        self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, turn: Callable[[], int],
-        delay: int = 0,
+        self, topics: Sequence[Topic], names: Collection[str], period_ns: int, end_ns: int, delay: int = 0
     ) -> None:
-        self._reader, self._period_ns, self.end_ns, self._turn = StateReader(names), period_ns, end_ns, turn
+        self._reader, self._period_ns, self.end_ns = StateReader(names), period_ns, end_ns
         self._ahead_ns = PATIENCE_TICKS * period_ns
         self._states: deque[tuple[bool, State, bytes]] = deque()  # whether time went back; as read; as it came
-        self._others: dict[Topic, dict[int, bytes]] = {topic: {} for topic in topics}
-        self._uncertain: dict[Topic, dict[int, list[bytes]]] = {topic: {} for topic in topics}
+        self._others: dict[Topic, dict[int, Candidates]] = {topic: {} for topic in topics}
         self._wait = delay + 1  # ticks until the effort has a command
-        self._newest, self._newest_turn = -1, 0
-        self._before = -1  # last state taken
+        self._newest = self._before = -1  # last states put, and taken
 
     def put(self, topic: Topic, cdr: bytes, sure: bool = True) -> Arrival:
         """Add a serialized message, if it can be true; a command may not be sure to be of the right source."""
@@ -84,18 +90,12 @@ class Synchronizer:
             return Arrival.REFUSED
 
     def _put_state(self, stamp: int, cdr: bytes) -> Arrival:
-        if stamp == self._newest and (stamp or self._turn() == self._newest_turn):
+        if stamp == self._newest:
             return Arrival.REPEATED if self._states else Arrival.AGAIN
         if 0 < stamp < self._newest:
             return Arrival.STAMP
-        message = self._reader.read(cdr)
-        if message is None:
-            return Arrival.REFUSED
-        restarted = stamp <= self._newest
-        if restarted or self._newest < 0:
-            self._newest_turn = self._turn()
+        self._states.append((stamp < self._newest, self._reader.read(cdr), cdr))
         self._newest = stamp
-        self._states.append((restarted, message, cdr))
         return Arrival.TAKEN
 
     def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:
@@ -104,25 +104,17 @@ class Synchronizer:
         if topic.type == FORCE and not math.isfinite(messages.raw_force(cdr)):
             return Arrival.REFUSED
         queue = self._others[topic]
+        known = queue.get(stamp, NOTHING)
+        others = [other for other in known.found
+                  if topic.type == FORCE and messages.raw_force(other) != messages.raw_force(cdr)]
         # A late repetition of the last tick, or what a reset brings before its state: the newer one is right.
-        if stamp != self._before and (known := queue.get(stamp)) is not None:
-            same = topic.type != FORCE or messages.raw_force(known) == messages.raw_force(cdr)
-            return Arrival.REPEATED if same else Arrival.CONTRADICTS
-        if not sure:
-            return self._put_uncertain(topic, stamp, cdr)
+        if known.sure and (stamp != self._before or not sure):
+            return Arrival.CONTRADICTS if others else Arrival.REPEATED
         queue.pop(stamp, None)
-        queue[stamp] = cdr
+        queue[stamp] = Candidates([cdr], True) if sure else Candidates([*others, cdr][-MOST_UNCERTAIN:], False)
         if len(queue) > 2 * PATIENCE_TICKS:
             del queue[next(iter(queue))]
-        return Arrival.TAKEN
-
-    def _put_uncertain(self, topic: Topic, stamp: int, cdr: bytes) -> Arrival:
-        queue = self._uncertain[topic]
-        others = [known for known in queue.get(stamp, ()) if messages.raw_force(known) != messages.raw_force(cdr)]
-        queue[stamp] = [*others, cdr][-MOST_UNCERTAIN:]
-        if len(queue) > 2 * PATIENCE_TICKS:
-            del queue[next(iter(queue))]
-        return Arrival.CONTRADICTS if others else Arrival.TAKEN
+        return Arrival.CONTRADICTS if others and not sure else Arrival.TAKEN
 
     def take(self, waited: float = 0.0) -> Tick | None:
         """The next tick that is complete, or after such a wait in s will not be any more; None if that is open."""
@@ -133,9 +125,10 @@ class Synchronizer:
         given_up = len(self._states) > PATIENCE_TICKS or (waited > GIVE_UP_SECONDS and len(self._states) > 1)
         found, restored = {JOINT_STATES: cdr}, 0
         for topic, queue in self._others.items():
-            other = queue.get(time_ns)
+            known = queue.get(time_ns, NOTHING)
+            other = known.found[0] if known.sure else None
             if other is None and topic in SIDES:
-                other, made = self._decide(topic, time_ns, given_up or waited > UNCERTAIN_SECONDS)
+                other, made = self._decide(topic, known.found, time_ns, given_up or waited > UNCERTAIN_SECONDS)
                 restored += made
             if other is not None:
                 found[topic] = other
@@ -146,9 +139,8 @@ class Synchronizer:
         dropped = sum(self._forget(topic, time_ns) for topic in self._others if topic in found)
         return Tick(time_ns, restarted, message, found, 1 + len(self._others) - len(found), dropped, restored)
 
-    def _decide(self, topic: Topic, time_ns: int, late: bool) -> tuple[bytes | None, bool]:
+    def _decide(self, topic: Topic, there: Sequence[bytes], time_ns: int, late: bool) -> tuple[bytes | None, bool]:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
-        there = self._uncertain[topic].get(time_ns, [])
         force = self._acted(SIDES[topic], time_ns)
         if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
             to_come = len(self._states) <= self._wait < WINDOW
@@ -174,7 +166,4 @@ class Synchronizer:
                 del queue[first]
                 dropped += 1
             del queue[time_ns]
-        if uncertain := self._uncertain[topic]:
-            for stamp in [stamp for stamp in uncertain if stamp <= time_ns]:
-                del uncertain[stamp]
         return dropped

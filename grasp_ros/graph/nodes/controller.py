@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
-from typing import Any, TypeGuard
+from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -38,7 +37,7 @@ class Controller(PeerNode):
     in a free run the newest one that has come. It announces the numbers of its law before the first command that rests
     on them: at the beginning, after a reset, and when they were set while it runs. With a law of the user's own it
     announces nothing, and takes no other numbers. When a plant comes with another scene it goes on with that. Other
-    parameters are `real_time_priority` and the numbers of the scene.
+    parameters are the numbers of the scene.
     """
 
     why_read_only = "it is fixed for a run, so that the bag and a replay agree; set it in the scene"
@@ -49,7 +48,6 @@ class Controller(PeerNode):
         self._executable = name  # the node may have been given another name
         self._side = name.removesuffix("_controller")
         self._monitored = self.read_only("wait_for_monitor", False)
-        self._priority = self.read_priority()
         law = self.read_only("law", "")
         self._own = OwnLaw(law) if law else None
         self._commands, self._force_template = self.publisher(COMMANDS[self._side]), force_template()
@@ -57,12 +55,10 @@ class Controller(PeerNode):
         self._scene: Scene | None = None
         self._staged: dict[str, float] = {}
         self._answered = -1  # time in ns of the last state answered; -1: none of this run
-        self._turn = 0  # how often the plant had been reset then
         self._force = 0.0  # that answer
         self._number = 0  # of the last announcement for this scene
-        self._ready_to_answer = self._listening = False
+        self._ready_to_answer = False
         self._reader = StateReader(())  # before a scene
-        self._held: State | None = None  # the state that came before this node was ready
         self.counters.update({"answered states": 0, "repeated states": 0, "refused states": 0, "skipped states": 0})
         self.add_on_set_parameters_callback(self._check)
         self.add_post_set_parameters_callback(self._stage)
@@ -84,11 +80,11 @@ class Controller(PeerNode):
 
     def _on_scene(self, text: str) -> None:
         """A plant has come: the first one, or one after another."""
-        first, self._scene = not self._listening, None
+        self._scene = None
         try:
             self._take(scenes.parse(text, SCENE.name, f"topic {SCENE.name}"))
         except Refused as error:
-            if first:
+            if not self.begun:
                 raise
             self._left = None  # a living plant is no reason to go on with the last scene
             self.phase, self.words = Phase.IDLE, f"waits for another scene: {error}"
@@ -142,22 +138,15 @@ class Controller(PeerNode):
     def _start(self) -> None:
         self.phase = Phase.RUNNING
         self.words = f"running with {self._own.words}" if self._own else "running"
-        self.begun, self.concern = True, ""
-        self.take_priority(self._priority)
-        if not self._listening:  # this tells the plant that the controller is ready, so it comes last
-            self._listening = True
+        if not self.begun:  # this tells the plant that the controller is ready, so it comes last
             self._states = self.subscribe(JOINT_STATES, self._on_state, read=lambda cdr: self._reader.read(cdr))
-        self._ready_to_answer = True
-        if self._held is not None:
-            held, self._held = self._held, None
-            self._on_state(held)
+        self.begun, self._ready_to_answer, self.concern = True, True, ""
 
     def _begin(self, time_ns: int) -> None:
         """Let the numbers that were set act from a time on, and let all know before the command does."""
         assert self._scene is not None
         if time_ns <= self._answered and self._own:
             self._own.reset()
-        self._turn = self.turn(JOINT_STATES)
         before, self._scene = self._scene, self._scene.changed(self._staged)
         for warning in self._scene.warnings:
             if warning not in before.warnings:
@@ -170,26 +159,23 @@ class Controller(PeerNode):
             if not self._announcements.wait_for_all_acked(Duration(seconds=ANNOUNCE_SECONDS)):
                 self.get_logger().warning(f"{CHANGES[self._side].name}: a listener does not confirm what it was told")
 
-    def _admits(self, state: State | None) -> TypeGuard[State]:
-        """Whether a message can be a state of this run."""
+    def _admits(self, time_ns: int) -> bool:
+        """Whether a state can be one of this run."""
         assert self._scene is not None
-        if state is not None and state.time_ns % self._scene.period_ns == 0 and (
-            state.time_ns == 0 or self._answered <= state.time_ns <= self._scene.ticks * self._scene.period_ns
-        ):
+        period_ns, ticks = self._scene.period_ns, self._scene.ticks
+        if time_ns % period_ns == 0 and (time_ns == 0 or self._answered <= time_ns <= ticks * period_ns):
             return True
         self.refuse("refused states", JOINT_STATES)
         return False
 
-    def _on_state(self, state: State | None) -> None:
-        if not self._ready_to_answer:
-            self._held = state
-            return
-        if self._scene is None or not self._admits(state):  # the scene of a new plant may still be on its way
+    def _on_state(self, state: State) -> None:
+        # A plant that has just come may be sooner than its scene, or than what listens to this node; it asks again.
+        if not self._ready_to_answer or self._scene is None or not self._admits(state.time_ns):
             return
         if self._free:
             state = self._newest(state)
         time_ns = state.time_ns
-        if time_ns == self._answered and (time_ns or self.turn(JOINT_STATES) == self._turn):
+        if time_ns == self._answered:
             self.count("repeated states")  # it, or what answered it, was lost on the way
             self._answer(time_ns)
             return
@@ -216,14 +202,17 @@ class Controller(PeerNode):
     def _newest(self, state: State) -> State:
         """The last state that waits here, or the first after a reset."""
         for cdr in self.waiting(self._states):
-            newer = None
-            with suppress(*messages.UNREADABLE):
+            try:
                 newer = self._reader.read(cdr)
-            if not self._admits(newer):
+            except messages.UNREADABLE:
+                self.refuse("malformed messages", JOINT_STATES)
+                continue
+            if not self._admits(newer.time_ns):
                 continue
             before, state = state, newer
             self.count("skipped states")
             if state.time_ns < before.time_ns:
+                self._answered = before.time_ns  # for the reset to be seen, whatever was answered before it
                 break
         return state
 

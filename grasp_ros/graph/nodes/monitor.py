@@ -26,7 +26,7 @@ from grasp_ros.graph.nodes.lyapunov_monitor import Announcement, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.ros.node import PATIENCE_SECONDS, Phase
+from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.errors import Refused
@@ -45,7 +45,6 @@ from grasp_ros.scene.topics import (
     RUN,
     SCENE,
     TIMING,
-    WINDOW,
     Numbers,
     Topic,
     state_of,
@@ -53,6 +52,7 @@ from grasp_ros.scene.topics import (
 from grasp_ros.scene.versions import versions
 
 MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are evaluated at once, and of wall time that a tick waits for others
+BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
 
@@ -83,7 +83,6 @@ class Monitor(PeerNode):
         self._published = b""  # of the last tick
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
-        self._leaving = 0  # after a signal: ticks to which it still records, what was on the way with them
         self._plant = ""  # identity of the one that is recorded
         self._advanced = 0.0  # wall time of the last tick
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
@@ -105,17 +104,11 @@ class Monitor(PeerNode):
         """The ticks so far."""
         return self.counters["ticks"]
 
-    def behind(self) -> object:
-        """The ticks so far: it records what had arrived before a signal, and needs nobody any more."""
-        self._leaving = self._leaving or int(self.counters["ticks"]) + WINDOW
-        return min(int(self.counters["ticks"]), self._leaving)
-
     def look(self) -> None:
-        """See to it that everybody is there, unless it is about to end itself; go on without what does not come."""
-        if not self._leaving:
-            if self.progress() != self._before:  # it is behind: a plant that has ended is missed when all is recorded
-                self._gone.pop(JOINT_STATES, None)
-            super().look()
+        """See to it that everybody is there; go on without what does not come."""
+        if self.progress() != self._before:  # it is behind: a plant that has ended is missed when all is recorded
+            self._gone.pop(JOINT_STATES, None)
+        super().look()
         if self._recorder is not None:
             self._drain(time.monotonic() - max(self._advanced, self._excused))
 
@@ -153,7 +146,7 @@ class Monitor(PeerNode):
         self._lyapunov, self._picture = LyapunovMonitor(scene), Picture(self, scene)
         self._synchronizer = Synchronizer(
             [topic for topic in per_tick if topic != JOINT_STATES], [NAMES[body] for body in scene.system.present],
-            scene.period_ns, scene.ticks * scene.period_ns, partial(self.turn, JOINT_STATES), scene.system.delay,
+            scene.period_ns, scene.ticks * scene.period_ns, scene.system.delay,
         )
         self._limits = Limits(self, scene)
         topics = (RUN, SCENE, CLOCK, *scene.topics, *CHANGES.values(), *beside)
@@ -196,8 +189,7 @@ class Monitor(PeerNode):
             self.count("lost announcements", self._numbers[side].take(message))
             self._lyapunov.announce(side, Announcement(messages.to_ns(message.header.stamp), numbers, cdr))
         except messages.UNREADABLE as error:  # `Refused` is a ValueError
-            self.refuse("refused announcements", CHANGES[side])
-            self.get_logger().warning(str(error), throttle_duration_sec=PATIENCE_SECONDS)
+            self.refuse("refused announcements", CHANGES[side], str(error))
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
@@ -278,11 +270,22 @@ class Monitor(PeerNode):
                 f" state {state_of(tick.state)[0].tolist()}"
             )
 
+    def _take_what_came(self) -> None:
+        """Record what is on the way when a signal comes, which all nodes may get at once: the plant may be ahead."""
+        now = quiet = time.monotonic()
+        while not self.finished and time.monotonic() < min(now + BEHIND_SECONDS, quiet + QUIET_SECONDS):
+            before = self.progress()
+            self.sweep()
+            self._complete()
+            if self.progress() != before:
+                quiet = time.monotonic()
+        self._complete()
+
     def close(self) -> None:
         """Close the bag; then let the plant have the last value."""
         if self._recorder is not None:
             with suppress(*[BagError] if self.exit_code else []):  # it has been said
-                self._complete()
+                self._take_what_came()
                 self.take_waiting(self._others)  # what came with the last state
                 self._recorder.close(self.counters)
                 self.get_logger().info(f"closed the bag {self._path}: {self.counters['ticks']} ticks")

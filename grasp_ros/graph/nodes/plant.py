@@ -47,7 +47,6 @@ class Plant(PeerNode):
         progress = self.read_only("progress", False)
         free = self.read_only("free_running", False)
         waits = free and self.read_only("wait_for_controllers", False)
-        self._priority = self.read_priority() if free else 0
         steering = Steering(self)
         scene = scenes.load(name)
         running = self._read_running(free, list(scene.controllers.values()))
@@ -60,7 +59,7 @@ class Plant(PeerNode):
         self.resets, self.asked = 0, math.inf  # how often it was put back; wall time of the current state
         self._recorded, self.heard_of_record = -1, -math.inf  # last tick that the monitor has; wall time of its word
         self._begin = math.nan  # wall time of the first state
-        self.counters.update(tick=0, resets=0, **{"refused records": 0})
+        self.counters["refused records"] = 0
         # On a terminal alone: a file or a journal gets no bar.
         self._bar = tqdm(
             total=self.scene.ticks, unit="tick", desc=self.scene.name, disable=None if progress else True
@@ -77,8 +76,6 @@ class Plant(PeerNode):
         if self.monitored:
             self.subscribe(LYAPUNOV, self._on_lyapunov, raw=True)
         self.loop = FreeRunning(self, steering, running, waits) if free else Lockstep(self, steering)
-        if progress:
-            self.wall_timer(0.1, self._show)
         self.when(self._ready, self._start)
 
     def _read_running(self, free: bool, topics: Sequence[Any]) -> Running:
@@ -124,6 +121,7 @@ class Plant(PeerNode):
 
     def report(self) -> None:
         """Publish the counters, and see to it that nobody else plays the plant."""
+        self.counters.update(tick=self.tick, resets=self.resets)
         super().report()
         self._insist()
         self.loop.report()
@@ -143,6 +141,7 @@ class Plant(PeerNode):
     def look(self) -> None:
         """See to it that everybody is there; ask again what has not been answered."""
         super().look()
+        self._show()
         if self.begun and not self.finished:
             self.loop.ask_again(time.monotonic())
 
@@ -178,7 +177,6 @@ class Plant(PeerNode):
         self.begun, self.concern = True, ""
         self.heartbeats.tell()  # this plant vouches for its scene
         self._begin = time.monotonic()
-        self.take_priority(self._priority)
         self.publish_state()
         self.loop.start()
 
@@ -208,7 +206,6 @@ class Plant(PeerNode):
         if self._plant.status is not Status.DONE:
             self.fail(self._plant.stop)
             return
-        self.counters["tick"] = self._plant.tick
         self.publish_state()
 
     def restart(self) -> None:
@@ -216,12 +213,9 @@ class Plant(PeerNode):
         self.get_logger().info(f"reset at tick {self.tick}")
         self._plant, self._recorded = self._new_plant(), -1
         self.resets += 1
-        self.counters.update(tick=0, resets=self.resets)
         self._begin = time.monotonic()
         with suppress(OSError):
             self._bar.reset()
-        self.heartbeats.own.turn = self.resets
-        self.heartbeats.tell()  # with the stamp of the first state this one is otherwise a repetition
         self.publish_state()
 
     def finish(self) -> None:

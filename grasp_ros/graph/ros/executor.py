@@ -6,7 +6,6 @@ import gc
 import os
 import signal
 import sys
-import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
@@ -21,7 +20,6 @@ from grasp_ros.graph.stopping import end_by_force, note_signals, on_signals, tel
 from grasp_ros.physics.errors import Refused, described
 
 OF_ROS = ("ROS_", "RMW_", "RCUTILS_", "FAST")  # how variables begin that rcl and the middleware read
-BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what has arrived before a signal, and without any more of it
 # A spin without a time limit burns a core and can hang; one until a future is complete, which does not return between
 # messages, takes less time, and has corrupted the heap of a process.
 POLL_SECONDS = 0.2
@@ -111,15 +109,4 @@ def _spin(nodes: Sequence[GraspNode], received: Sequence[int], names: str) -> No
         executor.spin_once(timeout_sec=POLL_SECONDS)
     if received:
         tell_parent(names, f"was ended by {signal.Signals(received[0]).name}")
-    if received and len(nodes) == 1:  # of several, nobody is behind
-        _take_what_came(executor, nodes[0])
     executor.shutdown()
-
-
-def _take_what_came(executor: EventsExecutor, node: GraspNode) -> None:
-    """After a signal, which all nodes of a graph may get at once: a recorder may be behind the plant."""
-    end, before = time.monotonic() + BEHIND_SECONDS, None
-    while (now := node.behind()) != before and not node.finished and time.monotonic() < end:
-        before, look = now, time.monotonic() + QUIET_SECONDS
-        while time.monotonic() < look:
-            executor.spin_once(timeout_sec=QUIET_SECONDS)

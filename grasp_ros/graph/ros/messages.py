@@ -158,32 +158,30 @@ class StateReader:
         self._name: tuple[str, ...] = ()
         self._template: Template | None = None
 
-    def read(self, cdr: bytes) -> State | None:
-        """A state; None if a message is none: lists that differ in length, names that are missing or there twice, NaN.
+    def read(self, cdr: bytes) -> State:
+        """A state.
 
         Raises
         ------
         RuntimeError, ValueError or struct.error, which is `UNREADABLE`
-            If it cannot be decoded.
+            If a message is none: not to be decoded, lists that differ in length, names missing or there twice, NaN.
         """
         if self._template is not None and (found := self._template.read(cdr)) is not None:
             n, numbers = len(self._name), found[2:]
-            position, velocity, effort = numbers[:n], numbers[n : 2 * n], numbers[2 * n :]
-            time_ns = found[0] * NANOSECONDS + found[1]
-            return State(time_ns, self._name, position, velocity, effort) if _finite(numbers) else None
-        message = deserialize_message(cdr, JointState)
-        lists = tuple(message.position), tuple(message.velocity), tuple(message.effort)
-        name = tuple(message.name)
-        if not (
-            all(len(values) == len(name) for values in lists) and len(set(name)) == len(name)
-            and all(needed in name for needed in self._needed) and _finite(*lists)
-        ):
-            return None
-        if name != self._name:
-            self._name, self._template = name, state_template(name)
-        return State(to_ns(message.header.stamp), name, *lists)
-
-
-def _finite(*lists: Sequence[float]) -> bool:
-    """Whether all are; a finite sum says so at once, one that overflows says nothing."""
-    return math.isfinite(sum(map(sum, lists))) or all(map(math.isfinite, chain(*lists)))
+            state = State(found[0] * NANOSECONDS + found[1], self._name, numbers[:n], numbers[n : 2 * n],
+                          numbers[2 * n :])
+        else:
+            message = deserialize_message(cdr, JointState)
+            lists = tuple(message.position), tuple(message.velocity), tuple(message.effort)
+            name, numbers = tuple(message.name), (*chain(*lists),)
+            if any(len(values) != len(name) for values in lists) or not {*self._needed} <= {*name} or (
+                len({*name}) < len(name)
+            ):
+                raise ValueError(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
+            if name != self._name:
+                self._name, self._template = name, state_template(name)
+            state = State(to_ns(message.header.stamp), name, *lists)
+        # A finite sum says that all are, at once; one that overflows says nothing.
+        if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
+            raise ValueError("a number of a state is not finite")
+        return state

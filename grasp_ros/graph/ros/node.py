@@ -5,11 +5,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from enum import Enum
 from functools import partial
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -33,7 +31,6 @@ PATIENCE_SECONDS = 5.0
 ACKNOWLEDGE_SECONDS = 5.0
 LOSSES = ("lost", "silent")  # how the counters begin that are never again as if nothing had been
 SWEEP = 100  # messages of one topic at a time
-PRIORITY, MOST_PRIORITY = "real_time_priority", 99  # of Linux
 UNKNOWN = "_NODE_NAME_UNKNOWN_"  # what discovery answers until it has the name
 NEW = "a node whose name is not known yet"
 
@@ -63,7 +60,6 @@ class GraspNode(ParameterNode):
         self._complaints: dict[tuple[str, Topic], float] = {}  # when to say it again
         self.concern = ""  # what is not as it should be, although the node goes on
         self.trouble = ""  # what keeps it from going on
-        self.other_sources = ""  # who publishes what somebody else does
         self.phase = Phase.WAITING
         # What it does or waits for: the message of its /diagnostics.
         self.words = f"waiting for peers {place(os.environ, self.get_namespace())}"
@@ -152,39 +148,19 @@ class GraspNode(ParameterNode):
                 return False
         return bool(publisher.get_subscription_count() >= len(readers))
 
-    def read_priority(self) -> int:
-        """Parameter real_time_priority: that of this process once it runs, SCHED_RR; 0: that of every process.
-
-        Between equals a thread waits some milliseconds for its turn when all processors are busy, several periods of a
-        fast loop. Linux gives this priority to whoever has the right, by CAP_SYS_NICE or a limit `rtprio`.
-        """
-        wanted = self.read_only(PRIORITY, 0)
-        if not 0 <= wanted <= MOST_PRIORITY:
-            raise Refused(f"{PRIORITY}: {wanted} is not allowed; allowed: 0 to {MOST_PRIORITY}")
-        return int(wanted)
-
-    def take_priority(self, wanted: int) -> None:
-        """Give it to all threads of this process; those that they start inherit it. Without the right, say so."""
-        try:
-            for thread in Path("/proc/self/task").iterdir() if wanted else ():
-                with suppress(ProcessLookupError):  # it has just ended
-                    os.sched_setscheduler(int(thread.name), os.SCHED_RR, os.sched_param(wanted))
-        except OSError as error:
-            self.get_logger().info(f"{PRIORITY}: {wanted} is not to be had here ({error.strerror}):"
-                                   " goes on without, and commands get older on busy processors")
-
     def count(self, counter: str, number: int = 1) -> None:
         """Add to a counter."""
         self.counters[counter] = int(self.counters.get(counter, 0)) + number
 
-    def refuse(self, counter: str, topic: Topic) -> None:
-        """Count a message that cannot be true, and say every few seconds whose it may be."""
+    def refuse(self, counter: str, topic: Topic, why: str = "") -> None:
+        """Count a message that cannot be true, and say every few seconds whose it may be, and why."""
         self.count(counter)
         now = time.monotonic()
         if now >= self._complaints.get((counter, topic), 0.0):
             self._complaints[counter, topic] = now + PATIENCE_SECONDS
             names = " and ".join(self.sources(topic)) or "none any more"
-            self.get_logger().warning(f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}")
+            words = f"{topic.name}: {counter}: {self.counters[counter]}; sources: {names}"
+            self.get_logger().warning(f"{words}; {why}" if why else words)
 
     def flush(self, *publishers: Publisher) -> None:
         """Let every reader have the last messages before the process ends, within ACKNOWLEDGE_SECONDS in all."""
@@ -195,10 +171,10 @@ class GraspNode(ParameterNode):
     def report(self) -> None:
         """Publish the counters."""
         lost = any(self.counters[key] for key in self.counters if key.startswith(LOSSES))
-        failed, uncertain = self.exit_code or self.trouble, lost or self.concern or self.other_sources
+        failed, uncertain = self.exit_code or self.trouble, lost or self.concern
         status = DiagnosticStatus(name=self.get_fully_qualified_name(), hardware_id="grasp_ros")
         status.level = status.ERROR if failed else status.WARN if uncertain else status.OK
-        status.message = "; ".join(filter(None, (self.words, self.trouble, self.concern, self.other_sources)))
+        status.message = "; ".join(filter(None, (self.words, self.trouble, self.concern)))
         values = {"phase": self.phase.value, **self.counters}
         status.values = [KeyValue(key=key, value=str(value)) for key, value in values.items()]
         message = DiagnosticArray(status=[status])
@@ -244,10 +220,6 @@ class GraspNode(ParameterNode):
     def work(self, received: list[int]) -> bool:
         """Do in place of a spin what has an order of its own, until something is received; whether there is any."""
         return False
-
-    def behind(self) -> object:
-        """What changes while it takes what had arrived before a signal; None: nothing that must be taken."""
-        return None
 
     def close(self) -> None:
         """Release what is not ROS; called once, also after a signal, when the context is already invalid."""

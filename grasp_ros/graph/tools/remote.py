@@ -35,10 +35,6 @@ FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
 
 
-class Stopped(Exception):  # noqa: N818 - no error
-    """A signal has come."""
-
-
 class Failed(Refused):
     """Nobody answers, or does what was asked for."""
 
@@ -49,7 +45,6 @@ class Remote(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("remote", **options)
         self._wanted: list[str] = json.loads(self.read_only("words", "[]"))
-        self._received: list[int] = []
         self._known: dict[str, Any] = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self)
@@ -60,29 +55,25 @@ class Remote(GraspNode):
 
     def work(self, received: list[int]) -> bool:
         """Ask once, or be a shell; the exit code is that of the last answer."""
-        self._received = received
+
+        def stop(number: int, _: object) -> None:  # also a wait for a line, which Python would go on with
+            received.append(number)
+            raise KeyboardInterrupt
+
+        on_signals(stop)
         try:
-            self.exit_code = _say(self, self._wanted) if self._wanted else _shell(self)
-        except Stopped:
+            if not received:
+                self.exit_code = _say(self, self._wanted) if self._wanted else _shell(self)
+        except KeyboardInterrupt:
             pass
         except OSError as error:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             if not isinstance(error, BrokenPipeError):  # the reader of our output, `head` say, has had it
                 print(f"standard input or output: {error.strerror}", file=sys.stderr)
                 self.exit_code = 1
-        return True
-
-    def read(self) -> str:
-        """The next line of the standard input; a signal ends the wait for it, which Python would go on with."""
-        def stop(number: int, _: object) -> None:
-            self._received.append(number)
-            raise Stopped
-
-        on_signals(stop)
-        try:
-            return "" if self._received else sys.stdin.readline()
         finally:
-            note_signals(self._received)
+            note_signals(received)
+        return True
 
     def do(self, words: Sequence[str]) -> str:
         """Do what some words ask for; returns what there is to say.
@@ -185,7 +176,7 @@ class Remote(GraspNode):
     def _coming(self, found: list[Any]) -> Iterator[Any]:
         """What a subscription puts into a list, as it comes."""
         while True:
-            self._spin()
+            self._executor.spin_once(timeout_sec=SPIN_SECONDS)
             yield from found
             found.clear()
 
@@ -203,14 +194,9 @@ class Remote(GraspNode):
     def _wait(self, condition: Callable[[], bool], otherwise: str) -> None:
         deadline = time.monotonic() + PATIENCE_SECONDS
         while not condition():
-            self._spin()
+            self._executor.spin_once(timeout_sec=SPIN_SECONDS)
             if time.monotonic() > deadline:
                 raise Failed(otherwise)
-
-    def _spin(self) -> None:
-        self._executor.spin_once(timeout_sec=SPIN_SECONDS)
-        if self._received:
-            raise Stopped
 
 
 def _whole(word: str) -> int:
@@ -241,7 +227,7 @@ def _shell(remote: Remote) -> int:
     status, prompt = 0, "grasp> " if sys.stdin.isatty() else ""
     while True:
         print(prompt, end="", flush=True)
-        words = remote.read()
+        words = sys.stdin.readline()
         if not words or words.strip() in FAREWELL:
             return status
         if words.strip():
