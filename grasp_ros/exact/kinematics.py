@@ -112,12 +112,6 @@ def envelope_step(pair: PairFlight, at: Motion) -> float:
 
 
 @kernel
-def bound(body: Array, q: float, q_rate: float, span: float) -> float:
-    """`bound_by` of a body's row (4,)."""
-    return bound_by(rates_of(body), q, q_rate, span)
-
-
-@kernel
 def next_derivative(body: Array, before: float, value: float) -> float:
     """The derivative after two of a body's flight, from the second one on: m q'' = -(c q' + k q)."""
     return -(body[Of.DAMPING] * value + body[Of.STIFFNESS] * before) / body[Of.MASS]

@@ -272,7 +272,6 @@ class Push(NamedTuple):
 
     value: float  # N, to the right
     rounding: float  # N, of it and of the friction
-    noise: float  # N, rounding of the push as positions and velocities tell it
 
 
 class Leaning(NamedTuple):

@@ -28,7 +28,6 @@ SHORT_FLIGHT, FAR_SHORT = 0.25, 1.0  # of the time constants: there the power se
 FAR = 4.0  # times the position: a rest position whose roundings would take digits of a flight that hardly moves
 SHORT_START = 0.2  # of the time constants, well within those of a short flight
 SHORT_WAY = 0.125  # of a penetration: a longer way has roundings like those of its end
-FLIGHT_PARTS = 2.0**44  # of a flight, beyond which a rounding of the time may be longer than a part
 
 # Taylor steps.
 NOISE = 100.0 * EPS  # of a polynomial with some tens of terms

@@ -22,8 +22,7 @@ from grasp_ros.exact.driver.callback import ADDRESS, CONTEXT, FINISH, call
 from grasp_ros.exact.driver.workspace import workspace
 from grasp_ros.exact.integrator import BREATH, compile_kernels
 from grasp_ros.exact.records import COULOMB, Array, Integers, Loop, Output, Plant, State, new_run, one_interval
-from grasp_ros.observe.observe import BEGIN
-from grasp_ros.observe.observer import RunObserver
+from grasp_ros.observe.observer import BEGIN, RunObserver
 from grasp_ros.observe.record import UNDECIDED, Memory, Seen, Switch, Wanted
 from grasp_ros.physics.layout import Entry, Filled, Of, Outcome, Pair, Place, Transition, Work
 
@@ -156,9 +155,8 @@ def go_on(door: Any, driven: tuple[Any, ...], rows: Rows, i: int, room: Room, me
         done += 1
     loop.begins[0] = 0.0
     rows.touches[i, 0], rows.touches[i, 1] = left, right
-    rows.seen[i, Seen.SETTLED] = seen[Seen.SETTLED] if seen[Seen.SETTLED] != UNDECIDED else math.inf
-    for body in range(3):
-        rows.seen[i, Seen.OUTSIDE + body] = seen[Seen.OUTSIDE + body]
+    if seen[Seen.SETTLED] == UNDECIDED:
+        seen[Seen.SETTLED] = math.inf
     switches[Switch.WANTED], switches[Switch.LOSSES] = wanted, losses
     return int(outcome)
 
@@ -178,10 +176,10 @@ def run_rows(door: Any, driven: tuple[Any, ...], rows: Rows, room: Room, memory:
             rows.state[i, place] = room.state.y[place]
         if room.out.observer[ADDRESS] != 0:
             call(room.out.observer[ADDRESS], room.out.observer[CONTEXT], FINISH, 0.0, 0.0, 0)
-            for place in range(memory.seen.shape[0]):
-                rows.seen[i, place] = memory.seen[place]
             if outcome == Outcome.DONE and memory.switches[Switch.WANTED] & Wanted.SETTLING.value:
                 outcome = go_on(door, driven, rows, i, room, memory, limits)
+            for place in range(memory.seen.shape[0]):
+                rows.seen[i, place] = memory.seen[place]
         rows.outcome[i] = outcome
     return n
 

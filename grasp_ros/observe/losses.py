@@ -17,8 +17,8 @@ from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.kinematics import approach
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.records import Array
+from grasp_ros.observe.extremes import WORK
 from grasp_ros.observe.record import Seen, SegmentRecord
-from grasp_ros.observe.step_extremes import WORK
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, U, V, X
 
 NODES, WEIGHTS = (0.5 * (np.polynomial.legendre.leggauss(16)[0] + 1.0), 0.5 * np.polynomial.legendre.leggauss(16)[1])

@@ -1,14 +1,152 @@
-"""An observer with its memory: what a run is handed so that it is watched."""
+"""The observer of a run: what it remembers after each segment, what follows at the end, and its memory."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from grasp_ros.exact.driver.callback import FINISH, address_of, block_of
+from grasp_ros.exact.compensated import velocity_lane
+from grasp_ros.exact.compilation.jit import door, inlined, kernel
+from grasp_ros.exact.driver.callback import FINISH, address_of, block_of, call
+from grasp_ros.exact.impact import stored_energy
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.exact.records import Integers, Plant, State, Tables
-from grasp_ros.observe.observe import BEGIN, observe, observe_losses
-from grasp_ros.observe.record import UNDECIDED, Seen, Switch, Wanted, memory_of
+from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
+from grasp_ros.observe.extremes import extremes_of, may_exceed, write_ranges
+from grasp_ros.observe.losses import add_losses
+from grasp_ros.observe.record import (
+    QUANTITIES,
+    SEEN,
+    STATES,
+    UNDECIDED,
+    Memory,
+    Quantity,
+    Seen,
+    SegmentRecord,
+    Switch,
+    Wanted,
+    memory_at,
+    memory_of,
+)
+from grasp_ros.observe.settling import last_of, settled_from, watch_bound
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of, Pair, U, X
+
+BEGIN = -2  # in place of a kind of segment
+
+
+@kernel
+def level(loop: Array, pairs: Array, y: Array) -> float:
+    """V_c of a state, J."""
+    total = 0.0
+    for body in (LEFT, OBJECT, RIGHT):
+        row, lane = loop[body], velocity_lane(body)
+        x, v = y[lane - 1], y[lane]
+        total += row[Of.MASS] * v * v
+        if row[Of.STIFFNESS] > 0.0:
+            away = x - row[Of.FORCE] / row[Of.STIFFNESS]
+            total += row[Of.STIFFNESS] * away * away
+        else:
+            total -= 2.0 * row[Of.FORCE] * x
+    for side in (LEFT, RIGHT):
+        if pairs[side, Law.HERTZIAN] > 0.0:
+            total += 2.0 * stored_energy(pairs[side, Law.HERTZIAN], max(y[U.L + side], 0.0))
+    return total
+
+
+@inlined
+def is_wanted(segment: SegmentRecord, q: int, wanted: int) -> bool:
+    """Whether the extremes of a quantity are kept; those of an impact only while there is one."""
+    if q < U.L:
+        return wanted & Wanted.MOTION.value != 0
+    if q >= Quantity.INPUT_L:
+        return wanted & Wanted.INPUTS.value != 0
+    return wanted & Wanted.IMPACTS.value != 0 and segment.m.mode[q % 2] == Pair.CONTACT
+
+
+@inlined
+def watch_quantities(segment: SegmentRecord, seen: Array, wanted: int) -> None:
+    """Keep the extremes of what is wanted, where its range may hold new ones."""
+    for q in range(QUANTITIES):
+        if is_wanted(segment, q, wanted) and may_exceed(segment, q, seen[Seen.LOW + q], seen[Seen.HIGH + q]):
+            low, high = extremes_of(segment, q)
+            seen[Seen.LOW + q] = min(seen[Seen.LOW + q], low)
+            seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
+
+
+@kernel
+def watch_level(m: Memory) -> None:
+    """Keep the largest rise of V_c, as it is at the ends of segments."""
+    seen = m.seen
+    seen[Seen.LEVEL] = level(m.loop, m.pairs, m.y)
+    seen[Seen.RISE] = max(seen[Seen.RISE], seen[Seen.LEVEL] - seen[Seen.LEAST])
+    seen[Seen.LEAST] = min(seen[Seen.LEAST], seen[Seen.LEVEL])
+
+
+@kernel
+def begin(m: Memory, bound: float) -> None:
+    """Forget the last run, and remember the state at which this one begins."""
+    seen, y = m.seen, m.y
+    for place in range(SEEN):
+        seen[place] = 0.0
+    for q in range(QUANTITIES):
+        seen[Seen.LOW + q], seen[Seen.HIGH + q] = math.inf, -math.inf
+    for place in range(STATES):
+        m.before[place] = y[place]
+    seen[Seen.LEVEL] = seen[Seen.LEAST] = level(m.loop, m.pairs, y)
+    seen[Seen.BOUND], seen[Seen.SETTLED] = bound * max(abs(y[X.L]), abs(y[X.O]), abs(y[X.R])), math.nan
+    for body in (LEFT, OBJECT, RIGHT):
+        if abs(y[velocity_lane(body) - 1]) > seen[Seen.BOUND]:
+            seen[Seen.OUTSIDE + body] = math.inf
+
+
+@kernel
+def finish(m: Memory) -> None:
+    """What follows at the end of a run: whether the last times outside the bound are the last for good."""
+    seen = m.seen
+    if m.switches[Switch.WANTED] & Wanted.BOUND.value:
+        seen[Seen.LAST_OUTSIDE] = last_of(seen)
+    if m.switches[Switch.CERTAIN] != 0:
+        seen[Seen.SETTLED] = settled_from(m, level(m.loop, m.pairs, m.y))
+
+
+@door
+def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
+    """Remember what is wanted of a segment of t s, which has just ended; called by `callback.notify`.
+
+    Before a run it is called with BEGIN and the part of the largest displacement that counts as settled; after it with
+    FINISH.
+    """
+    m = memory_at(address)
+    if kind == BEGIN:
+        begin(m, t)
+        return 0
+    if kind == FINISH:
+        finish(m)
+        return 0
+    segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
+    if not math.isfinite(m.y.sum() + t):
+        return 0
+    bound = wanted & (Wanted.SETTLING.value | Wanted.BOUND.value)
+    if bound or wanted & (Wanted.MOTION.value | Wanted.IMPACTS.value | Wanted.INPUTS.value):
+        write_ranges(segment)
+        watch_quantities(segment, seen, wanted)
+    if bound:
+        watch_bound(segment, seen, m.clock[2] + (m.clock[0] + m.clock[1]))
+    if m.switches[Switch.LOSSES] != 0:
+        call(m.switches[Switch.LOSSES], address, kind, t, s, degree)
+    if wanted & Wanted.RISE.value:
+        watch_level(m)
+    for place in range(STATES):
+        m.before[place] = m.y[place]
+    return 0
+
+
+@door
+def observe_losses(address: int, kind: int, t: float, s: float, degree: int) -> int:
+    """Add the losses of a segment; a function of its own, so that only who asks for them waits for its compilation."""
+    m = memory_at(address)
+    add_losses(SegmentRecord(kind, t, s, degree, m), m.base, m.seen)
+    return 0
 
 
 class RunObserver:

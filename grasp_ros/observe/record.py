@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import typeof
 
-from grasp_ros.exact.contact.step_order import higher_order, series_order
+from grasp_ros.exact.contact.step_unit import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run
 from grasp_ros.physics.accuracy import FINEST
@@ -70,7 +70,7 @@ class Switch(IntEnum):
     """Places of the whole numbers by which an observer is told what to do."""
 
     WANTED = 0
-    LOSSES = 1  # address of `observe.observe_losses`, 0: they are not wanted
+    LOSSES = 1  # address of `observer.observe_losses`, 0: they are not wanted
     CERTAIN = 2  # 1: V_c cannot rise
 
 

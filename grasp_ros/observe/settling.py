@@ -11,14 +11,19 @@ from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.kinematics import own_acceleration
 from grasp_ros.exact.numerics.roots import first_rise, shift, value_and_rate
 from grasp_ros.exact.records import Array, Regime
-from grasp_ros.observe.flight_extremes import first_zero
-from grasp_ros.observe.record import LOWER, UNDECIDED, UPPER, Memory, Seen, SegmentRecord
-from grasp_ros.observe.step_extremes import FIRST, ROW, WORK, expand_quantity, extremes_of
+from grasp_ros.observe.extremes import FIRST, ROW, WORK, expand_quantity, extremes_of, first_zero, may_exceed
+from grasp_ros.observe.record import UNDECIDED, Memory, Seen, SegmentRecord
 from grasp_ros.physics import reach as bounds
 from grasp_ros.physics.layout import LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Slide
 
 BISECTIONS = 60
 reach = kernel(bounds.reach)
+
+
+@inlined
+def last_of(seen: Array) -> float:
+    """When a body was outside last, s."""
+    return max(seen[Seen.OUTSIDE + LEFT], seen[Seen.OUTSIDE + OBJECT], seen[Seen.OUTSIDE + RIGHT])
 
 
 @kernel
@@ -32,7 +37,7 @@ def settled_from(m: Memory, V_c: float) -> float:
     if not (most < math.inf and bound > 0.0):
         return math.nan
     if most <= bound or m.rest[SINCE] < math.inf:
-        return max(m.seen[Seen.OUTSIDE + LEFT], m.seen[Seen.OUTSIDE + OBJECT], m.seen[Seen.OUTSIDE + RIGHT])
+        return last_of(m.seen)
     return UNDECIDED if takes_energy(m) else math.inf
 
 
@@ -46,8 +51,8 @@ def takes_energy(m: Memory) -> bool:
 
 @inlined
 def leaves(segment: SegmentRecord, x: int, bound: float) -> bool:
-    """Whether a position leaves the bound within a segment; the ranges stand in scratch."""
-    if segment.m.rows[LOWER, x] >= -bound and segment.m.rows[UPPER, x] <= bound:
+    """Whether a position leaves the bound within a segment."""
+    if not may_exceed(segment, x, -bound, bound):
         return False
     low, high = extremes_of(segment, x)
     return bool(low < -bound or high > bound)

@@ -15,7 +15,7 @@ from numba import typeof
 
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.compilation.vectors import HALF
-from grasp_ros.exact.contact.step_order import higher_order, series_order
+from grasp_ros.exact.contact.step_unit import higher_order, series_order
 from grasp_ros.exact.driver.callback import reader
 from grasp_ros.exact.driver.workspace import zeros
 from grasp_ros.exact.records import Array, Integers, Plant, State, new_run

@@ -148,7 +148,7 @@ def _run_plain(variants: Variants, setup: Setup, wanted: Wanted, runs: Runs, whi
 
 def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: int) -> Integrator:
     """One row, driven as `simulate` drives it."""
-    system, sampled, seen = scene.system, setup.sampled or scene.sampled, runs.seen[i]
+    system, sampled = scene.system, setup.sampled or scene.sampled
     run = Integrator(
         system, continuous=not sampled, accuracy=setup.accuracy, max_events=setup.max_events, max_work=setup.max_work)
     wanted = wanted_by(columns)
@@ -164,9 +164,7 @@ def _run(scene: Scene, setup: Setup, columns: Sequence[Outcome], runs: Runs, i: 
             runs.growth[i] = spectrum(scene, accuracy=setup.accuracy)[0]
     if run_observer is not None:
         run_observer.finish()
-        seen[:] = run_observer.seen
         if done and wanted & Wanted.SETTLING:
             settle(run, run_observer, scene.duration, setup.horizons)
-            settled = [*range(Seen.OUTSIDE, Seen.OUTSIDE + 3), Seen.SETTLED]
-            seen[settled] = run_observer.seen[settled]
+        runs.seen[i] = run_observer.seen
     return run

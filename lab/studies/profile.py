@@ -12,7 +12,7 @@ import numpy as np
 from grasp_ros import simulation
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.exact.contact.series import expand_one
-from grasp_ros.exact.contact.step_order import series_order
+from grasp_ros.exact.contact.step_unit import series_order
 from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.layout import LANES, LEFT, V, Work, Z

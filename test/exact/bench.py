@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.contact.step_order import higher_order
-from grasp_ros.exact.contact.step_unit import new_settings
+from grasp_ros.exact.contact.step_unit import higher_order, new_settings
 from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.driver.outputs import SPARE
 from grasp_ros.exact.driver.workspace import new_workspace

@@ -1,6 +1,6 @@
 """Mutation check of the automaton and the event search: `python test/exact/mutants.py [part of a name]`, minutes.
 
-Deletes or negates every branch of `modes`, `resting_pair`, `begin` and `clamp_surface` in turn, drops every operand of
+Deletes or negates every branch of `modes`, `edge` and `begin` in turn, drops every operand of
 an `and` or `or`, one side of every loop over both sides, and every statement that calls or stores something. A test of
 the file of the same name, test_modes.py ..., must fail for each of these mutants, but for those that do what the
 original does; they are listed with the reason. Everything runs uncompiled, each mutant in a fork.
@@ -26,7 +26,7 @@ os.environ["NUMBA_DISABLE_JIT"] = "1"
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 ROOM = "grasp_ros.exact"
-MODULES = ("automaton.modes", "automaton.resting_pair", "automaton.begin", "automaton.clamp_surface")
+MODULES = ("automaton.modes", "automaton.edge", "automaton.begin")
 SEARCH = {"flight.search": "flight", "numerics.roots": "roots"}  # sampled alone; and whose tests they are
 EDGES = {ast.Lt: ast.LtE, ast.LtE: ast.Lt, ast.Gt: ast.GtE, ast.GtE: ast.Gt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq}
 OPERATIONS = {ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult}

@@ -14,9 +14,9 @@ from gmpy2 import mpfr
 from oracles import FREE, done, kinds, run
 
 from grasp_ros.exact.automaton.begin import force_free_time, leaves_force_out, must_begin
+from grasp_ros.exact.automaton.edge import HIGHEST
 from grasp_ros.exact.automaton.friction import apply_friction
 from grasp_ros.exact.automaton.modes import begin_contacts, end_begin, initial_modes
-from grasp_ros.exact.automaton.resting_pair import HIGHEST
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, Work, X

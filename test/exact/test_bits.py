@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import door
+from grasp_ros.exact.compilation.vectors import fma
 from grasp_ros.exact.numerics.powers_of_two import (
     exponent,
     near_exp2,

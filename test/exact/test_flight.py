@@ -14,7 +14,7 @@ from oracles import first_touch_from_rest, flight, flight_array
 from grasp_ros.exact.flight.closed_form import fly, launch
 from grasp_ros.exact.flight.search import first_root, motion_at, pair_in_flight, relative_bound
 from grasp_ros.exact.flight.segment import is_far
-from grasp_ros.exact.kinematics import bound
+from grasp_ros.exact.kinematics import bound_by, rates_of
 from grasp_ros.exact.records import Flights, Motion, PairFlight, Plant, Regime
 from grasp_ros.exact.tolerances import FAR
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of, Transition, U, Work
@@ -403,7 +403,7 @@ def test_the_bound_holds_and_is_not_idle(body: Body) -> None:
     for q, q_rate in ((1.0, 0.0), (0.2, 3.0), (-0.5, 2.0), (0.0, -1.0)):
         for span in (0.1, 3.0):
             largest = max(abs(flight(body, q, q_rate, span * j / 60)[0]) for j in range(61))
-            limit = bound(np.array(body), q, q_rate, span)
+            limit = bound_by(rates_of(np.array(body)), q, q_rate, span)
             assert largest <= limit * (1 + 1e-14)
             assert limit <= 30.0 * largest
 
@@ -434,8 +434,9 @@ def test_the_difference_of_two_motions_is_bounded(body: Body, at: tuple[float, f
 @pytest.mark.parametrize("size", [2.0**-540, 2.0**-700, 2.0**-900, 2.0**600])
 def test_the_bound_of_a_swing_knows_no_size(size: float) -> None:
     """Its squares leave the range of numbers."""
-    body = np.array([2.0, 3.0, 0.5, 0.0])
-    assert bound(body, size, 3.0 * size, 10.0) == pytest.approx(size * bound(body, 1.0, 3.0, 10.0), rel=1e-14, abs=0.0)
+    rates = rates_of(np.array([2.0, 3.0, 0.5, 0.0]))
+    expected = size * bound_by(rates, 1.0, 3.0, 10.0)
+    assert bound_by(rates, size, 3.0 * size, 10.0) == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
 def test_where_a_bound_says_far_the_search_needs_one_step_and_finds_nothing() -> None:

@@ -9,8 +9,14 @@ import numpy as np
 import pytest
 from mpmath import mpf
 
-from grasp_ros.exact.contact.step_order import higher_order, lower_order, series_order
-from grasp_ros.exact.contact.step_unit import impact_scales, new_settings, new_step
+from grasp_ros.exact.contact.step_unit import (
+    higher_order,
+    impact_scales,
+    lower_order,
+    new_settings,
+    new_step,
+    series_order,
+)
 from grasp_ros.exact.contact.taylor_step import ABOVE, BELOW, accepted_length, begin_series, fitted_step, length, pulls
 from grasp_ros.exact.contact.taylor_step import expand as expand_step
 from grasp_ros.exact.driver.workspace import new_workspace

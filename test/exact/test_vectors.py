@@ -5,12 +5,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import door, kernel
 from grasp_ros.exact.compilation.vectors import (
     HALF,
     WIDTH,
     add_product,
+    fma,
     highest,
     larger,
     load,
@@ -20,7 +20,6 @@ from grasp_ros.exact.compilation.vectors import (
     spread,
     spread_half,
     store,
-    vector_of,
 )
 from grasp_ros.exact.records import Array
 
@@ -39,7 +38,9 @@ def combine(a: Array, b: Array, number: float, out: Array) -> float:
     store(out, 2 * WIDTH, add_product(x, y, x))
     store(out, 3 * WIDTH, add_product(x, y, number))
     store(out, 4 * WIDTH, larger(x, y) - spread(number))
-    store(out, 5 * WIDTH, vector_of(numbers_of(sizes(x))))
+    numbers = numbers_of(sizes(x))
+    for i in range(WIDTH):
+        out[5 * WIDTH + i] = numbers[i]
     return highest(x)
 
 

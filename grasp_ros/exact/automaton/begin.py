@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 
-from grasp_ros.exact.automaton.resting_pair import HIGHEST, LONGEST, short_time, write_own_series
+from grasp_ros.exact.automaton.edge import HIGHEST, LONGEST, short_time, write_own_series
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import damping_factor, elastic_force
 from grasp_ros.exact.kinematics import approach, other, rate_lanes, reduced_mass

@@ -12,7 +12,7 @@ import math
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.contact.series import expand_force
 from grasp_ros.exact.impact import damping_factor, elastic_force
-from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, own_size, rate_lanes
+from grasp_ros.exact.kinematics import approach, rate_lanes
 from grasp_ros.exact.numerics.polynomial import values
 from grasp_ros.exact.numerics.roots import first_rise, value_and_rate
 from grasp_ros.exact.records import Array, Candidate, Integers, Plant, Push, State, Tables
@@ -55,16 +55,10 @@ def still_noise(plant: Plant) -> float:
 
 @kernel
 def impact_on_object(plant: Plant, state: State, side: Body) -> Push:
-    """The impact of a pair on an object at rest; where rounding hides that of a glide at u' = -1/p, the arm's force."""
-    x, v, sign = arm_of(state.y, side)
-    body, loss = plant.bodies[side], plant.pairs[side, Law.DISSIPATION]
+    """The impact of a pair on an object at rest."""
     elastic = elastic_force(plant.pairs[side, Law.HERTZIAN], state.y[U.L + side])
-    force = elastic * damping_factor(loss, approach(state.y, side))
-    noise = impact_noise(plant, side, elastic, state.y)
-    own = sign * (body[Of.MASS] * own_acceleration(body, x, v))
-    if abs(force) <= noise and 0.0 < own <= noise:
-        return Push(own, FRICTION * (body[Of.MASS] * own_size(body, x, v)), noise)
-    return Push(force, noise, noise)
+    factor = damping_factor(plant.pairs[side, Law.DISSIPATION], approach(state.y, side))
+    return Push(elastic * factor, impact_noise(plant, side, elastic, state.y))
 
 
 @kernel
@@ -72,18 +66,15 @@ def push_on_object(plant: Plant, state: State) -> Push:
     """What pushes the object beside its dry friction, by (3), and the rounding of that and of the friction.
 
     This decides about an object at rest, wherever it is asked: it slides if the push exceeds the limit of the friction
-    by more than the rounding. A series from the state, which knows nothing of glides, is held against the noise.
+    by more than the rounding.
     """
-    given = plant.given[OBJECT, Of.FORCE]
-    value, rounding, noise = 0.0, 0.0, 0.0  # of both sides first, for mirror images
+    value, rounding = 0.0, 0.0  # of both sides first, for mirror images
     for side in (LEFT, RIGHT):
         if state.mode[side] == Pair.CONTACT:
             impact = impact_on_object(plant, state, side)
             value += impact.value if side == LEFT else -impact.value
             rounding += impact.rounding
-            noise += impact.noise
-    still = still_noise(plant)
-    return Push(value + given, rounding + still, noise + still)
+    return Push(value + plant.given[OBJECT, Of.FORCE], rounding + still_noise(plant))
 
 
 @inlined
@@ -192,12 +183,12 @@ def slide_in_contact(tables: Tables, plant: Plant, state: State, n: int, h: floa
         for k in range(n + 1):
             row[k] = factor * c[LANES * k + V.O]
         if row[0] == 0.0:
-            accelerating = c[LANES + Lane.TIME] * push_on_object(plant, state).noise / plant.bodies[OBJECT, Of.MASS]
+            accelerating = c[LANES + Lane.TIME] * push_on_object(plant, state).rounding / plant.bodies[OBJECT, Of.MASS]
             if abs(row[1]) <= 0.5 * accelerating:
                 row[1] = 0.0
         return Candidate(first_rise(row, n, h, 0.0, work), Slide.STUCK)
     impact_series(tables, plant, state.mode, n)
-    noise = push_on_object(plant, state).noise
+    noise = push_on_object(plant, state).rounding
     begin, end = excess(tables, plant, n, 0.0), excess(tables, plant, n, h)
     if begin < -noise:
         found = slip_candidate(tables, plant, n, h, (0.0, 0.0), work)

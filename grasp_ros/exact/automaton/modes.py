@@ -7,9 +7,8 @@ consistent where one begins, and `make_transitions` where it ends; `begin_interv
 from __future__ import annotations
 
 from grasp_ros.exact.automaton.begin import must_begin
-from grasp_ros.exact.automaton.clamp_surface import glides, has_glided, surface_side
+from grasp_ros.exact.automaton.edge import NEVER, glides, has_glided, is_negligible, leaning, parts, surface_side
 from grasp_ros.exact.automaton.friction import apply_friction, lift_friction, push_on_object
-from grasp_ros.exact.automaton.resting_pair import NEVER, is_negligible, leaning, parts
 from grasp_ros.exact.compensated import copy, meet, put, velocity_lane
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.driver.outputs import record

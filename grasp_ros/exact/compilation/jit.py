@@ -14,7 +14,6 @@ import numpy as np
 from llvmlite import ir
 from numba.extending import intrinsic
 
-from grasp_ros.exact.compilation.kernel_cache import cache_directory
 from grasp_ros.exact.compilation.numba_internals import Kernel, KernelCache
 
 # Off by default in numba: it makes vector instructions of neighbouring sums, which speeds sampled runs up by some
@@ -120,16 +119,7 @@ def _compiled(function: K, *, door: bool, counts: bool = False, inline: bool = F
         no_cfunc_wrapper=not door,
     )(function)
     if COMPILED and door:
-        found._cache = _cache_of(function)
+        found._cache = KernelCache(function)
     elif COMPILED:
         found.__class__, found.door = Kernel, partial(_door, function)
     return found
-
-
-def _cache_of(function: Callable[..., Any]) -> KernelCache:
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(cache_directory())
-    try:
-        return KernelCache(function)
-    finally:
-        numba.config.CACHE_DIR = before

@@ -48,17 +48,11 @@ def cache_directory() -> Path:
 def kernels_on_disk() -> bool:
     """Whether the integrator has machine code on disk, so that its first call need not wait for the compiler."""
     uncompiled = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-    return uncompiled or any(cache_directory().rglob("*.advance-*.nbc"))
-
-
-def code_file(directory: str, name: str, key: object) -> Path:
-    """Where the machine code of a function for some key is kept: types, machine, versions."""
-    return Path(directory) / f"{name}.{hashlib.sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
+    return uncompiled or any(cache_directory().glob("*.advance.advance.*.nbc"))
 
 
 def write_checked(path: Path, content: bytes) -> None:
     """Write a file with its checksum, whole or not at all: others may read and write it at the same time."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     own = path.with_name(f"{path.name}.{uuid.uuid4().hex}")
     try:
         own.write_bytes(hashlib.sha256(content).digest() + content)

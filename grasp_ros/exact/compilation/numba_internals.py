@@ -3,20 +3,29 @@
 `test_numba_internals` names what is missing in another version of numba.
 """
 
+import hashlib
 import pickle
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
-from numba.core.caching import FunctionCache
+from numba.core.caching import NullCache
 from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.core.serialize import dumps
 
-from grasp_ros.exact.compilation.kernel_cache import code_file, read_checked, say_compiling, say_damaged, write_checked
+from grasp_ros.exact.compilation.kernel_cache import (
+    cache_directory,
+    read_checked,
+    say_compiling,
+    say_damaged,
+    write_checked,
+)
 
 
 class Part(JITCodeLibrary):
@@ -72,19 +81,23 @@ def _no_environment(*_: object) -> None:
     """Hand nothing over to machine code that is not there."""
 
 
-class KernelCache(FunctionCache):
+class KernelCache(NullCache):
     """Machine code of a function on disk: a file for each signature and machine, with its checksum.
 
     What is damaged is compiled anew. numba itself keeps an index beside the files, loads whatever is there, and two
     processes that write at once can leave an index that names the code of another machine.
     """
 
+    def __init__(self, function: Callable[..., Any]) -> None:
+        code, self._directory = function.__code__, cache_directory()
+        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._key = code.co_filename, code.co_firstlineno, code.co_code, numba.__version__, llvmlite.__version__
+
     def load_overload(self, signature: Any, target: Any) -> Any:
         """Machine code for arguments of some types; None if there is none."""
         target.refresh()
-        path = self._path(signature, target.codegen())
         try:
-            return self._impl.rebuild(target, pickle.loads(read_checked(path)))
+            return CompileResult._rebuild(target, *pickle.loads(read_checked(self._path(signature, target.codegen()))))
         except FileNotFoundError:
             say_compiling()
             return None
@@ -94,10 +107,9 @@ class KernelCache(FunctionCache):
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep machine code. It is a help, no need: a disk that is full only means to compile again."""
-        if self._impl.check_cachable(result):
-            with suppress(OSError):
-                write_checked(self._path(signature, result.codegen), dumps(self._impl.reduce(result)))
+        with suppress(OSError):
+            write_checked(self._path(signature, result.codegen), dumps(result._reduce()))
 
-    def _path(self, signature: Any, codegen: Any) -> Any:
-        key = self._index_key(signature, codegen), numba.__version__, llvmlite.__version__
-        return code_file(self.cache_path, self._impl.filename_base, key)
+    def _path(self, signature: Any, codegen: Any) -> Path:
+        key = repr((signature, codegen.magic_tuple(), self._key)).encode()
+        return self._directory / f"{self._name}.{hashlib.sha256(key).hexdigest()[:16]}.nbc"

@@ -16,9 +16,8 @@ coefficients of the velocities, and they pass through one product; w, u = w^2 an
 
 import numpy as np
 
-from grasp_ros.exact.compilation.fma import fma
 from grasp_ros.exact.compilation.jit import inlined, kernel, whole
-from grasp_ros.exact.compilation.vectors import add_product, load, numbers_of, spread
+from grasp_ros.exact.compilation.vectors import add_product, fma, load, numbers_of, spread
 from grasp_ros.exact.numerics.polynomial import product
 from grasp_ros.exact.numerics.powers_of_two import exponent, power_of_two
 from grasp_ros.exact.records import FACTORS, Array, Lanes, PerMass

@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.compilation.jit import inlined
-from grasp_ros.exact.compilation.vectors import highest, larger, load, numbers_of, sizes, vector_of
-from grasp_ros.exact.contact.series import expand_both, expand_one, scale_of
+from grasp_ros.exact.compilation.vectors import highest, larger, load, numbers_of, sizes
+from grasp_ros.exact.contact.series import FIRST, expand_both, expand_one, put, scale_of
 from grasp_ros.exact.kinematics import own_size
 from grasp_ros.exact.numerics.polynomial import INVERSE, curvatures, values
 from grasp_ros.exact.numerics.powers_of_two import near_exp2, near_inverse, near_log2, orders_to_one, power_of_two
@@ -127,7 +127,8 @@ def length(tables: Tables, pulled: tuple[float, float, float], step: Step, setti
     z_l = depth_size(c[Z.L], step.left, z_l, t * (v_l + v_o))
     z_r = depth_size(c[Z.R], step.right, z_r, t * (v_o + v_r))
     parts = (inverse(t), inverse(v_l), inverse(x_o), inverse(v_o), 0.0, inverse(v_r), inverse(z_l), inverse(z_r))
-    return step_size(c, vector_of(parts), step.order)
+    put(tables.size, FIRST, parts)
+    return step_size(c, load(tables.size, FIRST), step.order)
 
 
 @inlined

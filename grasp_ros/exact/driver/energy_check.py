@@ -6,7 +6,7 @@ import math
 
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.impact import elastic_force, stored_energy
-from grasp_ros.exact.kinematics import approach, arm_of, reduced_mass
+from grasp_ros.exact.kinematics import arm_of, reduced_mass
 from grasp_ros.exact.records import Array, Level, Plant, Settings, State
 from grasp_ros.exact.tolerances import DIED_OUT, ENERGY, ENERGY_UNDERFLOW, MAX_IDLE, NEGLECTED
 from grasp_ros.physics.body_energy import body_energy
@@ -29,16 +29,6 @@ def level_of(body: Array, x: float, v: float, way: float, t: float) -> tuple[flo
         away = t * (abs(v) + 0.5 * t * abs(force) / mass)
         size += 2.0 * abs(force) * (min(away, 2.0 * abs(force) / stiffness) if stiffness > 0.0 else away)
     return value, size
-
-
-@kernel
-def jump(plant: Plant, y: Array, side: Body, t: float) -> float:
-    """What an arm gains or loses, J of V, where a touch after t s puts it to u = 0: by the rounding of that time."""
-    if y[U.L + side] != 0.0:
-        return 0.0
-    body = plant.given[side]
-    held = abs(body[Of.FORCE]) + abs(body[Of.STIFFNESS] * arm_of(y, side)[0])
-    return 2.0 * held * EPS * t * abs(approach(y, side))
 
 
 @inlined
@@ -76,15 +66,6 @@ def losses(plant: Plant, before: Level, modes: tuple[int, int], size: float, t: 
         elif mode in (Pair.CLAMPED, Pair.LEAVING):
             loss += 2.0 * stored_energy(hertzian, u)
     return loss
-
-
-@inlined
-def may_be_damped(plant: Plant, fall: float, size: float, t: float) -> bool:
-    """Whether the damper of one body can take a fall of the energy: what most segments need to know, for less."""
-    arm, body, far = plant.given[LEFT], plant.given[OBJECT], plant.given[RIGHT]
-    most = 2.0 * t * size
-    return bool(fall * arm[Of.MASS] <= most * arm[Of.DAMPING] or fall * far[Of.MASS] <= most * far[Of.DAMPING]
-                or fall * body[Of.MASS] <= most * body[Of.DAMPING])
 
 
 @inlined
@@ -130,10 +111,6 @@ def check_segment(plant: Plant, state: State, settings: Settings, before: Level,
     driven = plant.given[LEFT, Of.DAMPING] < 0.0 or plant.given[RIGHT, Of.DAMPING] < 0.0
     if driven or not abs(rise) > rounding:  # nan where energies overflow before the state does
         return Outcome.GO_ON
-    rounding += jump(plant, state.y, LEFT, t) + jump(plant, state.y, RIGHT, t)
     if rise > rounding:
         return Outcome.ENERGY_RISES
-    fall = -rise - rounding
-    if fall <= 0.0 or may_be_damped(plant, fall, size, t) or fall <= losses(plant, before, modes, size, t):
-        return Outcome.GO_ON
-    return Outcome.ENERGY_FALLS
+    return Outcome.GO_ON if -rise - rounding <= losses(plant, before, modes, size, t) else Outcome.ENERGY_FALLS

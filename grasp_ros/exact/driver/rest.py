@@ -35,29 +35,22 @@ def may_rest(plant: Plant, state: State) -> bool:
 
 
 @kernel
-def contact_stiffness(plant: Plant, state: State, side: Body) -> float:
-    """Slope of the Hertzian force of a pair in contact, N/m."""
-    if state.mode[side] != Pair.CONTACT:
-        return 0.0
-    return elastic_slope(plant.pairs[side, Law.HERTZIAN], max(state.y[U.L + side], 0.0))
-
-
-@kernel
 def stays(plant: Plant, state: State, body: Body) -> bool:
     """Whether a body stays where it is, but for a part REST of the largest position.
 
     A spring or a contact holds what is near its balance; a body without either rests if nothing moves it at all.
     """
     row, lane = plant.bodies[body], velocity_lane(body)
-    x, v = state.y[lane - 1], state.y[lane]
-    push_l = impact_on_object(plant, state, LEFT).value if state.mode[LEFT] == Pair.CONTACT else 0.0
-    push_r = impact_on_object(plant, state, RIGHT).value if state.mode[RIGHT] == Pair.CONTACT else 0.0
-    held_l, held_r = contact_stiffness(plant, state, LEFT), contact_stiffness(plant, state, RIGHT)
-    push = push_l - push_r if body == OBJECT else (-push_l if body == LEFT else push_r)
-    stiffness = row[Of.STIFFNESS] + (held_l + held_r if body == OBJECT else (held_l if body == LEFT else held_r))
-    a = own_acceleration(row, x, v) + push / row[Of.MASS]
+    x, v, push, held = state.y[lane - 1], state.y[lane], 0.0, 0.0
     if row[Of.DAMPING] < 0.0:
         return False
+    for side in (LEFT, RIGHT):
+        if state.mode[side] == Pair.CONTACT and body in (side, OBJECT):
+            force = impact_on_object(plant, state, side).value
+            push += force if (side == LEFT) == (body == OBJECT) else -force
+            held += elastic_slope(plant.pairs[side, Law.HERTZIAN], max(state.y[U.L + side], 0.0))
+    stiffness = row[Of.STIFFNESS] + held
+    a = own_acceleration(row, x, v) + push / row[Of.MASS]
     if stiffness > 0.0:
         return bool(abs(a) * row[Of.MASS] <= stiffness * REST * max(state.rest[LENGTH], abs(x)))
     return bool(v == 0.0 and abs(a) <= DERIVATIVE * own_size(row, x, v))

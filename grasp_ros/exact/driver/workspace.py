@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from grasp_ros.exact.contact.step_order import higher_order, series_order
+from grasp_ros.exact.contact.step_unit import higher_order, series_order
 from grasp_ros.exact.flight.closed_form import FLIGHT_ORDER
 from grasp_ros.exact.records import Array, Tables, numbers_of_tables, tables_of
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from grasp_ros.exact.automaton.begin import force_free_time
+from grasp_ros.exact.automaton.edge import NEVER, own_difference, parting_time
 from grasp_ros.exact.automaton.friction import slide_in_flight
-from grasp_ros.exact.automaton.resting_pair import NEVER, own_difference, parting_time
 from grasp_ros.exact.compensated import keep_together, move_in_flight
 from grasp_ros.exact.compilation.jit import inlined, kernel
 from grasp_ros.exact.flight.closed_form import FLIGHT_ORDER, expand_flight, flights_of, fly, settling_time
@@ -28,7 +28,7 @@ from grasp_ros.exact.records import (
     Step,
     Tables,
 )
-from grasp_ros.exact.tolerances import FLIGHT_PARTS, TOGETHER
+from grasp_ros.exact.tolerances import TOGETHER
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Kind, Of, Pair, Transition, U, V, Work, X
 
 STEEP = 1e16  # rate in 1/s whose powers leave the range of numbers
@@ -148,7 +148,7 @@ def state_in_flight(tables: Tables, plant: Plant, segment: Segment, settings: Se
     the part that they hold.
     """
     rate, at = settings.rate, tables.at
-    if not (rate < STEEP and tau * 2.0 * rate < FLIGHT_PARTS):
+    if not rate < STEEP:
         at[X.L], at[V.L], _, _ = fly(segment.flights.left, tau)
         at[X.O], at[V.O], _, _ = fly(segment.flights.object, tau)
         at[X.R], at[V.R], _, _ = fly(segment.flights.right, tau)

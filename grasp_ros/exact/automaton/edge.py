@@ -1,8 +1,8 @@
-"""A pair at u = u' = 0: which way it goes, how long that is certain, and whether its force matters.
+"""A pair on the edge of a mode: which way it goes, how long that is certain, and whether its force matters.
 
-Each body obeys m x'' + c x' + k x = f, so its derivatives follow from each other, and the first one in which arm and
-object differ decides. Their motion relative to each other obeys an equation of order five: no difference up to order
-six means that they move together for ever.
+At u = u' = 0, and at u' = -1/p, where its force ends. Each body obeys m x'' + c x' + k x = f, so its derivatives follow
+from each other, and the first one in which arm and object differ decides. Their motion relative to each other obeys an
+equation of order five: no difference up to order six means that they move together for ever.
 """
 
 from __future__ import annotations
@@ -162,3 +162,40 @@ def parting_time(f: Array, plant: Plant, state: State, side: Body, work: Integer
             f[k] = -f[k]
     longest = short_time(plant, side)
     return 0.5 * min(first_rise(f, HIGHEST, min(longest, LONGEST), 0.0, work), longest)
+
+
+@kernel
+def surface_side(plant: Plant, state: State, side: Body) -> float:
+    """1 + p u', which is positive in contact; within its rounding, where no force acts, what moves u' first; or 0."""
+    factor = surface_factor(plant.pairs, state.y, side, SURFACE)
+    if factor != 0.0:
+        return float(factor)
+    push, pace = impact_beside(plant, state, side)
+    highest = HIGHEST if push == 0.0 and pace == 0.0 else NEXT  # of an impact no more is known
+    return float(first_difference(plant, state.y, side, push, pace, highest).value)
+
+
+@kernel
+def stays(plant: Plant, state: State, side: Body) -> bool:
+    """Whether the bodies of a pair never move apart or together by themselves, but for its u'."""
+    return bool(own_difference(plant, state.y, side).order == NEVER)
+
+
+@kernel
+def glides(plant: Plant, state: State, side: Body) -> bool:
+    """Whether nothing moves a pair off u' = -1/p: neither its own motion nor the other pair, which will not push.
+
+    That one is without force, or glides as well: in a symmetric grasp both are treated alike at one instant.
+    """
+    beside = other(side)
+    if not stays(plant, state, side):
+        return False
+    if state.mode[beside] == Pair.CONTACT and surface_factor(plant.pairs, state.y, beside, SURFACE) != 0.0:
+        return False
+    return state.mode[beside] not in (Pair.CONTACT, Pair.CLAMPED) or stays(plant, state, beside)
+
+
+@kernel
+def has_glided(plant: Plant, state: State, side: Body, roundings: float) -> bool:
+    """Whether a pair is at u' = -1/p but for some roundings, and nothing moves it off."""
+    return surface_factor(plant.pairs, state.y, side, roundings) == 0.0 and bool(glides(plant, state, side))
