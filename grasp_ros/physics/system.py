@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.control import ControlLaw, feedback
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Arm, Array, Grasp, impact_force_of
+from grasp_ros.physics.model import Arm, Array, impact_force_of
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
@@ -73,17 +73,6 @@ class System:
     delay: int = 0
     sampled: bool = False
     caveats: list[str] = field(default_factory=list)
-
-    @staticmethod
-    def of(grasp: Grasp, state: Array) -> System:
-        """The paper's grasp."""
-        system = System(state=np.asarray(state, dtype=float))
-        for side, arm in ((LEFT, grasp.left), (RIGHT, grasp.right)):
-            system.bodies[side, : Of.FORCE] = arm.mass, arm.stiffness, arm.damping
-            system.laws[side] = ControlLaw(arm.position_gain, arm.velocity_gain)
-        system.bodies[OBJECT, Of.MASS] = grasp.object_mass
-        system.pairs[:] = grasp.left_contact, grasp.right_contact
-        return system
 
     @property
     def present(self) -> list[int]:
@@ -143,19 +132,6 @@ class System:
         u, u_rate = (state[COLUMN[front] + part] - state[COLUMN[back] + part] for part in (0, 1))
         hertzian, dissipation = self.pairs[side].tolist()
         return impact_force_of(hertzian, dissipation, u, u_rate)
-
-    def commands(self, tick: int, state: Array) -> Array:
-        """What the controllers answer to the state of a tick, in N by body; 0 without a controller.
-
-        Parameters
-        ----------
-        tick : int
-        state : array (6,)
-        """
-        forces = np.zeros(3)
-        for side, law in self.laws.items():
-            forces[side] = law.command(tick, *state[COLUMN[side] : COLUMN[side] + 2].tolist())
-        return forces
 
     def feedback(self, state: Array) -> Array:
         """Continuous feedback (n, 2) of the left and the right arm in N, (4), (5), for states (n, 6)."""
