@@ -168,7 +168,7 @@ class Recording(Tabular, Frozen):
         if self.scene.system.delay:
             numbers["loop.delay_ticks"] = 0  # the forces have been delayed
         laws = {side: _recorded(acted[:, body]) for side, body in SIDES.items() if body in self.scene.system.laws}
-        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, accuracy=self.running.accuracy)
+        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
 
     @property
     def whole(self) -> bool:

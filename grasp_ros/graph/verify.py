@@ -131,7 +131,7 @@ def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool
     """Whether the scene with its own laws has the recorded states and commands, without a graph."""
     if not recording.running.lockstep or len(recording.starts) > 1 or any(found.differs for found in answers.values()):
         return None
-    run = simulate(recording.scene, sampled=True, grid=recording.t, accuracy=recording.running.accuracy,
+    run = simulate(recording.scene, sampled=True, grid=recording.t, setting=recording.running.accuracy,
                    changes=recording.changes)
     return run.state.tobytes() == recording.state.tobytes() and run.command.tobytes() == recording.command.tobytes()
 

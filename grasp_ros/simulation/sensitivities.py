@@ -31,7 +31,7 @@ def with_derivatives(chunk: Chunk, variants: Variants, setup: Setup, keys: Seque
         scene = variants.row(i)
         try:
             found = differentiate(simulate(
-                scene, grid=np.array([scene.duration]), sampled=setup.sampled, accuracy=setup.accuracy,
+                scene, grid=np.array([scene.duration]), sampled=setup.sampled, setting=setup.accuracy,
                 max_events=setup.max_events, max_work=setup.max_work), keys)
         except Refused as refusal:
             stops[i] = str(refusal)

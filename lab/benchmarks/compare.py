@@ -83,8 +83,8 @@ def prepare(row: Row) -> tuple[Callable[[], Any], Measured]:
         return run, {"state": state(run()).tolist()}
     from grasp_ros.simulation import Setup, ensemble
 
-    truth = state(simulate(scene, grid=end, accuracy=FINEST))
-    errors = ((float(np.abs(state(simulate(scene, grid=end, accuracy=a)) - truth).max()), a) for a in LADDER)
+    truth = state(simulate(scene, grid=end, setting=FINEST))
+    errors = ((float(np.abs(state(simulate(scene, grid=end, setting=a)) - truth).max()), a) for a in LADDER)
     error, accuracy = next(pair for pair in errors if pair[0] <= ERROR)
     numbers = {f"{section}.{key}": value for section, keys in scene.values.items() if section != "time"
                for key, value in keys.items() if isinstance(value, float) and value}

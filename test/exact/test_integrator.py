@@ -136,7 +136,7 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
     assert table.done.all()
     for name, setting in (("exact", np.float32(1e-6)), ("rk4", 1), ("paper", 1), ("discrete_gradient", np.float32(1))):
         simulate(scene, method=name, setting=setting, grid=grid)
-    simulate(scene, sampled=True, accuracy=np.float32(1e-6), max_work=np.int32(10**8), grid=grid)
+    simulate(scene, sampled=True, setting=np.float32(1e-6), max_work=np.int32(10**8), grid=grid)
     assert compiled() == known
     assert len(advance.signatures) == 1
 

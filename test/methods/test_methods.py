@@ -113,7 +113,7 @@ def test_exact_is_the_default_and_its_setting_is_the_accuracy() -> None:
     assert plain.method == EXACT
     assert plain.state.tobytes() == named.state.tobytes()
     coarse = simulate(scene, method=EXACT, setting=1e-6)
-    assert coarse.state.tobytes() == simulate(scene, accuracy=1e-6).state.tobytes()
+    assert coarse.state.tobytes() == simulate(scene, setting=1e-6).state.tobytes()
     assert coarse.state.tobytes() != plain.state.tobytes()
 
 
