@@ -50,11 +50,8 @@ class Number(NamedTuple):
 def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Number, ...]:
     """The free numbers, with the values of the scene as starts.
 
-    Raises
-    ------
-    Refused
-        If a key is given twice, not in the scene, does not enter smoothly, or starts from 0 where only positive
-        numbers are allowed.
+    Refused: a key that is given twice, is not in the scene, does not enter smoothly, or starts from 0 where only
+    positive numbers are allowed.
     """
     twice = [key for place, key in enumerate(keys) if key in keys[:place]]
     if twice:

@@ -52,13 +52,7 @@ class Axis(NamedTuple):
 
 
 def read_axis(option: str, text: str, grid: bool = True) -> Axis:
-    """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid.
-
-    Raises
-    ------
-    Refused
-        If it is written otherwise.
-    """
+    """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid. Another text is refused."""
     allowed = (
         "allowed: section.key=low:high, keys of one value joined by +, :n behind it for 2 to"
         f" {MOST:,} values, and :log behind that for a scale > 0"
@@ -159,13 +153,7 @@ class Plan:
 
 
 def check(plan: Plan) -> None:
-    """Refuse a setup that the scene has not, axes that it has not, or whose ends it refuses.
-
-    Raises
-    ------
-    Refused
-        Names what is wrong.
-    """
+    """Refuse a setup that the scene has not, axes that it has not, or whose ends it refuses."""
     check_setup(plan.scene, plan.setup)
     names = [key for axis in plan.axes for key in axis.keys]
     if not names or len(set(names)) < len(names):

@@ -66,10 +66,7 @@ def feedback(row: Any, x: Any, v: Any) -> Any:
 def command_of(answer: object, who: str, tick: int, time: float) -> float:
     """The command in N that a law of the user's own has answered with.
 
-    Raises
-    ------
-    Refused
-        If it is not a finite number; `who` is what the refusal begins with.
+    What is no finite number is refused; `who` is what the refusal begins with.
     """
     try:
         force = float(answer) if isinstance(answer, Real) else math.nan
