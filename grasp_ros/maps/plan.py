@@ -82,8 +82,6 @@ class Plan:
     sample : int
         Rows of a sample; 0: a grid.
     seed : int
-    quasi : bool
-        Whether the sample is a scrambled Sobol sequence instead of independent numbers.
     """
 
     scene: Scene
@@ -91,7 +89,6 @@ class Plan:
     axes: tuple[Axis, ...]
     sample: int = 0
     seed: int = 0
-    quasi: bool = True
 
     def __post_init__(self) -> None:
         """Numbers of Python's own, which a file takes."""
@@ -99,7 +96,7 @@ class Plan:
             Axis(name, number(f"{name}: low", low), number(f"{name}: high", high), whole(f"{name}: points", points, 2),
                  truth(f"{name}: log", log)) for name, low, high, points, log in self.axes)
         own = {"setup": checked(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
-               "seed": whole("seed", self.seed, 0), "quasi": truth("quasi", self.quasi)}
+               "seed": whole("seed", self.seed, 0)}
         for name, value in own.items():
             object.__setattr__(self, name, value)
 
@@ -125,14 +122,12 @@ class Plan:
 
     @cached_property
     def _sample(self) -> Array:
-        """Values (n, axes)."""
-        n, k = self.sample, len(self.axes)
-        if self.quasi:
-            from scipy.stats import qmc
+        """Values (n, axes): a scrambled Sobol sequence."""
+        from scipy.stats import qmc
 
-            parts = qmc.Sobol(k, rng=np.random.default_rng(self.seed)).random(2 ** max(math.ceil(math.log2(n)), 0))[:n]
-        else:
-            parts = np.random.default_rng(self.seed).random((n, k))
+        n = self.sample
+        sequence = qmc.Sobol(len(self.axes), rng=np.random.default_rng(self.seed))
+        parts = sequence.random(2 ** max(math.ceil(math.log2(n)), 0))[:n]
         return np.stack([axis.at(parts[:, i]) for i, axis in enumerate(self.axes)], axis=1)
 
     def to_document(self) -> dict[str, Any]:
@@ -140,7 +135,6 @@ class Plan:
         return {
             "scene_name": self.scene.name, "scene": self.scene.to_yaml(), "setup": self.setup._asdict(),
             "axes": [axis._asdict() for axis in self.axes], "sample": self.sample, "seed": self.seed,
-            "quasi": self.quasi,
         }
 
     @staticmethod
@@ -149,7 +143,7 @@ class Plan:
         setup = Setup(**{**document["setup"], "outcomes": tuple(document["setup"]["outcomes"])})
         scene = scenes.parse(document["scene"], document["scene_name"], document["scene_name"])
         axes = tuple(Axis(**axis) for axis in document["axes"])
-        return Plan(scene, setup, axes, document["sample"], document["seed"], document["quasi"])
+        return Plan(scene, setup, axes, document["sample"], document["seed"])
 
 
 def check(plan: Plan) -> None:

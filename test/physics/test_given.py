@@ -132,7 +132,6 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda setup: ensemble(CASE, {}, setup=setup), {}, "setup: dict"),
     (lambda outcomes: ensemble(CASE, {}, outcomes), 3, "outcomes: 3"),
     (lambda sampled: ensemble(CASE, {}, setup=Setup(sampled=sampled)), "no", "sampled: 'no'"),
-    (lambda quasi: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0),), 9, quasi=quasi), "no", "quasi: 'no'"),
     (lambda log: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0, log=log),)), "no", f"{GAIN}: log: 'no'"),
     (lambda sampled: simulate(CASE, sampled=sampled), "no", "sampled: 'no'"),
     (lambda changes: simulate(CASE, changes=changes), [1], "changes: [1]"),
