@@ -71,23 +71,12 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that the numbers of a map depend on.
-
-    Attributes
-    ----------
-    scene : Scene
-    setup : Setup
-    axes : tuple of Axis
-        Of a grid: y and x, or x alone; of a sample: any number.
-    sample : int
-        Rows of a sample; 0: a grid.
-    seed : int
-    """
+    """All that the numbers of a map depend on."""
 
     scene: Scene
     setup: Setup
-    axes: tuple[Axis, ...]
-    sample: int = 0
+    axes: tuple[Axis, ...]  # of a grid: y and x, or x alone; of a sample: any number
+    sample: int = 0  # rows of a sample; 0: a grid
     seed: int = 0
 
     def __post_init__(self) -> None:

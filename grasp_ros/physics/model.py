@@ -63,15 +63,7 @@ def hertzian_force(contact: Contact, u: Array) -> Array:
 
 
 def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
-    """Impact force fw in N, never negative: the Hunt-Crossley law (6), (7), cut off by (10).
-
-    Parameters
-    ----------
-    contact : Contact
-    u : array, m
-        Penetration (8); negative is a gap.
-    u_rate : array, m/s
-    """
+    """Impact force fw >= 0 in N, of u in m and u' in m/s: the Hunt-Crossley law (6), (7), cut off by (10)."""
     force = damping_factor(contact.dissipation, u_rate) * hertzian_force(contact, u)
     return np.where(in_contact(contact, u, u_rate), force, 0.0)
 

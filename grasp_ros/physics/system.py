@@ -41,38 +41,18 @@ class ExternalForce(NamedTuple):
 
 @dataclass
 class System:
-    """A scene as arrays.
+    """A scene as arrays."""
 
-    Attributes
-    ----------
-    bodies : array (3, 4)
-        Mass, stiffness, damping and constant force of every body by itself, see `layout`; mass 0: no such body.
-    pairs : array (2, 2)
-        H and p of every pair; H = 0: no such pair.
-    state : array (6,), m and m/s
-        At t = 0; 0 for what is not there.
-    coulomb : float, N
-        Dry friction of the object.
-    laws : dict of int to ControlLaw
-        Controllers by side.
-    external : list of ExternalForce
-    delay : int
-        Control periods from a state to the command that answers it.
-    sampled : bool
-        Whether commands are held over control periods; otherwise the feedback acts continuously.
-    caveats : list of str
-        Why V_c may rise in this scene.
-    """
-
+    # of every body by itself, see `layout`; mass 0: no such body
     bodies: Array = field(default_factory=lambda: np.zeros((3, 4)))
-    pairs: Array = field(default_factory=lambda: np.zeros((2, 2)))
-    state: Array = field(default_factory=lambda: np.zeros(6))
-    coulomb: float = 0.0
-    laws: dict[int, ControlLaw] = field(default_factory=dict)
+    pairs: Array = field(default_factory=lambda: np.zeros((2, 2)))  # H and p; H = 0: no such pair
+    state: Array = field(default_factory=lambda: np.zeros(6))  # at t = 0, m and m/s; 0 for what is not there
+    coulomb: float = 0.0  # dry friction of the object, N
+    laws: dict[int, ControlLaw] = field(default_factory=dict)  # controllers by side
     external: list[ExternalForce] = field(default_factory=list)
-    delay: int = 0
-    sampled: bool = False
-    caveats: list[str] = field(default_factory=list)
+    delay: int = 0  # control periods from a state to the command that answers it
+    sampled: bool = False  # whether commands are held over control periods; otherwise the feedback acts continuously
+    caveats: list[str] = field(default_factory=list)  # why V_c may rise
 
     @property
     def present(self) -> list[int]:
