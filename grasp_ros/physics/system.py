@@ -20,6 +20,7 @@ from grasp_ros.physics.model import Arm, Array, impact_force_of
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
+Place = tuple[str, int, int]  # array of a system, row, column
 COLUMN: dict[int, int] = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of the position in a state (6,); the velocity is the next
 
 
@@ -53,6 +54,17 @@ class System:
     delay: int = 0  # control periods from a state to the command that answers it
     sampled: bool = False  # whether commands are held over control periods; otherwise the feedback acts continuously
     caveats: list[str] = field(default_factory=list)  # why V_c may rise
+
+    def put(self, place: Place, number: float) -> None:
+        """Write a number of a scene into its place; the first one of a controller makes its law."""
+        array, row, column = place
+        if array == "coulomb":
+            self.coulomb = number
+        elif array == "laws":
+            self.laws.setdefault(row, ControlLaw(0.0, 0.0)).row[column] = number
+        else:
+            rows = getattr(self, array)
+            rows.reshape(len(rows), -1)[row, column] = number
 
     @property
     def present(self) -> list[int]:
