@@ -144,7 +144,7 @@ def test_a_closed_output_is_no_traceback(program: str) -> None:
     assert "Exception" not in result.stderr
 
 
-@pytest.mark.parametrize("words", ["--help", "simulate --help", "scenes", "new -o - -q"])
+@pytest.mark.parametrize("words", ["--help", "simulate --help", "scenes", "new - -q"])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_an_output_that_cannot_be_written_is_no_success(words: str, unbuffered: str) -> None:
     result = shell(f"$GRASP {words} > /dev/full", PYTHONUNBUFFERED=unbuffered)
