@@ -75,7 +75,7 @@ def ran(program: list[str]) -> subprocess.CompletedProcess[str]:
         ("simulate bytes.yaml", "bytes.yaml: 'utf-8' codec can't decode byte 0xff"),
         ("simulate deep.yaml", "deep.yaml: line 1: nested too deeply"),
         ("simulate tag.yaml", "tag.yaml: line 1: a tag, tag:yaml.org,2002:bool; allowed: none"),
-        ("simulate digits.yaml", "digits.yaml: readings: "),
+        ("simulate digits.yaml", "digits.yaml: time: missing"),
         ("simulate merge.yaml", "merge.yaml: <<: unknown key with the value {'title': 'x'}; allowed: title"),
         ("simulate date.yaml", "date.yaml: readings: missing; allowed"),
         ("simulate case_01 --set left_arm.mass_kg=0", "left_arm.mass_kg: 0 is not allowed; allowed: a number >= 1e-12"),
