@@ -74,8 +74,8 @@ def prepare(row: Row) -> tuple[Callable[[], Any], Measured]:
         scene = scenes.load(row.scene)  # the checkout's own, where it cannot read this one
     end, grid = np.array([scene.duration]), np.linspace(0.0, scene.duration, OUTPUTS)
     ways: dict[str, dict[str, Any]] = {
-        "last, 1e-9": {"grid": end, "accuracy": 1e-9}, "last, finest": {"grid": end, "accuracy": FINEST},
-        "outputs": {"grid": grid, "accuracy": FINEST}, "sampled": {"sampled": True},
+        "last, 1e-9": {"grid": end, "setting": 1e-9}, "last, finest": {"grid": end, "setting": FINEST},
+        "outputs": {"grid": grid, "setting": FINEST}, "sampled": {"sampled": True},
         **{method: {"method": method, "setting": setting} for method, setting in METHODS.items()},
     }
     if row.how in ways:
