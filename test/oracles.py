@@ -16,10 +16,10 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics import energy as certificate
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import Transition
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp
-from grasp_ros.physics.system import System
+from grasp_ros.physics.model import Arm, Array, Contact
 from lab.oracles.closed_forms import Balance, Impact, balance, first_touch_from_rest, flight, impact, reduced_mass
 from lab.reference import Reference, integrate
+from lab.reference.grasp import Grasp, grasp_of, system_of
 
 __all__ = ["Balance", "Impact", "first_touch_from_rest", "flight", "impact", "reduced_mass"]  # for the tests
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
@@ -31,7 +31,7 @@ CASES = [f"case_{number:02d}" for number in range(1, 12)]
 
 def energy(grasp: Grasp, state: Array) -> certificate.Energy:
     """V, V_c, V' and mode of the paper's grasp."""
-    return certificate.energy(System.of(grasp, np.zeros(6)), state)
+    return certificate.energy(system_of(grasp, np.zeros(6)), state)
 
 
 def make_grasp(
@@ -64,7 +64,7 @@ def reference_of(name: str, horizon: float, points: int = 201) -> Reference:
     """The reference of a scene's binary floats on an equidistant grid."""
     scene = scenes.load(name)
     times = np.linspace(0.0, horizon, points).tolist()
-    return integrate(scene.grasp, scene.initial_state.tolist(), times, digits=25)
+    return integrate(grasp_of(scene), scene.initial_state.tolist(), times, digits=25)
 
 
 # Balances of momentum and energy, O3.
@@ -84,7 +84,7 @@ class Run(NamedTuple):
 def run(grasp: Grasp, state: Any, duration: float, grid: Any = None, **options: Any) -> Run:
     """Integrate with continuous feedback (unless told otherwise) over one horizon."""
     options = {"continuous": True, "accuracy": ACCURACY, **options}
-    integrator = Integrator(System.of(grasp, np.asarray(state, dtype=float)), **options)
+    integrator = Integrator(system_of(grasp, np.asarray(state, dtype=float)), **options)
     return Run(integrator, integrator.advance(duration, None if grid is None else np.asarray(grid)))
 
 
@@ -102,5 +102,5 @@ def done(result: Run) -> Integrator:
 def balance_of(grasp: Grasp, state: Any, duration: float, **options: Any) -> Balance:
     """O3 along one trajectory with continuous feedback."""
     events = [event.time for event in run(grasp, state, duration, **options).integrator.events]
-    system = System.of(grasp, np.asarray(state, dtype=float))
+    system = system_of(grasp, np.asarray(state, dtype=float))
     return balance(system, duration, events, lambda grid: run(grasp, state, duration, grid, **options).states)

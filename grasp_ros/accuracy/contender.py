@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -56,11 +55,7 @@ def own_contenders(scene: Scene) -> tuple[list[Contender], dict[str, str]]:
 
 
 def simulated(name: str, scene: Scene, setting: float) -> Solve:
-    """A method of `grasp simulate` as a contender builds it; ImportError if its package is not installed."""
-    package = METHODS[name].package
-    if package is not None and importlib.util.find_spec(package) is None:
-        raise ImportError(package)
-
+    """A method of `grasp simulate` as a contender builds it."""
     def solve(grid: Array) -> Answer:
         run = simulate(scene, grid=grid, method=name, setting=setting)
         left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))

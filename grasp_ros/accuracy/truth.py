@@ -37,11 +37,11 @@ class Truth(NamedTuple):
 def finest(scene: Scene) -> Truth:
     """The motion of a scene to its end, and how well it is known."""
     grid = np.linspace(0.0, scene.duration, GRID_POINTS)
-    run = simulate(scene, grid=grid, accuracy=FINEST)
+    run = simulate(scene, grid=grid, setting=FINEST)
     if run.status is not Status.DONE:
         raise Refused(f"{scene.name}: {run.stop}; allowed here: a scene that runs to its end")
-    apart = [distance(run, simulate(scene, grid=grid, accuracy=FINER * FINEST).state) / FINER, *(
-        distance(run, simulate(_beside(scene, section), grid=grid, accuracy=FINEST).state)
+    apart = [distance(run, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER, *(
+        distance(run, simulate(_beside(scene, section), grid=grid, setting=FINEST).state)
         for section in SECTIONS.values() if section in scene.values)]
     left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     return Truth(grid, run.state, (left, right), max(apart))

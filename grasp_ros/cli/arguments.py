@@ -79,6 +79,11 @@ def add_output(sub: Options, metavar: str, text: str, default: Path | None = Non
 def add_file(sub: Options, metavar: str, text: str) -> None:
     """A file to write, or - for the standard output, and whether one that is there may be replaced."""
     add_output(sub, metavar, text, kind=Path)
+    add_force(sub)
+
+
+def add_force(sub: Options) -> None:
+    """Whether a file that is there may be replaced."""
     sub.add_argument("--force", action="store_true", help="replace the output file if it is there")
 
 

@@ -37,9 +37,8 @@ def add_to(commands: Any) -> None:
     sub.add_argument("--y", metavar=RANGE, help="number up the map")
     sub.add_argument("--vary", action="append", default=[], metavar="KEY[+KEY]=low:high[::log]",
                      help="one more number of a sample; keys of one value are joined by +")
-    sub.add_argument("--sample", type=whole(1), default=0, metavar="N", help="N rows at random instead of a grid")
+    sub.add_argument("--sample", type=whole(1), default=0, metavar="N", help="N rows at random, a Sobol sequence")
     sub.add_argument("--seed", type=whole(0), default=0, metavar="S", help="of the sample (default 0)")
-    sub.add_argument("--independent", action="store_true", help="independent numbers instead of a Sobol sequence")
     sub.add_argument("--outcome", action="append", default=[], metavar="NAME",
                      help=f"one of {', '.join(GROUPS)}, or a column of one (default settling_time and touches)")
     sub.add_argument("--settled", type=float, default=SETTLED, metavar="PART", help="part of the largest initial"
@@ -72,12 +71,12 @@ def _run(options: argparse.Namespace) -> int:
     axes = tuple(read_axis(option, text, grid=not options.sample) for option, text in given if text is not None)
     if options.vary and not options.sample:
         raise Refused("--vary: allowed: with --sample N; a map has --x and --y")
-    if (options.seed or options.independent) and not options.sample:
-        raise Refused("--seed, --independent: allowed: with --sample N, which draws at random")
+    if options.seed and not options.sample:
+        raise Refused("--seed: allowed: with --sample N, which draws at random")
     outcomes = tuple(options.outcome) or Setup().outcomes
     setup = Setup(outcomes, options.accuracy, options.sampled, options.settled, options.horizons, options.max_events,
                   options.max_work)
-    plan = Plan(scene, setup, axes, options.sample, options.seed, not options.independent)
+    plan = Plan(scene, setup, axes, options.sample, options.seed)
     check(plan)
     prepare()
     with bar(plan.rows, "run", scene.name) as progress:

@@ -7,10 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from grasp_ros import scene as scenes
-from grasp_ros.cli.arguments import add_command, add_file, add_json, add_settings, complete_scenes
+from grasp_ros.cli.arguments import add_command, add_force, add_json, add_settings, complete_scenes
 from grasp_ros.cli.checks import check_output, load_scene
 from grasp_ros.cli.output import destination, show
-from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.commented import commented
 from grasp_ros.scene.files import YAML
 from grasp_ros.scene.library import text_of
@@ -24,11 +23,12 @@ def add_to(commands: Any) -> None:
     complete_scenes(sub.add_argument("scene", nargs="?", help="print this one, as a file, with its comments"))
     add_json(sub)
     sub = add_command(commands, "new", _new)
-    sub.add_argument("file", metavar="FILE.yaml", type=Path, nargs="?", help="new file; its name is that of the scene")
     complete_scenes(sub.add_argument("--like", metavar="SCENE", default=DEFAULT,
                                      help=f"what it begins with (default {DEFAULT})"))
     add_settings(sub)
-    add_file(sub, "FILE.yaml", "the same as FILE.yaml; - is the standard output")
+    sub.add_argument("file", metavar="FILE.yaml", type=Path,
+                     help="new file, whose name is that of the scene; - is the standard output")
+    add_force(sub)
 
 
 def _scenes(options: argparse.Namespace) -> int:
@@ -47,11 +47,8 @@ def _scenes(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
-    if (options.file is None) == (options.output is None):
-        raise Refused("new: allowed: one FILE.yaml to write, or -o - for the standard output")
-    output: Path = options.file or options.output
-    check_output(output, YAML, options.force)
+    check_output(options.file, YAML, options.force)
     text = commented(load_scene(options.like, options.settings))
-    with destination(output) as file:
+    with destination(options.file) as file:
         file.write(text.encode())
     return 0

@@ -21,13 +21,7 @@ HINT = "Space pause   ← → step   q quit"
 def play(recording: Recording, rate: float, first: float | None = None) -> None:
     """Draw a recording as time goes by; the last picture stays. On a terminal keys pause, step and end it.
 
-    Parameters
-    ----------
-    recording : Recording
-    rate : float
-        Seconds of the recording in a second.
-    first : float, s, optional
-        Where it begins; default: at the first tick.
+    `rate` is in seconds of the recording in a second; `first` is where it begins, in s, by default at the first tick.
     """
     times = recording.t
     first = float(times[0]) if first is None else first

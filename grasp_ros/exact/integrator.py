@@ -22,8 +22,8 @@ from grasp_ros.physics.accuracy import ACCURACY, check_accuracy
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import number, whole
-from grasp_ros.physics.layout import Filled, Of, Outcome, U, Work, X
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.layout import Filled, Law, Of, Outcome, U, Work, X
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 
 MAX_EVENTS, MAX_WORK = 10**7, 10**8  # budgets; the second lasts for a minute or a few
@@ -260,6 +260,6 @@ def _block_of(bodies: Array, pairs: Array, coulomb: float) -> Array:
 @compiling
 def compile_kernels() -> None:
     """Compile the kernels, or load them from disk, by integrating over no time at all."""
-    arm = Arm(1.0, 1.0, 0.0, 0.0, 0.0)
-    contact = Contact(1.0, 0.0)
-    Integrator(System.of(Grasp(arm, arm, contact, contact, 1.0), np.zeros(6)), continuous=False).advance(0.0)
+    system = System()
+    system.bodies[:, Of.MASS], system.pairs[:, Law.HERTZIAN] = 1.0, 1.0
+    Integrator(system, continuous=False).advance(0.0)

@@ -169,7 +169,7 @@ class Recording(Tabular, Frozen):
         forces = np.vstack([acted[:-1], np.zeros(2)]).T.tolist()  # from the last tick on nothing acts
         laws = {side: partial(_recorded, forces[body]) for side, body in SIDES.items()
                 if body in self.scene.system.laws}
-        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, accuracy=self.running.accuracy)
+        return simulate(self.scene.changed(numbers), sampled=True, controllers=laws, setting=self.running.accuracy)
 
     @property
     def whole(self) -> bool:

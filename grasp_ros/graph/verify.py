@@ -134,7 +134,7 @@ def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool
     others = any(found.differs or found.commands < len(recording.tick) for found in answers.values())
     if others or not recording.running.lockstep or len(recording.starts) > 1:
         return None
-    run = simulate(recording.scene, sampled=True, grid=recording.t, accuracy=recording.running.accuracy,
+    run = simulate(recording.scene, sampled=True, grid=recording.t, setting=recording.running.accuracy,
                    changes=recording.changes)
     return run.state.tobytes() == recording.state.tobytes() and run.command.tobytes() == recording.command.tobytes()
 

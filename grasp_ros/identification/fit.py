@@ -60,7 +60,7 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
                       " controllers or external forces")
     for key in against:
         if key not in free or key.startswith("offset."):
-            raise Refused(f"--against {key}: allowed: a number of the scene that is free")
+            raise Refused(f"against: {key}: allowed: a number of the scene that is free")
     samples = len(found.t) * len(found.channels)
     if samples < len(numbers) + FEWEST:
         raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"

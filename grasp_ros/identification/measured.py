@@ -63,12 +63,8 @@ class Measured(NamedTuple):
 def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> Measured:
     """A motion from what holds it; a scene replaces that of the source, and a table must have one.
 
-    By sensors: what those of the scene have measured, in place of the exact states of a bag.
-
-    Raises
-    ------
-    Refused
-        If the source cannot be read, holds too little, or holds what is no number.
+    By sensors: what those of the scene have measured, in place of the exact states of a bag. A source that cannot be
+    read, holds too little, or holds what is no number, is refused.
     """
     if not isinstance(source, (Recording, Trajectory)):
         path = Path(given.instance("data", source, (str, os.PathLike), "a path, a Recording or a Trajectory"))

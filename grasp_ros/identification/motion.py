@@ -24,11 +24,7 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     """States (rows, 6) at the first times of a measurement, their derivatives (rows, 6, n), and touches (k, 2).
 
     A touch is its time in s and its side. Recorded inputs act as they were; without them the controllers of the scene.
-
-    Raises
-    ------
-    Refused
-        If the run does not get there.
+    A run that does not get there is refused.
     """
     if data.inputs is None:
         return _closed_loop(data, scene, keys, data.t[:rows])

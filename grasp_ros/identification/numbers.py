@@ -50,17 +50,14 @@ class Number(NamedTuple):
 def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Number, ...]:
     """The free numbers, with the values of the scene as starts.
 
-    Raises
-    ------
-    Refused
-        If a key is given twice, not in the scene, does not enter smoothly, or starts from 0 where only positive
-        numbers are allowed.
+    Refused: a key that is given twice, is not in the scene, does not enter smoothly, or starts from 0 where only
+    positive numbers are allowed.
     """
     twice = [key for place, key in enumerate(keys) if key in keys[:place]]
     if twice:
-        raise Refused(f"--free {twice[0]}: given twice")
+        raise Refused(f"free: {twice[0]}: given twice")
     if all(key.startswith(OFFSET) for key in keys):
-        raise Refused(f"--free: {', '.join(keys) or 'nothing'}; allowed: at least one number of the scene, such as"
+        raise Refused(f"free: {', '.join(keys) or 'nothing'}; allowed: at least one number of the scene, such as"
                       " left_contact.hertz_N_per_m1_5")
     return tuple(_offset(key, data) if key.startswith(OFFSET) else _number(scene, key) for key in keys)
 
@@ -74,7 +71,7 @@ def acts(key: str) -> bool:
 def _offset(key: str, data: Measured) -> Number:
     known = [CHANNELS[place] for place in data.channels]
     if key.removeprefix(OFFSET) not in known:
-        raise Refused(f"--free {key}: not measured; {allowed(key, [OFFSET + name for name in known])}")
+        raise Refused(f"free: {key}: not measured; {allowed(key, [OFFSET + name for name in known])}")
     return Number(key, 0.0, False)
 
 
@@ -84,6 +81,6 @@ def _number(scene: Scene, key: str) -> Number:
     if parameter.low < 0.0:
         return Number(key, value, False, max(abs(value), 1.0))
     if value == 0.0:
-        raise Refused(f"--free {key}: the search starts from the scene's value, 0; allowed: a start > 0, as with"
+        raise Refused(f"free: {key}: the search starts from the scene's value, 0; allowed: a start > 0, as with"
                       f" --set {key}=VALUE")
     return Number(key, value, True)

@@ -43,23 +43,14 @@ class Problem(NamedTuple):
         return {number.key: float(number.at(own)) for number, own in zip(self.numbers, y.tolist(), strict=True)}
 
     def scene_at(self, y: Array) -> Scene:
-        """The scene with the free numbers.
-
-        Raises
-        ------
-        Refused
-            If they are outside its domain.
-        """
+        """The scene with the free numbers; outside its domain it is refused."""
         free = zip(self.numbers, self.values(y).items(), strict=True)
         return self.scene.changed({key: value for number, (key, value) in free if number.channel is None})
 
     def predict(self, y: Array, rows: int) -> tuple[Array, Array, Array]:
         """What is measured of the motion (rows, 6), its derivatives by y (rows, 6, n), and its touches.
 
-        Raises
-        ------
-        Refused
-            If the numbers are outside the domain, or the run does not get there.
+        Numbers outside the domain, and a run that does not get there, are refused.
         """
         keys = [number.key for number in self.numbers if number.channel is None]
         states, found, touches = motion(self.data, self.scene_at(y), keys, rows)
@@ -82,13 +73,7 @@ class Problem(NamedTuple):
 
 
 def search(problem: Problem) -> Array:
-    """The free numbers (n,) as y, from their starts.
-
-    Raises
-    ------
-    Refused
-        If the scene cannot be run as it is.
-    """
+    """The free numbers (n,) as y, from their starts; a scene that cannot be run as it is is refused."""
     begin = np.zeros(len(problem.numbers))
     problem.residuals(begin, FEWEST)  # a start that is refused says why
     best, least = begin, math.inf
@@ -122,10 +107,7 @@ def mean_square(problem: Problem, y: Array) -> float:
 def refine(problem: Problem, begin: Array, rows: int, enough: float = FINE) -> Array:
     """The next minimum of the sum of squares over the first rows, from y = begin (n,); `begin` if no motion gets there.
 
-    Parameters
-    ----------
-    enough : float
-        Relative change of the sum of squares at which it ends.
+    It ends where the sum changes by no more than `enough`, relative.
     """
     from scipy.optimize import least_squares
 
@@ -168,13 +150,7 @@ def _at_least(noise: Array, data: Measured) -> Array:
 
 
 def fitted(problem: Problem) -> tuple[Problem, Array]:
-    """The free numbers as y (n,), of a problem whose noise is that of the residuals.
-
-    Raises
-    ------
-    Refused
-        See `search`.
-    """
+    """The free numbers as y (n,), of a problem whose noise is that of the residuals; refused as in `search`."""
     y = search(problem)
     rows = len(problem.data.t)
     for _ in range(2):  # the weights of the channels, and the minimum that belongs to them

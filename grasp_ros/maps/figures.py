@@ -24,13 +24,7 @@ LOG_FROM = 1e3  # ratio of values from which on colours are those of their logar
 
 @canvas.style()
 def draw(data: Any, plan: Plan, outcome: str, path: Path) -> None:
-    """Draw one outcome: a heat map over two axes, a curve over one, a histogram and scatter of a sample.
-
-    Raises
-    ------
-    Refused
-        If the file cannot be written.
-    """
+    """Draw one outcome: a heat map over two axes, a curve over one, a histogram and scatter of a sample."""
     values = np.asarray(data[outcome].values)
     label = f"{outcome.replace('_', ' ')}, {data[outcome].attrs['units']}"
     if plan.sample:

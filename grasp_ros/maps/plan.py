@@ -52,13 +52,7 @@ class Axis(NamedTuple):
 
 
 def read_axis(option: str, text: str, grid: bool = True) -> Axis:
-    """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid.
-
-    Raises
-    ------
-    Refused
-        If it is written otherwise.
-    """
+    """An axis from "section.key[+section.key]=low:high[:n[:log]]"; n only of a grid. Another text is refused."""
     allowed = (
         "allowed: section.key=low:high, keys of one value joined by +, :n behind it for 2 to"
         f" {MOST:,} values, and :log behind that for a scale > 0"
@@ -77,27 +71,13 @@ def read_axis(option: str, text: str, grid: bool = True) -> Axis:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that the numbers of a map depend on.
-
-    Attributes
-    ----------
-    scene : Scene
-    setup : Setup
-    axes : tuple of Axis
-        Of a grid: y and x, or x alone; of a sample: any number.
-    sample : int
-        Rows of a sample; 0: a grid.
-    seed : int
-    quasi : bool
-        Whether the sample is a scrambled Sobol sequence instead of independent numbers.
-    """
+    """All that the numbers of a map depend on."""
 
     scene: Scene
     setup: Setup
-    axes: tuple[Axis, ...]
-    sample: int = 0
+    axes: tuple[Axis, ...]  # of a grid: y and x, or x alone; of a sample: any number
+    sample: int = 0  # rows of a sample; 0: a grid
     seed: int = 0
-    quasi: bool = True
 
     def __post_init__(self) -> None:
         """Numbers of Python's own, which a file takes."""
@@ -105,7 +85,7 @@ class Plan:
             Axis(name, number(f"{name}: low", low), number(f"{name}: high", high), whole(f"{name}: points", points, 2),
                  truth(f"{name}: log", log)) for name, low, high, points, log in self.axes)
         own = {"setup": checked(self.setup), "axes": axes, "sample": whole("sample", self.sample, 0),
-               "seed": whole("seed", self.seed, 0), "quasi": truth("quasi", self.quasi)}
+               "seed": whole("seed", self.seed, 0)}
         for name, value in own.items():
             object.__setattr__(self, name, value)
 
@@ -131,14 +111,12 @@ class Plan:
 
     @cached_property
     def _sample(self) -> Array:
-        """Values (n, axes)."""
-        n, k = self.sample, len(self.axes)
-        if self.quasi:
-            from scipy.stats import qmc
+        """Values (n, axes): a scrambled Sobol sequence."""
+        from scipy.stats import qmc
 
-            parts = qmc.Sobol(k, rng=np.random.default_rng(self.seed)).random(2 ** max(math.ceil(math.log2(n)), 0))[:n]
-        else:
-            parts = np.random.default_rng(self.seed).random((n, k))
+        n = self.sample
+        sequence = qmc.Sobol(len(self.axes), rng=np.random.default_rng(self.seed))
+        parts = sequence.random(2 ** max(math.ceil(math.log2(n)), 0))[:n]
         return np.stack([axis.at(parts[:, i]) for i, axis in enumerate(self.axes)], axis=1)
 
     def to_document(self) -> dict[str, Any]:
@@ -146,7 +124,6 @@ class Plan:
         return {
             "scene_name": self.scene.name, "scene": self.scene.to_yaml(), "setup": self.setup._asdict(),
             "axes": [axis._asdict() for axis in self.axes], "sample": self.sample, "seed": self.seed,
-            "quasi": self.quasi,
         }
 
     @staticmethod
@@ -155,17 +132,11 @@ class Plan:
         setup = Setup(**{**document["setup"], "outcomes": tuple(document["setup"]["outcomes"])})
         scene = scenes.parse(document["scene"], document["scene_name"], document["scene_name"])
         axes = tuple(Axis(**axis) for axis in document["axes"])
-        return Plan(scene, setup, axes, document["sample"], document["seed"], document["quasi"])
+        return Plan(scene, setup, axes, document["sample"], document["seed"])
 
 
 def check(plan: Plan) -> None:
-    """Refuse a setup that the scene has not, axes that it has not, or whose ends it refuses.
-
-    Raises
-    ------
-    Refused
-        Names what is wrong.
-    """
+    """Refuse a setup that the scene has not, axes that it has not, or whose ends it refuses."""
     check_setup(plan.scene, plan.setup)
     names = [key for axis in plan.axes for key in axis.keys]
     if not names or len(set(names)) < len(names):

@@ -22,25 +22,11 @@ def run(
     plan: Plan, path: str | os.PathLike[str], *, workers: int = 0, scheduler: str = "",
     progress: Callable[[int], object] | None = None,
 ) -> Store:
-    """Compute what a file does not have yet.
+    """Compute what a file does not have yet: a new directory, or the map of the same plan.
 
-    Parameters
-    ----------
-    plan : Plan
-    path : Path
-        A new directory, or the map of the same plan, which is completed.
-    workers : int
-        Processes of a Dask cluster that is started for it; 0: threads of this process.
-    scheduler : str
-        Address of a Dask scheduler that exists.
-    progress : callable, optional
-        Called with the number of rows that are done.
-
-    Raises
-    ------
-    Refused
-        If the plan cannot be run, the file is something else or cannot be written, or workers die again and again.
-        What is done is kept.
+    `workers` are processes of a Dask cluster that is started for it, 0: threads of this process; `scheduler` is the
+    address of one that exists. `progress` is told the number of rows that are done. Refused: a plan that cannot be run,
+    a file that is something else or cannot be written, workers that die again and again; what is done is kept.
     """
     check(plan)
     store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))

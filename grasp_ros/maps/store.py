@@ -29,20 +29,9 @@ ALL_FILES = {"array.write_empty_chunks": True}  # of zarr: by itself it leaves o
 
 
 class Store:
-    """The file of one plan.
+    """The file of one plan: a new directory, or the map of the same plan; anything else is refused.
 
-    Parameters
-    ----------
-    path : Path
-        A new directory, or the map of the same plan.
-    plan : Plan
-    rows : int
-        Rows of a chunk; of a new file only.
-
-    Raises
-    ------
-    Refused
-        If there is something else, or it cannot be written.
+    `rows` are those of a chunk, of a new file only.
     """
 
     def __init__(self, path: Path, plan: Plan, rows: int) -> None:
@@ -73,13 +62,7 @@ class Store:
         return [(i * size, min((i + 1) * size, self.plan.rows)) for i in _undone(self._group, self.path)]
 
     def write(self, span: Span, chunk: Chunk) -> None:
-        """Write a chunk.
-
-        Raises
-        ------
-        Refused
-            If it cannot be written; the chunk counts as not done.
-        """
+        """Write a chunk; if that cannot be done, which is refused, it counts as not done."""
         import zarr
 
         part = slice(span[0] // self._lines, span[1] // self._lines)
@@ -121,13 +104,7 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> No
 
 
 def open_group(path: Path, mode: str = "r") -> Any:
-    """The Zarr group of a map.
-
-    Raises
-    ------
-    Refused
-        If it is none, or damaged.
-    """
+    """The Zarr group of a map; what is none, or damaged, is refused."""
     import zarr
 
     with decoding(path, "a map", also=(AttributeError,)):
@@ -160,10 +137,7 @@ def _undone(group: Any, path: Path) -> list[int]:
 def read(path: str | os.PathLike[str]) -> Any:
     """A map as an `xarray.Dataset`; a chunk that is not done, or lacks a file, is nan and has the status -1.
 
-    Raises
-    ------
-    Refused
-        If it is no map, or damaged.
+    What is no map, or damaged, is refused.
     """
     import xarray
 

@@ -72,14 +72,8 @@ def mean_force(hertzian: float, loss: float, u0: float, u1: float, h: float) -> 
 def forces(q: Any, h: float, u_l: float, u_r: float, free_l: float, free_r: float, give: Any, work: Any) -> Any:
     """Mean impact forces of a step by Newton's method for the penetrations at its end; nan if it does not converge.
 
-    Parameters
-    ----------
-    u_l, u_r : float, m
-        At the beginning.
-    free_l, free_r : float, m
-        At the end, if nothing pushed.
-    give : tuple, m/N
-        By how much a unit of the left force, of the right force and of the other side's force moves them.
+    `u_l`, `u_r` are those at the beginning in m, `free_l`, `free_r` those at the end if nothing pushed; `give` in m/N
+    is by how much a unit of the left force, of the right force and of the other side's force moves them.
     """
     f_l, slope_l = mean_force(q[3], q[4], u_l, free_l, h)
     f_r, slope_r = mean_force(q[8], q[9], u_r, free_r, h)

@@ -37,23 +37,11 @@ class Found(NamedTuple):
 
 
 class Problem:
-    """A scene, its free numbers, outcomes to make small, and bounds.
+    """A scene, its free numbers with their ranges, outcomes to make small, and bounds; what cannot be is refused.
 
-    Parameters
-    ----------
-    scene : Scene
-    axes : sequence of Axis
-        Free numbers with their ranges; keys that are joined have one value. The search takes logarithmic ones as such.
-    minimise : sequence of str
-        One outcome or two, see `simulation.outcomes`; of a group the largest of its columns.
-    bounds : sequence of Bound
-    setup : Setup
-        How rows are run; its outcomes are those that are needed.
-
-    Raises
-    ------
-    Refused
-        If a number, a range, an outcome or a bound cannot be.
+    Keys of an axis that are joined have one value; the search takes logarithmic ranges as such. `minimise` names one
+    outcome or two, see `simulation.outcomes`, of a group the largest of its columns. `setup` says how rows are run; its
+    outcomes are those that are needed.
     """
 
     def __init__(self, scene: Scene, axes: Sequence[Axis], minimise: Sequence[str], bounds: Sequence[Bound] = (),
@@ -103,13 +91,7 @@ class Problem:
 
 
 def read_bound(text: str) -> Bound:
-    """A bound from "OUTCOME<=NUMBER".
-
-    Raises
-    ------
-    Refused
-        If it is written otherwise.
-    """
+    """A bound from "OUTCOME<=NUMBER"; another text is refused."""
     name, _, most = re.sub(r"\s", "", text).partition("<=")
     try:
         return Bound(name, read_number(most))

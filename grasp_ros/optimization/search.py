@@ -95,18 +95,8 @@ def design(
 def search(problem: Problem, seed: int = 0, progress: Told | None = None) -> Design:
     """Find the choice whose first outcome is smallest within the bounds.
 
-    Parameters
-    ----------
-    problem : Problem
-    seed : int
-        Of the search; where the best choice is unique every seed ends there.
-    progress : callable, optional
-        Called with the number of simulations so far.
-
-    Raises
-    ------
-    Refused
-        If no choice was found that keeps the bounds and has the outcome, or scipy is not installed.
+    Where the best choice is unique every seed ends there. `progress` is told the number of simulations so far. Refused:
+    no choice was found that keeps the bounds and has the outcome, or scipy is not installed.
     """
     with needing("`grasp design`", "design"):
         from scipy.optimize import differential_evolution
@@ -144,21 +134,7 @@ def front(problem: Problem, seed: int = 0, progress: Told | None = None) -> list
     """Choices none of which is better than another in both outcomes of a problem, from the first outcome's best on.
 
     Each has the smallest first outcome for a bound on the second one; the bounds are even between the two ends. Of
-    choices that are equal in both the first is kept.
-
-    Parameters
-    ----------
-    problem : Problem
-        With two outcomes to make small.
-    seed : int
-        Of every search.
-    progress : callable, optional
-        Called with the number of simulations so far.
-
-    Raises
-    ------
-    Refused
-        See `search`.
+    choices that are equal in both the first is kept. See `search`.
     """
     if len(problem.minimise) != 2:
         raise Refused(f"minimise: {', '.join(problem.minimise)}; allowed: two outcomes for a curve")

@@ -8,13 +8,7 @@ FINEST, COARSEST = 1e-16, 1e-3
 
 
 def check_accuracy(accuracy: float) -> float:
-    """An accuracy as the kernels take it.
-
-    Raises
-    ------
-    Refused
-        If it is no number, or outside its range.
-    """
+    """An accuracy as the kernels take it; what is no number, or outside the range, is refused."""
     found = number("accuracy", accuracy)
     if not FINEST <= found <= COARSEST:
         raise Refused(f"accuracy: {accuracy!r} is not allowed; allowed: {FINEST:g} to {COARSEST:g}")

@@ -66,10 +66,7 @@ def feedback(row: Any, x: Any, v: Any) -> Any:
 def command_of(answer: object, who: str, tick: int, time: float) -> float:
     """The command in N that a law of the user's own has answered with.
 
-    Raises
-    ------
-    Refused
-        If it is not a finite number; `who` is what the refusal begins with.
+    What is no finite number is refused; `who` is what the refusal begins with.
     """
     try:
         force = float(answer) if isinstance(answer, Real) else math.nan
@@ -104,18 +101,7 @@ def normals_over(seed: tuple[int, int], first: int, count: int) -> Array:
 class ControlLaw:
     """Linear state feedback around a set-point, with the sensor and the actuator of its arm.
 
-    Parameters
-    ----------
-    position_gain : float, N/m
-    velocity_gain : float, N s/m
-    set_point, feed_forward : float, m and N
-
-    Attributes
-    ----------
-    row : array, see `Column`
-        All numbers of the law.
-    seed : tuple of int, or None
-        What its noise is drawn from, seed and side; None: none is.
+    `row` holds all of its numbers, see `Column`; `seed`, of seed and side, is what its noise is drawn from, None: none.
     """
 
     def __init__(self, position_gain: float, velocity_gain: float, set_point: float = 0.0, feed_forward: float = 0.0

@@ -58,16 +58,10 @@ RANGES = {
 
 
 class Systems:
-    """Arrays of n systems, one a row, over one duration, and what the rules measure of them.
+    """Arrays of n systems, one a row, over one duration in s, and what the rules measure of them.
 
-    Parameters
-    ----------
-    bodies : array (n, 3, 4)
-        With the continuous feedback in them, see `System.closed_loop`; mass 0: no such body.
-    pairs : array (n, 2, 2)
-        See `System`.
-    state : array (n, 6), m and m/s
-    duration : float, s
+    Bodies (n, 3, 4) have the continuous feedback in them, see `System.closed_loop`, and mass 0 where there is none;
+    pairs are (n, 2, 2), states (n, 6) in m and m/s.
     """
 
     def __init__(self, bodies: Array, pairs: Array, state: Array, duration: float) -> None:

@@ -1,7 +1,8 @@
-"""The grasp of Fukuda, Shoji and Inaba (1990): equations of motion, control law, impact law, energy.
+"""The grasp of Fukuda, Shoji and Inaba (1990): an arm, a contact, penetrations and impact forces.
 
 Everything here is written with the paper's letters; every function works on scalars and on NumPy arrays.
 The integrators in this package do not call it, so that tests can hold their results against it.
+`lab.reference.grasp` has the equations of motion.
 
 The impact law, (6), (7), is that of Hunt and Crossley, see `impact_law`; how its p translates to the symbols of other
 authors stands in the notation, `grasp_ros.physics`.
@@ -42,16 +43,6 @@ class Contact(NamedTuple):
     dissipation: float  # p, s/m
 
 
-class Grasp(NamedTuple):
-    """Left arm, object and right arm on one line."""
-
-    left: Arm
-    right: Arm
-    left_contact: Contact
-    right_contact: Contact
-    object_mass: float  # m_o, kg
-
-
 class Mode(IntFlag):
     """Which pairs are in contact in the sense of (10)."""
 
@@ -59,11 +50,6 @@ class Mode(IntFlag):
     LEFT = 1
     RIGHT = 2
     BOTH = 3
-
-
-def feedback(arm: Arm, x: float, v: float) -> float:
-    """Input force of the linear state feedback in N, (4), (5)."""
-    return -arm.position_gain * x - arm.velocity_gain * v
 
 
 def in_contact(contact: Contact, u: Array, u_rate: Array) -> NDArray[np.bool_]:
@@ -77,15 +63,7 @@ def hertzian_force(contact: Contact, u: Array) -> Array:
 
 
 def impact_force(contact: Contact, u: Array, u_rate: Array) -> Array:
-    """Impact force fw in N, never negative: the Hunt-Crossley law (6), (7), cut off by (10).
-
-    Parameters
-    ----------
-    contact : Contact
-    u : array, m
-        Penetration (8); negative is a gap.
-    u_rate : array, m/s
-    """
+    """Impact force fw >= 0 in N, of u in m and u' in m/s: the Hunt-Crossley law (6), (7), cut off by (10)."""
     force = damping_factor(contact.dissipation, u_rate) * hertzian_force(contact, u)
     return np.where(in_contact(contact, u, u_rate), force, 0.0)
 
@@ -100,19 +78,3 @@ def penetration(state: Array) -> tuple[Array, Array, Array, Array]:
     """u_l, u_l', u_r, u_r' of states (..., 6): (8)."""
     x_l, v_l, x_o, v_o, x_r, v_r = np.moveaxis(np.asarray(state), -1, 0)
     return x_l - x_o, v_l - v_o, x_o - x_r, v_o - v_r
-
-
-def impact_forces(grasp: Grasp, state: Array) -> tuple[Array, Array]:
-    """fw_l and fw_r in N of states (..., 6)."""
-    u_l, d_l, u_r, d_r = penetration(state)
-    return impact_force(grasp.left_contact, u_l, d_l), impact_force(grasp.right_contact, u_r, d_r)
-
-
-def acceleration(grasp: Grasp, state: Array) -> tuple[Array, Array, Array]:
-    """x_l'', x_o'', x_r'' in m/s^2 of states (..., 6) under continuous feedback: (1) to (5)."""
-    x_l, v_l, _, _, x_r, v_r = np.moveaxis(np.asarray(state), -1, 0)
-    fw_l, fw_r = impact_forces(grasp, state)
-    left, right = grasp.left, grasp.right
-    f_l = -left.stiffness * x_l - left.damping * v_l + feedback(left, x_l, v_l)
-    f_r = -right.stiffness * x_r - right.damping * v_r + feedback(right, x_r, v_r)
-    return (f_l - fw_l) / left.mass, (fw_l - fw_r) / grasp.object_mass, (f_r + fw_r) / right.mass

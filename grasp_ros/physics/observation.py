@@ -87,10 +87,7 @@ def opposite(side: int) -> int:
 def asked(law: Callable[..., float]) -> tuple[str, ...]:
     """What a law asks for beside its arm: names of `OBSERVABLES` among its parameters after the first four.
 
-    Raises
-    ------
-    TypeError
-        If it cannot be called with these.
+    TypeError if it cannot be called with these.
     """
     try:
         signature = inspect.signature(law)
@@ -102,13 +99,7 @@ def asked(law: Callable[..., float]) -> tuple[str, ...]:
 
 
 def check(names: Sequence[str], system: System, side: int, what: str) -> None:
-    """Refuse a law that asks for what the scene does not have; `what` is what the refusal begins with.
-
-    Raises
-    ------
-    Refused
-        Names it.
-    """
+    """Refuse a law that asks for what the scene does not have; `what` is what the refusal begins with."""
     far = opposite(side)
     for body, name_of_it, needing in ((OBJECT, "object", _OF_OBJECT), (far, f"{NAMES[far]} arm", _OF_OTHER)):
         lacking = [name for name in names if name in needing and body in system.absent]

@@ -16,13 +16,8 @@ def reach(bodies: Any, pairs: Any, V_c: Any) -> Any:
     """Largest displacements of left arm, object and right arm, and largest deformations of both pairs, in m.
 
     An arm that is not driven to 0, an object that the arms do not enclose or that a force pushes, and a pair that
-    cannot push have no bound: infinite. What is not there stays at 0.
-
-    Parameters
-    ----------
-    bodies, pairs : arrays (3, 4) and (2, 2)
-        See `layout`; with the feedback in them.
-    V_c : float, J
+    cannot push have no bound: infinite. What is not there stays at 0. `bodies` (3, 4) have the feedback in them,
+    `pairs` are (2, 2), see `layout`; `V_c` is in J.
     """
     left = middle = right = 0.0
     if bodies[LEFT, Of.MASS] > 0.0:

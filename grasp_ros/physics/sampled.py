@@ -13,18 +13,9 @@ from grasp_ros.physics.model import Arm, Array
 
 
 def transition(arm: Arm, period: Array, delay: int) -> Array:
-    """Matrices from tick to tick of (x, v, commands that wait).
+    """Matrices (n, 2 + delay, 2 + delay) from tick to tick of (x, v, commands that wait), for periods (n,) in s.
 
-    Parameters
-    ----------
-    arm : Arm
-    period : array (n,), s
-    delay : int
-        Periods between a state and the command that answers it.
-
-    Returns
-    -------
-    array (n, 2 + delay, 2 + delay)
+    The delay is in periods between a state and the command that answers it.
     """
     flow = held_flow(arm, period)
     gain = np.array([-arm.position_gain, -arm.velocity_gain])

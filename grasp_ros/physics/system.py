@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from grasp_ros.physics.control import ControlLaw, feedback
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Law, Of
-from grasp_ros.physics.model import Arm, Array, Grasp, impact_force_of
+from grasp_ros.physics.model import Arm, Array, impact_force_of
 
 BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
+Place = tuple[str, int, int]  # array of a system, row, column
 COLUMN: dict[int, int] = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of the position in a state (6,); the velocity is the next
 
 
@@ -41,49 +42,29 @@ class ExternalForce(NamedTuple):
 
 @dataclass
 class System:
-    """A scene as arrays.
+    """A scene as arrays."""
 
-    Attributes
-    ----------
-    bodies : array (3, 4)
-        Mass, stiffness, damping and constant force of every body by itself, see `layout`; mass 0: no such body.
-    pairs : array (2, 2)
-        H and p of every pair; H = 0: no such pair.
-    state : array (6,), m and m/s
-        At t = 0; 0 for what is not there.
-    coulomb : float, N
-        Dry friction of the object.
-    laws : dict of int to ControlLaw
-        Controllers by side.
-    external : list of ExternalForce
-    delay : int
-        Control periods from a state to the command that answers it.
-    sampled : bool
-        Whether commands are held over control periods; otherwise the feedback acts continuously.
-    caveats : list of str
-        Why V_c may rise in this scene.
-    """
-
+    # of every body by itself, see `layout`; mass 0: no such body
     bodies: Array = field(default_factory=lambda: np.zeros((3, 4)))
-    pairs: Array = field(default_factory=lambda: np.zeros((2, 2)))
-    state: Array = field(default_factory=lambda: np.zeros(6))
-    coulomb: float = 0.0
-    laws: dict[int, ControlLaw] = field(default_factory=dict)
+    pairs: Array = field(default_factory=lambda: np.zeros((2, 2)))  # H and p; H = 0: no such pair
+    state: Array = field(default_factory=lambda: np.zeros(6))  # at t = 0, m and m/s; 0 for what is not there
+    coulomb: float = 0.0  # dry friction of the object, N
+    laws: dict[int, ControlLaw] = field(default_factory=dict)  # controllers by side
     external: list[ExternalForce] = field(default_factory=list)
-    delay: int = 0
-    sampled: bool = False
-    caveats: list[str] = field(default_factory=list)
+    delay: int = 0  # control periods from a state to the command that answers it
+    sampled: bool = False  # whether commands are held over control periods; otherwise the feedback acts continuously
+    caveats: list[str] = field(default_factory=list)  # why V_c may rise
 
-    @staticmethod
-    def of(grasp: Grasp, state: Array) -> System:
-        """The paper's grasp."""
-        system = System(state=np.asarray(state, dtype=float))
-        for side, arm in ((LEFT, grasp.left), (RIGHT, grasp.right)):
-            system.bodies[side, : Of.FORCE] = arm.mass, arm.stiffness, arm.damping
-            system.laws[side] = ControlLaw(arm.position_gain, arm.velocity_gain)
-        system.bodies[OBJECT, Of.MASS] = grasp.object_mass
-        system.pairs[:] = grasp.left_contact, grasp.right_contact
-        return system
+    def put(self, place: Place, number: float) -> None:
+        """Write a number of a scene into its place; the first one of a controller makes its law."""
+        array, row, column = place
+        if array == "coulomb":
+            self.coulomb = number
+        elif array == "laws":
+            self.laws.setdefault(row, ControlLaw(0.0, 0.0)).row[column] = number
+        else:
+            rows = getattr(self, array)
+            rows.reshape(len(rows), -1)[row, column] = number
 
     @property
     def present(self) -> list[int]:
@@ -143,19 +124,6 @@ class System:
         u, u_rate = (state[COLUMN[front] + part] - state[COLUMN[back] + part] for part in (0, 1))
         hertzian, dissipation = self.pairs[side].tolist()
         return impact_force_of(hertzian, dissipation, u, u_rate)
-
-    def commands(self, tick: int, state: Array) -> Array:
-        """What the controllers answer to the state of a tick, in N by body; 0 without a controller.
-
-        Parameters
-        ----------
-        tick : int
-        state : array (6,)
-        """
-        forces = np.zeros(3)
-        for side, law in self.laws.items():
-            forces[side] = law.command(tick, *state[COLUMN[side] : COLUMN[side] + 2].tolist())
-        return forces
 
     def feedback(self, state: Array) -> Array:
         """Continuous feedback (n, 2) of the left and the right arm in N, (4), (5), for states (n, 6)."""

@@ -40,6 +40,7 @@ class Parameter(NamedTuple):
     whole: bool = False
     several: bool = False
     smallest: float = SMALLEST  # of what is not 0
+    place: tuple[str, int] | None = None  # array of a system and column, where it goes straight into one
 
     @property
     def unit(self) -> str:

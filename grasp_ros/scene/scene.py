@@ -18,8 +18,7 @@ from typing import Any
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
-from grasp_ros.physics.model import Array, Contact, Grasp
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 from grasp_ros.scene.changes import texts_of_changed
 from grasp_ros.scene.effects import BY_SECTION, build, named
@@ -78,21 +77,6 @@ class Scene(Frozen):
     def warnings(self) -> tuple[str, ...]:
         """Valid but suspicious settings, a sentence each: the key, its value, why it is odd, and what may be meant."""
         return tuple(str(oddity) for effect in self.effects for oddity in effect.oddities(self.values, self.system))
-
-    @property
-    def grasp(self) -> Grasp:
-        """The paper's grasp with its gains.
-
-        Raises
-        ------
-        Refused
-            If the scene is not two arms, an object, two contacts and the paper's feedback.
-        """
-        system = self.system
-        if self.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
-            raise Refused(f"{self.name}: not the paper's grasp; allowed here: exactly {', '.join(sorted(PAPER))}")
-        left, right = (Contact(*pair) for pair in system.pairs.tolist())
-        return Grasp(system.arm(LEFT), system.arm(RIGHT), left, right, float(system.bodies[OBJECT, Of.MASS]))
 
     @property
     def initial_state(self) -> Array:

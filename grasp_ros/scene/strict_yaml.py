@@ -12,13 +12,11 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.files import TEXT_BYTES
 
 _FLOAT = re.compile(r"^[-+]?(\d+\.\d*|\.\d+|\d+(?=[eE]))([eE][-+]?\d+)?$|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$")
-_INT = re.compile(r"^[-+]?(0|[1-9]\d*)$")
+_INT = re.compile(r"^[-+]?(0|[1-9]\d{,400})$")  # more digits than any number has are a text
 _RULES = (("float", _FLOAT), ("int", _INT))
+_KEPT = {"tag:yaml.org,2002:bool", "tag:yaml.org,2002:null"}  # of PyYAML's rules; a date is a text
 MOST_DEPTH, MOST_NODES = 20, 50_000
 LONG = 60  # characters that a refusal shows of a name
-MISFITS = (ValueError, LookupError, AttributeError, OverflowError)  # PyYAML's for 2001-13-45 or "\UFFFFFFFF"
-_NUMERIC = {f"tag:yaml.org,2002:{kind}" for kind, _ in _RULES}
-_MERGE = "tag:yaml.org,2002:merge"  # of mappings, by a key <<: here a key like any other
 
 
 class _Loader(yaml.SafeLoader):
@@ -54,25 +52,16 @@ class _Loader(yaml.SafeLoader):
         self._depth -= 1
         return node
 
-    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
-        try:
-            return super().construct_object(node, deep)
-        except Refused:
-            raise
-        except MISFITS as error:
-            text = str(node.value)[:LONG]
-            raise Refused(f"line {node.start_mark.line + 1}: {text} cannot be read: {error}") from None
-
 
 class _Dumper(yaml.SafeDumper):
-    """SafeDumper that quotes what the loader would take for a number."""
+    """SafeDumper that quotes what our loader, or another one, would take for a number."""
 
 
+_Loader.yaml_implicit_resolvers = {
+    first: [rule for rule in rules if rule[0] in _KEPT]
+    for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
 for _class in (_Loader, _Dumper):
-    _class.yaml_implicit_resolvers = {
-        first: [rule for rule in rules if rule[0] not in {*_NUMERIC, _MERGE}]
-        for first, rules in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
     for _kind, _pattern in _RULES:
         _class.add_implicit_resolver(f"tag:yaml.org,2002:{_kind}", _pattern, list("-+0123456789."))
 
@@ -103,7 +92,7 @@ def load(text: str) -> Any:
         raise
     except yaml.YAMLError as error:
         raise Refused(" ".join(str(error).split()).replace(' in "<unicode string>",', " at")) from None
-    except MISFITS as error:  # before there is a node
+    except (ValueError, OverflowError) as error:  # PyYAML's for "\UFFFFFFFF"
         raise Refused(f"line {loader.line + 1}: a value cannot be read: {error}") from None
 
 

@@ -54,12 +54,12 @@ def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Ar
     if not len(motion.t):
         raise Refused("nothing to draw: the motion has no output times")
     if not 0.0 < speed < np.inf:
-        raise Refused(f"--speed {speed!r} is not allowed; allowed: a number > 0")
+        raise Refused(f"speed: {speed!r} is not allowed; allowed: a number > 0")
     first, last = span or (float(motion.t[0]), float(motion.t[-1]))
     count = int((last - first) / speed * RATE) + 1
     if count > MOST_PICTURES:
-        raise Refused(f"--speed {speed!r}: {count} pictures; allowed: at most {MOST_PICTURES}, with a higher --speed or"
-                      " a shorter time")
+        raise Refused(f"speed: {speed!r} makes {count} pictures; allowed: at most {MOST_PICTURES}, by a higher speed"
+                      " or a shorter time")
     return np.minimum(first + np.arange(count) * speed / RATE, last)
 
 

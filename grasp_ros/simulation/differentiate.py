@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.methods.registry import EXACT
@@ -20,9 +21,15 @@ from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
 from grasp_ros.sensitivity.run import Carrier
+from grasp_ros.simulation.chunk import Chunk, Setup
 from grasp_ros.simulation.closed_loop import drive
+from grasp_ros.simulation.outcomes import BY, CORNER, GROUPS, V_C_END
 from grasp_ros.simulation.repeat import check_same, integrator_of
+from grasp_ros.simulation.simulate import simulate
 from grasp_ros.simulation.trajectory import Trajectory
+from grasp_ros.simulation.variants import Variants
+
+DIFFERENTIATED = (*GROUPS["last_state"], V_C_END)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,3 +144,29 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
         explicit.append(2.0 * stored_energy(1.0, pressed))
         weights.append(changes.pairs[side, Law.HERTZIAN])
     return np.asarray(np.einsum("mi,min->mn", gradient, rates) + np.stack(explicit, axis=1) @ np.array(weights))
+
+
+def with_derivatives(chunk: Chunk, variants: Variants, setup: Setup, keys: Sequence[str], stop: NDArray[np.int64]
+                     ) -> Chunk:
+    """A chunk of rows with the derivatives of their last states, see `ensemble`; a `stop` that is not 0 ends it early.
+
+    A row that has none says why among the stops, and has nan.
+    """
+    n, stops = variants.rows, dict(chunk.stops)
+    rates, level, corner = np.full((n, len(DIFFERENTIATED), len(keys)), np.nan), np.full(n, np.nan), np.full(n, np.nan)
+    for i in np.flatnonzero(chunk.status == 0).tolist():
+        if stop[0]:
+            break
+        scene = variants.row(i)
+        try:
+            found = differentiate(simulate(
+                scene, grid=np.array([scene.duration]), sampled=setup.sampled, setting=setup.accuracy,
+                max_events=setup.max_events, max_work=setup.max_work), keys)
+        except Refused as refusal:
+            stops[i] = str(refusal)
+            continue
+        rates[i], level[i] = np.vstack([found.state_rates[-1], found.V_c_rates[-1]]), found.V_c[-1]
+        corner[i] = np.inf if found.corner is None else found.corner
+    columns = {f"{name}{BY}{key}": rates[:, row, column] for column, key in enumerate(keys)
+               for row, name in enumerate(DIFFERENTIATED)}
+    return chunk._replace(columns={**chunk.columns, V_C_END: level, **columns, CORNER: corner}, stops=stops)

@@ -161,7 +161,7 @@ def ensemble(
         chunk = compute(part, setup, stop)
         if keys is None:
             return chunk
-        from grasp_ros.simulation.sensitivities import with_derivatives  # whose kernels no other run loads
+        from grasp_ros.simulation.differentiate import with_derivatives  # whose kernels no other run loads
 
         return with_derivatives(chunk, part, setup, keys, stop)
 

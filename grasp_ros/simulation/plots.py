@@ -91,10 +91,10 @@ def compose(
     if not 0 < len(motions) == len(captions):
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
-    width = usual if width_mm is None else number("--width", width_mm)
+    width = usual if width_mm is None else number("width_mm", width_mm)
     first_last = None if span is None else ascending("span", rows("span", span, 2), np.inf, strictly=True)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
-        raise Refused(f"--width {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
+        raise Refused(f"width_mm: {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
     panels = [*PANELS.values()] if panels is None else panels
     shares = [panel.share for panel in panels]

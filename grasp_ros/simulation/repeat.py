@@ -44,11 +44,8 @@ def integrator_of(run: Trajectory) -> Integrator:
 def states_at(run: Trajectory, times: Array) -> Array:
     """States (..., 6) at any times (...) in s of a run: those of the run with these output times, bit for bit.
 
-    Raises
-    ------
-    Refused
-        If a time is outside the run, if the commands of its controllers were not recorded at every control period, or
-        if the run cannot be repeated here to the last bit, as one from another machine.
+    Refused: a time outside the run, commands that were not recorded at every control period, and a run that cannot be
+    repeated here to the last bit, as one from another machine.
     """
     wanted = np.asarray(times, dtype=float)
     end = reached(run)

@@ -11,9 +11,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import MAX_EVENTS, MAX_WORK, Status
 from grasp_ros.methods import registry
-from grasp_ros.methods.contract import ACCURACY_KNOB
 from grasp_ros.methods.registry import EXACT
-from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.control import Law
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending, mapping, names, truth, whole
@@ -35,7 +33,6 @@ def simulate(
     *,
     grid: Array | None = None,
     sampled: bool = False,
-    accuracy: float = ACCURACY,
     method: str = EXACT,
     setting: float | None = None,
     max_events: int = MAX_EVENTS,
@@ -56,12 +53,11 @@ def simulate(
     sampled : bool
         False: feedback acts continuously, as in the paper, unless the scene itself has a `loop`. True: as in the
         graph, each command is computed from the state at the beginning of a control period and held over it.
-    accuracy : float
-        Of the method `exact`, see `exact.integrator.Integrator`.
     method : str
         A key of `methods.registry.METHODS`.
     setting : float, optional
-        Accuracy, step in s, or tolerance of the method. Default: `accuracy` for `exact`, otherwise the method's own.
+        Accuracy of `exact`, see `exact.integrator.Integrator`; step in s, or tolerance, of another method. Default: the
+        method's own.
     max_events : int
         Budget of events.
     max_work : int
@@ -100,8 +96,6 @@ def simulate(
         check_keys(scene, sensitivity, sampled)
         if method != EXACT or controllers or changes:
             raise Refused(f"{scene.name}: sensitivity: allowed: the method {EXACT}, without controllers and changes")
-    if setting is None and registry.find(method).knob == ACCURACY_KNOB:
-        setting = accuracy
     setting = registry.check(method, scene, setting, sampled=sampled, max_work=max_work)
     if grid is None:
         grid = tick_times(scene) if sampled else np.linspace(0.0, scene.duration, GRID_POINTS)

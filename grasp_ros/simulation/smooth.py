@@ -79,12 +79,7 @@ def real_roots(series: Array) -> Array:
 def expand(states: States, quantity: Quantity, begins: Array, ends: Array, group: NDArray[np.int64]) -> Pieces:
     """Pieces of a motion, halved until they are resolved relative to the largest value of their group.
 
-    Parameters
-    ----------
-    begins, ends : arrays (k,), s
-        Of pieces without an event or a change of an input within.
-    group : array (k,)
-        What a piece belongs to: 0, 1, ...
+    They begin and end (k,) in s, without an event or a change of an input within, and belong to a group (k,), 0, 1, ...
     """
     done: list[Pieces] = []
     begin, length = begins, ends - begins

@@ -260,20 +260,24 @@ class Trajectory(Tabular, Frozen):
         Refused
             If the file cannot be written.
         """
-        level, parts = self.energy, self.parts
         with opened(path) as file:
-            np.savez_compressed(file, **signed(dict(
-                t=self.t, state=self.state, command=self.command, inputs=self.inputs,
-                V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **parts._asdict(),
-                epsilon=self.epsilon, impacts=self.impacts,
-                **{name: self.times(*which) for name, which in MOMENTS.items()},
-                events=self.event_table, work=self.work,
-                work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
-                method=self.method, setting=float(self.setting), sampled=self.sampled, stop=self.stop,
-                scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
-                controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
-                at_rest=np.inf if self.at_rest is None else self.at_rest,
-            )))
+            np.savez_compressed(file, **signed(self.contents()))
+
+    def contents(self) -> dict[str, Any]:
+        """What a file holds, by the names of its arrays."""
+        level = self.energy
+        return dict(
+            t=self.t, state=self.state, command=self.command, inputs=self.inputs,
+            V=level.V, V_c=level.V_c, V_rate=level.V_rate, mode=level.mode, **self.parts._asdict(),
+            epsilon=self.epsilon, impacts=self.impacts,
+            **{name: self.times(*which) for name, which in MOMENTS.items()},
+            events=self.event_table, work=self.work,
+            work_names=np.array([name.replace(" ", "_") for name in self.counters]), status=self.status.name,
+            method=self.method, setting=float(self.setting), sampled=self.sampled, stop=self.stop,
+            scene_name=self.scene.name, scene=self.scene.to_yaml(), energy_of=self.energy_of,
+            controllers=np.array([self.controllers.get(side, "") for side in SIDES]),
+            at_rest=np.inf if self.at_rest is None else self.at_rest,
+        )
 
 
 def check_run(run: object) -> Trajectory:

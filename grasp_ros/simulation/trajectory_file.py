@@ -12,24 +12,12 @@ from grasp_ros.methods.registry import find
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Entry, Transition
-from grasp_ros.physics.lyapunov import Parts
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
-from grasp_ros.scene.npz import TEXT, Field, read_npz
+from grasp_ros.scene.npz import TEXT, form_of, read_npz
 from grasp_ros.simulation.ticks import Loop, tick_of
-from grasp_ros.simulation.trajectory import MOMENTS, Trajectory
-
-_ROW = {name: Field("<f8", ("n",)) for name in ("t", "V", "V_c", "V_rate", *Parts._fields)}
-_WORDS = {name: Field(TEXT) for name in ("status", "method", "stop", "scene_name", "scene", "energy_of")}
-FIELDS = {
-    **_ROW, "epsilon": Field("<f8", ("n", 2)), "impacts": Field("<f8", ("n", 2)), "state": Field("<f8", ("n", 6)),
-    "command": Field("<f8", ("n", 2)), "inputs": Field("<f8", ("n", 3)), "mode": Field("<i8", ("n",)),
-    "events": Field("<f8", ("events", 5)),
-    **{name: Field("<f8", (name,)) for name in MOMENTS}, "work": Field("<i8", ("work",)),
-    "work_names": Field(TEXT, ("work",)), **_WORDS, "setting": Field("<f8"), "sampled": Field("|b1"),
-    "at_rest": Field("<f8"), "controllers": Field(TEXT, (2,)),
-}
+from grasp_ros.simulation.trajectory import Trajectory
 
 
 def load(path: str | os.PathLike[str]) -> Trajectory:
@@ -42,24 +30,27 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
     """
     path = given.path("path", path)
     with decoding(path, "a file of `grasp simulate`"), reading(path):
-        data = read_npz(path, FIELDS)
-        words = {name: str(data[name]) for name in _WORDS}
-        scene, method = scenes.parse(words["scene"], words["scene_name"], str(path)), find(words["method"])
-        if data["work_names"].tolist() != [counter.name.lower() for counter in method.counters]:
-            raise Refused(f"work_names: {data['work_names'].tolist()}; allowed: the counters of {method.name}")
-        loop = Loop(data["command"], data["inputs"]) if data["sampled"] else None
+        data = read_npz(path)
+        words = {name: str(data[name]) for name in ("status", "method", "stop", "scene_name", "scene")}
+        scene = scenes.parse(words["scene"], words["scene_name"], str(path))
+        t, state, command, inputs, events = (data[name].astype(float, casting="same_kind") for name in (
+            "t", "state", "command", "inputs", "events"))
         found = Trajectory(
-            scene, data["t"], data["state"], loop, data["events"], data["work"], Status[words["status"]], method.name,
+            scene, t, state, Loop(command, inputs) if data["sampled"] else None, events,
+            data["work"].astype(np.int64, casting="same_kind"), Status[words["status"]], find(words["method"]).name,
             float(data["setting"]), words["stop"],
             {side: name for side, name in zip(SIDES, data["controllers"].tolist(), strict=True) if name},
             float(data["at_rest"]) if np.isfinite(data["at_rest"]) else None,
         )
-        if found.energy_of != words["energy_of"]:
-            raise Refused(f"energy_of: {words['energy_of']}; allowed with these controllers: {found.energy_of}")
         _check(found)
-        for name, which in MOMENTS.items():
-            if data[name].tolist() != found.times(*which).tolist():
-                raise Refused(f"{name}: not those of the events")
+        own = {name: np.asarray(values) for name, values in found.contents().items()}
+        if data.keys() != own.keys():
+            raise Refused(f"arrays {', '.join(sorted(data))}; allowed: {', '.join(sorted(own))}")
+        for name, values in own.items():
+            text = values.dtype.kind == TEXT
+            if form_of(data[name]) != form_of(values) or (text and data[name].tolist() != values.tolist()):
+                raise Refused(f"{name}: {data[name].dtype} of shape {data[name].shape} is not allowed; allowed: as this"
+                              f" run has it, {values.dtype} of shape {values.shape}")
         return found
 
 

@@ -74,8 +74,8 @@ def prepare(row: Row) -> tuple[Callable[[], Any], Measured]:
         scene = scenes.load(row.scene)  # the checkout's own, where it cannot read this one
     end, grid = np.array([scene.duration]), np.linspace(0.0, scene.duration, OUTPUTS)
     ways: dict[str, dict[str, Any]] = {
-        "last, 1e-9": {"grid": end, "accuracy": 1e-9}, "last, finest": {"grid": end, "accuracy": FINEST},
-        "outputs": {"grid": grid, "accuracy": FINEST}, "sampled": {"sampled": True},
+        "last, 1e-9": {"grid": end, "setting": 1e-9}, "last, finest": {"grid": end, "setting": FINEST},
+        "outputs": {"grid": grid, "setting": FINEST}, "sampled": {"sampled": True},
         **{method: {"method": method, "setting": setting} for method, setting in METHODS.items()},
     }
     if row.how in ways:
@@ -83,8 +83,8 @@ def prepare(row: Row) -> tuple[Callable[[], Any], Measured]:
         return run, {"state": state(run()).tolist()}
     from grasp_ros.simulation import Setup, ensemble
 
-    truth = state(simulate(scene, grid=end, accuracy=FINEST))
-    errors = ((float(np.abs(state(simulate(scene, grid=end, accuracy=a)) - truth).max()), a) for a in LADDER)
+    truth = state(simulate(scene, grid=end, setting=FINEST))
+    errors = ((float(np.abs(state(simulate(scene, grid=end, setting=a)) - truth).max()), a) for a in LADDER)
     error, accuracy = next(pair for pair in errors if pair[0] <= ERROR)
     numbers = {f"{section}.{key}": value for section, keys in scene.values.items() if section != "time"
                for key, value in keys.items() if isinstance(value, float) and value}

@@ -58,7 +58,7 @@ class Product:
             If it ends with another status than DONE.
         """
         grid = None if times is None else np.array(list(times))
-        result = simulate(scene, grid=grid, sampled=sampled, accuracy=self.accuracy, max_events=self.max_events,
+        result = simulate(scene, grid=grid, sampled=sampled, setting=self.accuracy, max_events=self.max_events,
                           max_work=self.max_work)
         self.runs.append(result)
         if result.status is not Status.DONE:

@@ -11,9 +11,10 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.exact.events import Event
 from grasp_ros.physics.layout import Transition
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.scene import Scene
 from lab.reference import Reference, integrate
+from lab.reference.grasp import Grasp, grasp_of
 
 STANDARD = Arm(1.0, 10.0, 0.2, 5.0, 0.5)
 ELASTIC = Arm(1.0, 10.0, 0.0, 5.0, 0.0)
@@ -70,7 +71,7 @@ def reference_run(scene: Scene, times: Sequence[float] | Array, force: tuple[flo
                   feedback: bool = True) -> Reference:
     """States and contacts by another method with 25 digits."""
     ticks = tuple(float(t) for t in times)
-    return _reference(scene.grasp, tuple(scene.initial_state.tolist()), ticks, force, feedback)
+    return _reference(grasp_of(scene), tuple(scene.initial_state.tolist()), ticks, force, feedback)
 
 
 def reference(scene: Scene, times: Sequence[float] | Array, force: tuple[float, float] = (0.0, 0.0),

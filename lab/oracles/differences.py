@@ -97,7 +97,7 @@ def judge(scene: Scene, key: str, size: float) -> Verdict:
 
 
 def _run(scene: Scene) -> Trajectory:
-    return simulate(scene, grid=np.array([scene.duration]), accuracy=FINEST)
+    return simulate(scene, grid=np.array([scene.duration]), setting=FINEST)
 
 
 def _spread(scene: Scene, key: str, rates: Array) -> Array:
@@ -141,5 +141,5 @@ def _plateau(scene: Scene, key: str, size: float) -> _Plateau:
 
 def _end(scene: Scene) -> Array:
     """The last state (6,) of a run; NaN: it does not get there."""
-    run = simulate(scene, grid=np.array([scene.duration]), accuracy=FINEST)
+    run = simulate(scene, grid=np.array([scene.duration]), setting=FINEST)
     return np.asarray(run.state[-1] if run.status is Status.DONE else np.full(6, np.nan))

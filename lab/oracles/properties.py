@@ -24,6 +24,7 @@ from lab.oracles.replay import findings
 from lab.oracles.restart_check import digits, reversal, splitting
 from lab.oracles.rounding_bounds import DIED_OUT
 from lab.oracles.segments import Detail, Pieces, cut, detail, grid_of, pieces_of, rule
+from lab.reference.grasp import commands
 
 MOST_EVENTS = 2000
 MOST_WORK = 100_000  # of a run
@@ -163,7 +164,7 @@ def look(run: Trajectory, pieces: Pieces, product: Product) -> Detail:
 def _held(run: Trajectory) -> float:
     """Number of ticks at which other inputs acted than the laws answer to the states, late by the delay."""
     system, states = run.scene.system, np.nan_to_num(run.state)
-    answers = [np.zeros(3)] * system.delay + [system.commands(tick, state) for tick, state in enumerate(states[:-1])]
+    answers = [np.zeros(3)] * system.delay + [commands(system, tick, state) for tick, state in enumerate(states[:-1])]
     wanted = [answers[tick] + system.external_at(tick) for tick in range(len(states) - 1)]
     return float(np.count_nonzero((np.array(wanted) != run.inputs[:-1]).any(axis=1)))
 

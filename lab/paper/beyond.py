@@ -11,12 +11,12 @@ from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import tail_rate
 from lab.paper.cases import Cases
 from lab.paper.motion import distance_of_states, nearest_return, state_weights
+from lab.reference.grasp import grasp_of, system_of
 from lab.studies.certificate import SCENES, Jump, jumps, safe_p
 
 TAIL_SECONDS = 1e5
@@ -44,7 +44,7 @@ def gap(cases: Cases) -> Gap:
     found = [(name, jump) for name in SCENES[:2] for jump in jumps(scenes.load(name).system, 0.8)]
     rise = max(float(np.diff(run.energy.V_c).max() / run.energy.V_c[0]) for run in runs)
     safe = [
-        (number, scene.grasp.left_contact.dissipation, safe_p(scene.grasp, scene.initial_state))
+        (number, grasp_of(scene).left_contact.dissipation, safe_p(grasp_of(scene), scene.initial_state))
         for number, scene in cases.items()
     ]
     return Gap(runs, found, rise, safe)
@@ -65,7 +65,7 @@ class Tail(NamedTuple):
 
 def tail(scene: Scene, seconds: float = TAIL_SECONDS) -> Tail:
     """Follow a case with damped arms to the law of its tail; O9 of docs/oracles.md."""
-    grasp = scene.grasp
+    grasp = grasp_of(scene)
     arm, hertzian = grasp.left, grasp.left_contact.hertzian
     kappa = float(
         tail_rate(arm.damping + arm.velocity_gain, arm.stiffness + arm.position_gain, hertzian, grasp.object_mass)
@@ -128,7 +128,7 @@ def stretching(scene: Scene, seconds: float, push: Array) -> Array:
     for row in range(len(found)):
         ends = []
         for start in (state, state + offset):
-            integrator = Integrator(System.of(scene.grasp, start), continuous=True)
+            integrator = Integrator(system_of(grasp_of(scene), start), continuous=True)
             integrator.advance(EVERY)
             ends.append(integrator.state)
         state, offset = ends[0], ends[1] - ends[0]
@@ -176,7 +176,7 @@ def _apart(scene: Scene, push: Array) -> tuple[Array, Array]:
     offset = push / state_weights(scene.system)
     offset *= SMALL * level / float(np.linalg.norm(push))
     states = [
-        Integrator(System.of(scene.grasp, start), continuous=True).advance(seconds, grid)
+        Integrator(system_of(grasp_of(scene), start), continuous=True).advance(seconds, grid)
         for start in (scene.initial_state, scene.initial_state + offset)
     ]
     return grid, distance_of_states(scene, *states) / level

@@ -18,6 +18,7 @@ from lab.paper.cases import (
     with_values,
 )
 from lab.paper.measures import measure, seconds, settlings
+from lab.reference.grasp import grasp_of
 
 
 def doubts(cases: Cases) -> list[tuple[str, str]]:
@@ -25,7 +26,7 @@ def doubts(cases: Cases) -> list[tuple[str, str]]:
     standard = cases[STANDARD]
     inputs = measure(cases[9], "input")
     literal = started(standard, LITERAL)
-    force = float(hertzian_force(standard.grasp.left_contact, np.array([LITERAL[0]]))[0])
+    force = float(hertzian_force(grasp_of(standard).left_contact, np.array([LITERAL[0]]))[0])
     levels = [float(energy(scene.system, scene.initial_state).V_c) for scene in (standard, literal)]
     ps = sorted({*READ_P, 1.0})
     times = [seconds(settlings(with_values(standard, {"p": p}))) for p in ps]

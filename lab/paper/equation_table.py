@@ -42,9 +42,9 @@ _LARGEST = "smallest of (5 V_c(0) / 4H)^(2/5) over the largest deformation, less
 _FIT = "lab.paper.quadratic_form.A", "a fitted to the motion, its distance from 4/5"
 AT_EVENTS = "(10) at events"  # the second row of (10)
 EQUATIONS = {row.number: row for row in (
-    Equation("(1)", "motion of the left arm", "physics.model.acceleration", _DIFFERENTIATED, 1e-8),
-    Equation("(2)", "motion of the right arm", "physics.model.acceleration", _DIFFERENTIATED, 1e-8),
-    Equation("(3)", "motion of the object", "physics.model.acceleration", _DIFFERENTIATED, 1e-8),
+    Equation("(1)", "motion of the left arm", "lab.reference.grasp.acceleration", _DIFFERENTIATED, 1e-8),
+    Equation("(2)", "motion of the right arm", "lab.reference.grasp.acceleration", _DIFFERENTIATED, 1e-8),
+    Equation("(3)", "motion of the object", "lab.reference.grasp.acceleration", _DIFFERENTIATED, 1e-8),
     Equation("(4)", "input of the left arm", "physics.system.System.feedback", _COMMAND, 1e-14, ALGEBRA),
     Equation("(5)", "input of the right arm", "physics.system.System.feedback", _COMMAND, 1e-14, ALGEBRA),
     Equation("(6)", "left impact force", "physics.model.impact_force", _LAW, 1e-7),

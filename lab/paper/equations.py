@@ -11,13 +11,14 @@ import numpy as np
 from grasp_ros import scene as scenes
 from grasp_ros.physics import lyapunov
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, X
-from grasp_ros.physics.model import acceleration, impact_force, in_contact, penetration
+from grasp_ros.physics.model import impact_force, in_contact, penetration
 from grasp_ros.scene import SceneError
 from lab.paper import by_hand, quadratic_form
 from lab.paper.cases import Cases, with_values
 from lab.paper.conditions import condition_rows
 from lab.paper.equation_table import AT_EVENTS, Equation, rows
 from lab.paper.sample import Sample, relative
+from lab.reference.grasp import acceleration
 
 CROSSING = ("v_jump_one_sided", "v_jump_symmetric")  # scenes that cross the second surface of (10) with u > 0
 

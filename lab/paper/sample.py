@@ -12,6 +12,7 @@ from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate
+from lab.reference.grasp import grasp_of
 
 STEP = 2e-4  # s, of the differences
 STENCIL = np.array([1.0 / 280.0, -4.0 / 105.0, 0.2, -0.8, 0.0, 0.8, -0.2, 4.0 / 105.0, -1.0 / 280.0])  # order 8
@@ -22,7 +23,7 @@ class Sample:
     """One motion, at places between its events, with the derivatives of everything."""
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.system, self.grasp = scene, scene.system, scene.grasp
+        self.scene, self.system, self.grasp = scene, scene.system, grasp_of(scene)
         self.run = simulate(scene)
         edges = np.unique(np.concatenate([[0.0], self.run.event_table[:, 0], [scene.duration]]))
         reach = 4.0 * STEP

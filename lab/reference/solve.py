@@ -12,10 +12,11 @@ import numpy as np
 from gmpy2 import mpfr
 from numpy.typing import NDArray
 
-from grasp_ros.physics.model import Arm, Contact, Grasp
+from grasp_ros.physics.model import Arm, Contact
 from grasp_ros.scene import Scene
 from lab.reference.automaton import Event
 from lab.reference.deadline import Deadline
+from lab.reference.grasp import Grasp
 from lab.reference.plant import LEFT, OBJECT, RIGHT, Body, Law, Plant, Real, Reals, number
 from lab.reference.run import Row, Run, precision
 

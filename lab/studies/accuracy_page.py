@@ -12,6 +12,7 @@ from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import writing
+from lab.reference.grasp import grasp_of
 from lab.studies import (
     accuracy,
     accuracy_rows,
@@ -61,7 +62,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
         contender for contender in all_contenders() if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
-    limits = stability.limits(case.grasp.left)
+    limits = stability.limits(grasp_of(case).left)
     points = loop.run(case, directory, () if quick else loop.GRAPH_PERIODS_MS)
 
     write_csv(records, place / "records.csv")
@@ -70,7 +71,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     figures.energy_drift(drifts, place / "energy_drift.png")
     figures.prediction(predictions, place / "prediction.png")
     figures.control_period(points, case.name, place / "control_period.png")
-    figures.stability(*stability.curves(case.grasp.left, limits), place / "stability.png")
+    figures.stability(*stability.curves(grasp_of(case).left, limits), place / "stability.png")
     return pages.write(
         docs, "accuracy", metric=accuracy.METRIC, points=simulation.GRID_POINTS, **accuracy_rows.by_error(records),
         drift=accuracy_rows.drift(drifts), prediction=accuracy_rows.prediction(predictions),

@@ -13,9 +13,10 @@ from tqdm import tqdm
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.layout import Law, Transition
-from grasp_ros.physics.model import Arm, Array, Contact, Grasp
+from grasp_ros.physics.model import Arm, Array, Contact
 from grasp_ros.physics.system import NAMES, System
 from grasp_ros.simulation import simulate
+from lab.reference.grasp import Grasp, system_of
 from lab.studies import pages
 from lab.studies.stability import first_limit
 
@@ -109,7 +110,7 @@ class Found(NamedTuple):
 def highest_jump(family: Family, place: Array, p: float) -> Jump | None:
     """The highest jump of a start of the family, if it counts."""
     start, mass, hertzian = family.start(place)
-    found = jumps(System.of(table_one(p, mass, hertzian), start), HORIZON)
+    found = jumps(system_of(table_one(p, mass, hertzian), start), HORIZON)
     level = 15.0 * (start[0] ** 2 + start[4] ** 2)  # V(0) at rest
     best = max(found, key=lambda jump: jump.height, default=None)
     return best if best is not None and best.height >= family.part * level else None

@@ -21,6 +21,7 @@ from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation.chunk import Setup
 from grasp_ros.simulation.ensemble import ensemble
 from lab.cases.draw import relative
+from lab.reference.grasp import grasp_of
 
 GAINS = "left_feedback.position_gain_N_per_m+right_feedback.position_gain_N_per_m"
 LOSSES = "left_contact.dissipation_s_per_m+right_contact.dissipation_s_per_m"
@@ -129,7 +130,7 @@ def limits(periods: int = PERIODS, levels: int = LEVELS) -> Limits:
     scene = scenes.load("case_01")
     steps = np.round(np.linspace(FIRST_S, LAST_S, periods) * NANOSECONDS) / NANOSECONDS
     gains = np.linspace(1.0, 60.0, levels)
-    arm = scene.grasp.left
+    arm = grasp_of(scene).left
     radius = {delay: np.array([spectral_radii(arm._replace(position_gain=gain), steps, delay) for gain in gains])
               for delay in (0, 1)}
     loops = []

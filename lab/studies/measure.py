@@ -17,6 +17,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.scene import Scene
 from lab import reference
 from lab.reference.deadline import Deadline, deadline
+from lab.reference.grasp import grasp_of
 from lab.studies.records import Journal, scene_key
 
 DIGITS = 25
@@ -52,7 +53,7 @@ def truth(scene: Scene, journal: Journal) -> Truth:
 
 
 def _reference(scene: Scene, grid: list[float]) -> Known:
-    exact = reference.integrate(scene.grasp, scene.initial_state.tolist(), grid, digits=DIGITS)
+    exact = reference.integrate(grasp_of(scene), scene.initial_state.tolist(), grid, digits=DIGITS)
     return Known(exact.as_array().tolist(), (len(exact.touches[LEFT]), len(exact.touches[RIGHT])))
 
 

@@ -18,8 +18,9 @@ import numpy as np
 from grasp_ros.accuracy.contender import Answer, Contender
 from grasp_ros.exact.compilation.jit import kernel
 from grasp_ros.physics.layout import LEFT, RIGHT, X
-from grasp_ros.physics.model import Array, Grasp
+from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from lab.reference.grasp import Grasp, grasp_of
 from lab.studies.peers import other_side_touches
 
 BALLISTIC_S = 1e-7  # both sides' forces are left out so long after a touch of both: 1e-14 N s of impulse in case 1
@@ -185,10 +186,10 @@ class HeyokaGrasp:
 
         settings = {"tol": tolerance, **options}
         self._start = scene.initial_state
-        hertzian = max(scene.grasp.left_contact.hertzian, scene.grasp.right_contact.hertzian)
+        hertzian = max(grasp_of(scene).left_contact.hertzian, grasp_of(scene).right_contact.hertzian)
         self._ballistic_s = BALLISTIC_S * (BALLISTIC_HERTZ / hertzian) ** 0.4
-        self._legs = [Leg(hy, scene.grasp, mode, settings) for mode in range(4)]
-        flight, _ = heyoka_system(hy, scene.grasp, False, False)
+        self._legs = [Leg(hy, grasp_of(scene), mode, settings) for mode in range(4)]
+        flight, _ = heyoka_system(hy, grasp_of(scene), False, False)
         self._ballistic = hy.taylor_adaptive(flight, [0.0] * 6, **settings)
 
     def __call__(self, grid: Array) -> Answer:

@@ -9,8 +9,8 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import System
 from grasp_ros.scene import Scene
+from lab.reference.grasp import grasp_of, system_of
 
 SECONDS = 100.0
 POINTS = 10_001
@@ -54,4 +54,4 @@ def _predict(scene: Scene, seconds: float) -> Prediction:
 
 
 def _states(scene: Scene, start: Array, grid: Array) -> Array:
-    return Integrator(System.of(scene.grasp, start), continuous=True).advance(float(grid[-1]), grid)
+    return Integrator(system_of(grasp_of(scene), start), continuous=True).advance(float(grid[-1]), grid)

@@ -53,7 +53,7 @@ def profile(scene: Scene, accuracy: float) -> Profile:
         return integrator
 
     parts: list[Callable[[], Any]] = [
-        lambda: simulation.simulate(scene, grid=grid, accuracy=accuracy),
+        lambda: simulation.simulate(scene, grid=grid, setting=accuracy),
         lambda: integrate(grid),
         lambda: integrate(grid[-1:]),
         lambda: expand_often(tables.c, tables.f, bodies, system.pairs, order, EXPANSIONS),

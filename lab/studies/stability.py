@@ -15,6 +15,7 @@ from grasp_ros.physics.sampled import spectral_radii, spectral_radius
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.simulation import SampledPlant
+from lab.reference.grasp import commands
 
 FIRST_S, LAST_S, SCAN = 1e-4, 10.0, 3000  # periods that are looked at for the first crossing
 TICKS = 4000
@@ -53,7 +54,7 @@ def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) ->
         state = plant.state
         speed = math.sqrt((arm.stiffness + arm.position_gain) / arm.mass) * state[X.L]
         sizes.append(math.hypot(speed, state[V.L]))
-        plant.step(system.commands(tick, state))
+        plant.step(commands(system, tick, state))
     half = ticks // 2
     window = ticks // 8  # maxima over a window: the phase of the oscillation drops out
     return float((max(sizes[-window:]) / max(sizes[half - window : half])) ** (1.0 / (ticks - half)))

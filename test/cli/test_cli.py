@@ -29,7 +29,7 @@ def test_simulate_writes_what_the_function_returns(command: Any, tmp_path: Path)
     result = command("simulate", "case_04", "--grid", "11", "--accuracy", "1e-12", "-o", "out.npz")
     assert result.returncode == 0, result.stderr
     loaded = simulation.load(tmp_path / "out.npz")
-    expected = simulation.simulate(scene.load("case_04"), grid=np.linspace(0.0, 20.0, 11), accuracy=1e-12)
+    expected = simulation.simulate(scene.load("case_04"), grid=np.linspace(0.0, 20.0, 11), setting=1e-12)
     assert loaded.state.tobytes() == expected.state.tobytes()
     assert loaded.events == expected.events
     assert loaded.scene.values == expected.scene.values

@@ -64,7 +64,7 @@ def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
         (("--sensitivity", "object.colour"), "object.colour: not in this scene"),
         (("--animate", "--panel", "input"), "--panel: allowed: without --animate"),
         (("--speed", "2"), "--speed: with it"),
-        (("--width", "5"), "--width 5.0 is not allowed; allowed: 60 to 1000 mm"),
+        (("--width", "5"), "width_mm: 5.0 is not allowed; allowed: 60 to 1000 mm"),
     ],
 )
 def test_what_is_refused_in_a_line(command: Any, words: tuple[str, ...], text: str) -> None:

@@ -13,6 +13,7 @@ from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Arm
 from lab.cases.scenes import contacts
 from lab.reference import integrate
+from lab.reference.grasp import grasp_of
 
 pytestmark = pytest.mark.slow  # references with 20 and 25 digits
 
@@ -26,7 +27,7 @@ TOUCHES = {"case_01": (22, 22), "case_02": (29, 25), "case_03": (27, 21)}
 def case(name: str, **options: Any) -> Run:
     """One of the paper's cases on the grid of its reference."""
     scene, horizon = scenes.load(name), horizon_of(name)
-    return run(scene.grasp, scene.initial_state, horizon, np.linspace(0.0, horizon, 201), **options)
+    return run(grasp_of(scene), scene.initial_state, horizon, np.linspace(0.0, horizon, 201), **options)
 
 
 def horizon_of(name: str) -> float:

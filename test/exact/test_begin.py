@@ -20,10 +20,11 @@ from grasp_ros.exact.automaton.modes import begin_contacts, end_begin, initial_m
 from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Array
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, Transition, U, V, Work, X
-from grasp_ros.physics.model import Contact, Grasp
+from grasp_ros.physics.model import Contact
 from grasp_ros.physics.system import COLUMN
 from lab.cases.impacts import TOUCHING
 from lab.reference import plant as exact
+from lab.reference.grasp import Grasp
 from lab.reference.run import Run, precision
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])

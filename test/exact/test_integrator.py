@@ -22,11 +22,11 @@ from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.observe.observer import watch
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.layout import Work
-from grasp_ros.physics.system import System
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.chunk import Setup
 from lab.cases import regression
 from lab.cases.modes import STARTS
+from lab.reference.grasp import grasp_of, system_of
 
 GRID = np.linspace(0.0, 20.0, 201)
 
@@ -35,7 +35,7 @@ GRID = np.linspace(0.0, 20.0, 201)
 @pytest.mark.parametrize("name", CASES)
 def test_every_accuracy_gets_through_every_case(name: str, accuracy: float) -> None:
     scene = scenes.load(name)
-    result = run(scene.grasp, scene.initial_state, 20.0, GRID, accuracy=accuracy)
+    result = run(grasp_of(scene), scene.initial_state, 20.0, GRID, accuracy=accuracy)
     done(result)
     assert len(result.states) == len(GRID)
 
@@ -43,15 +43,15 @@ def test_every_accuracy_gets_through_every_case(name: str, accuracy: float) -> N
 @pytest.mark.parametrize("name", CASES)
 def test_repaired_v_never_rises(name: str) -> None:
     scene = scenes.load(name)
-    V_c = energy(scene.grasp, run(scene.grasp, scene.initial_state, 20.0, np.linspace(0, 20, 4001)).states).V_c
+    V_c = energy(grasp_of(scene), run(grasp_of(scene), scene.initial_state, 20.0, np.linspace(0, 20, 4001)).states).V_c
     assert np.diff(V_c).max() <= 1e-12 * V_c[0]
     assert V_c[-1] < V_c[0] or name == "case_02"
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if name not in ("case_01", "case_09", "case_10")])
 def test_the_decaying_tail_ends_properly(name: str) -> None:
-    result = run(scenes.load(name).grasp, scenes.load(name).initial_state, 1000.0, [500.0, 1000.0])
-    level = energy(scenes.load(name).grasp, result.states)
+    result = run(grasp_of(scenes.load(name)), scenes.load(name).initial_state, 1000.0, [500.0, 1000.0])
+    level = energy(grasp_of(scenes.load(name)), result.states)
     assert done(result).work[Work.ROOT_ITERATIONS] < 3_000_000
     # amplitudes of 1e-30 m and less are what rounding leaves of a motion that began with 0.5 m
     assert level.V_c[1] <= level.V_c[0] * (1 + 1e-10) + 1e-60
@@ -64,7 +64,7 @@ def test_the_first_output_is_the_start(start: Any) -> None:
 
 def test_the_first_and_the_last_output_are_start_and_end() -> None:
     scene = scenes.load("case_03")
-    dense = run(scene.grasp, scene.initial_state, 20.0, np.linspace(0.0, 20.0, 9001))
+    dense = run(grasp_of(scene), scene.initial_state, 20.0, np.linspace(0.0, 20.0, 9001))
     assert np.array_equal(dense.states[-1], dense.integrator.state)
     assert np.array_equal(dense.states[0], scene.initial_state)
 
@@ -73,7 +73,7 @@ def test_the_first_and_the_last_output_are_start_and_end() -> None:
 @pytest.mark.parametrize("pieces", [7, 250, 5000])
 def test_splitting_one_horizon_changes_nothing(name: str, pieces: int) -> None:
     scene = scenes.load(name)
-    whole = run(scene.grasp, scene.initial_state, 5.0)
+    whole = run(grasp_of(scene), scene.initial_state, 5.0)
     parts = Integrator(scene.system, continuous=True)
     for i in range(pieces):
         parts.advance(5.0 / pieces, start=5.0 * i / pieces)
@@ -86,9 +86,9 @@ def test_splitting_one_horizon_changes_nothing(name: str, pieces: int) -> None:
 
 def test_repeated_and_empty_output_times() -> None:
     scene = scenes.load("case_01")
-    result = run(scene.grasp, scene.initial_state, 1.0, [0.0, 0.0, 0.45, 0.45, 1.0, 1.0])
+    result = run(grasp_of(scene), scene.initial_state, 1.0, [0.0, 0.0, 0.45, 0.45, 1.0, 1.0])
     assert np.array_equal(result.states[::2], result.states[1::2])
-    assert run(scene.grasp, scene.initial_state, 1.0, []).states.shape == (0, 6)
+    assert run(grasp_of(scene), scene.initial_state, 1.0, []).states.shape == (0, 6)
 
 
 def test_advance_by_nothing_changes_nothing() -> None:
@@ -136,7 +136,7 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
     assert table.done.all()
     for name, setting in (("exact", np.float32(1e-6)), ("rk4", 1), ("paper", 1), ("discrete_gradient", np.float32(1))):
         simulate(scene, method=name, setting=setting, grid=grid)
-    simulate(scene, sampled=True, accuracy=np.float32(1e-6), max_work=np.int32(10**8), grid=grid)
+    simulate(scene, sampled=True, setting=np.float32(1e-6), max_work=np.int32(10**8), grid=grid)
     assert compiled() == known
     assert len(advance.signatures) == 1
 
@@ -144,7 +144,7 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
 def test_event_budget_stops_with_its_status() -> None:
     scene = scenes.load("case_01")
     for budget in (0, 1, 10):
-        result = run(scene.grasp, scene.initial_state, 20.0, GRID, max_events=budget)
+        result = run(grasp_of(scene), scene.initial_state, 20.0, GRID, max_events=budget)
         assert result.integrator.status is Status.EVENT_BUDGET, budget
         assert len(result.integrator.events) <= budget + 2
         assert len(result.states) < len(GRID)
@@ -152,7 +152,7 @@ def test_event_budget_stops_with_its_status() -> None:
 
 def test_event_budget_beyond_the_kernel_rows() -> None:
     scene = scenes.load("case_02")
-    result = run(scene.grasp, scene.initial_state, 5000.0, np.linspace(0, 5000, 501), max_events=2000)
+    result = run(grasp_of(scene), scene.initial_state, 5000.0, np.linspace(0, 5000, 501), max_events=2000)
     assert result.integrator.status is Status.EVENT_BUDGET
     assert 2000 <= len(result.integrator.events) < 4000
     assert 0 < len(result.states) < 501
@@ -163,19 +163,19 @@ def test_event_budget_beyond_the_kernel_rows() -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -1.0])
 def test_bad_durations_are_refused(bad: float) -> None:
     with pytest.raises(ValueError, match="duration"):
-        Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
+        Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True).advance(bad)
 
 
 @pytest.mark.parametrize("state", [AT_REST[:5], [math.nan, *AT_REST[1:]], [math.inf, *AT_REST[1:]], [AT_REST]])
 def test_bad_states_are_refused(state: Any) -> None:
     with pytest.raises(ValueError, match="six finite"):
-        Integrator(System.of(make_grasp(), np.array(state)), continuous=True)
+        Integrator(system_of(make_grasp(), np.array(state)), continuous=True)
 
 
 @pytest.mark.parametrize("accuracy", [0.0, -1.0, 9e-17, 2e-3, math.nan])
 def test_bad_accuracies_are_refused(accuracy: float) -> None:
     with pytest.raises(ValueError, match="accuracy"):
-        Integrator(System.of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
+        Integrator(system_of(make_grasp(), np.array(AT_REST)), continuous=True, accuracy=accuracy)
 
 
 EVERYTHING = """

@@ -28,9 +28,9 @@ from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT
-from grasp_ros.physics.model import impact_forces
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES
 from grasp_ros.simulation import simulate
+from lab.reference.grasp import grasp_of, impact_forces
 
 pytestmark = pytest.mark.slow  # real processes
 
@@ -147,7 +147,7 @@ def test_monitor_values_follow_from_the_recorded_states(two_runs: tuple[Path, Pa
     assert recording.lyapunov[:, 4].sum() < -1.0  # what the impacts and dampers have taken
     assert not recording.lyapunov[:, 5].any()
     assert set(recording.lyapunov[:, 3]) == {0.0, 1.0, 2.0, 3.0}
-    for side, force in zip(("left", "right"), impact_forces(recording.scene.grasp, recording.state), strict=True):
+    for side, force in zip(("left", "right"), impact_forces(grasp_of(recording.scene), recording.state), strict=True):
         assert np.array_equal(recording.outputs[f"contact/{side}"], force)
         assert force.max() > 10.0
 

@@ -31,10 +31,10 @@ from grasp_ros.graph.terminal import SIGNS, Moment, View
 from grasp_ros.graph.tools.watch import HINT
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.layout import LEFT, RIGHT
-from grasp_ros.physics.model import impact_forces
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.topics import CONTACTS, FRAME, LYAPUNOV_NAMES, ROBOT_DESCRIPTION
 from grasp_ros.simulation import simulate
+from lab.reference.grasp import grasp_of, impact_forces
 
 pytestmark = pytest.mark.slow  # real processes
 TRACK = 72  # columns
@@ -72,7 +72,7 @@ def test_markers_show_the_states_and_only_where_somebody_looks(
         assert boxes[LEFT] == state[0] - 0.06
         assert boxes[RIGHT] == state[4] + 0.06
         arrows = [m for m in picture.markers if m.ns == "contact forces"]
-        for arrow, force in zip(arrows, impact_forces(case.grasp, state), strict=True):
+        for arrow, force in zip(arrows, impact_forces(grasp_of(case), state), strict=True):
             assert arrow.action == (Marker.ADD if force > 0.0 else Marker.DELETE)
             assert abs(arrow.points[1].x - arrow.points[0].x) == pytest.approx(force / 100.0)
     joints = ElementTree.fromstring(texts[0]).findall("joint")

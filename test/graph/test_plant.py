@@ -26,6 +26,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
 from grasp_ros.simulation import simulate
 from lab.drills.nodes import plain_messages
+from lab.reference.grasp import commands
 
 pytestmark = pytest.mark.slow  # real processes
 
@@ -169,7 +170,7 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(
     def answer(message: JointState) -> None:
         states.append(state_of(message)[0])
         now = messages.to_ns(message.header.stamp)
-        forces = expected.scene.system.commands(now // 1_000_000, states[-1])
+        forces = commands(expected.scene.system, now // 1_000_000, states[-1])
         for publisher in publishers:
             publisher.publish(plain_messages.wrench(now - 1_000_000, 100.0))
             publisher.publish(plain_messages.wrench(now, math.nan))

@@ -8,10 +8,10 @@ from oracles import STANDARD, energy, run
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.layout import Transition
-from grasp_ros.physics.model import Arm, Contact, Grasp, hertzian_force, impact_force, in_contact
-from grasp_ros.physics.system import System
+from grasp_ros.physics.model import Arm, Contact, hertzian_force, impact_force, in_contact
 from grasp_ros.simulation import simulate
 from lab.reference import integrate
+from lab.reference.grasp import Grasp, grasp_of, system_of
 from lab.studies import certificate
 from lab.studies.certificate import SCENES, jumps, safe_p
 
@@ -52,7 +52,7 @@ def test_v_c_never_rises_and_v_rises_only_at_reentries(seed: int) -> None:
 
 
 def test_random_grasps_include_jumps() -> None:
-    found = [jumps(System.of(*draw(np.random.default_rng(seed))), 4.0) for seed in range(40)]
+    found = [jumps(system_of(*draw(np.random.default_rng(seed))), 4.0) for seed in range(40)]
     assert sum(bool(each) for each in found) >= 4
 
 
@@ -81,7 +81,7 @@ def test_jumps_have_the_known_heights() -> None:
 def test_smallest_jump_is_confirmed_by_the_reference() -> None:
     scene = scenes.load("v_jump_smallest_p")
     found = jumps(scene.system, 1.0)
-    reference = integrate(scene.grasp, scene.initial_state.tolist(), [0.0, 0.6], digits=25)
+    reference = integrate(grasp_of(scene), scene.initial_state.tolist(), [0.0, 0.6], digits=25)
     left = [float(time) for time in reference.touches[0]]
     assert [jump.time for jump in found] == pytest.approx(left[1:], abs=1e-10)
     assert [jump.side for jump in found] == [0]
@@ -91,7 +91,7 @@ def test_a_small_search_finds_a_jump_near_the_smallest_p() -> None:
     family = certificate.families()[1]
     found = certificate.search(family, draws=400, steps=300, seed=2)
     start, mass, hertzian = family.start(found.place)
-    again = jumps(System.of(certificate.table_one(found.p, mass, hertzian), start), certificate.HORIZON)
+    again = jumps(system_of(certificate.table_one(found.p, mass, hertzian), start), certificate.HORIZON)
     assert max(jump.height for jump in again) == found.jump.height >= family.part * 15.0 * (start @ start)
     assert 2.0 < found.p < 3.5
 
@@ -109,8 +109,8 @@ def test_theorem_2_excludes_clamped_pairs(seed: int) -> None:
 @pytest.mark.parametrize("name", PAPER)
 def test_the_papers_cases_are_safe(name: str) -> None:
     scene = scenes.load(name)
-    p = scene.grasp.left_contact.dissipation
-    assert (p < safe_p(scene.grasp, scene.initial_state)) == (name != "case_04")
+    p = grasp_of(scene).left_contact.dissipation
+    assert (p < safe_p(grasp_of(scene), scene.initial_state)) == (name != "case_04")
     assert all(event.kind in (Transition.TOUCH, Transition.RELEASE) for event in simulate(scene).events)
 
 

@@ -14,12 +14,13 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import Energy, energy, pairs_of
 from grasp_ros.physics.layout import LEFT
-from grasp_ros.physics.model import acceleration, impact_force, in_contact, penetration
+from grasp_ros.physics.model import impact_force, in_contact, penetration
 from grasp_ros.physics.system import System
 from lab.paper import conditions, equations, quadratic_form, sample
 from lab.paper.cases import load_cases
 from lab.paper.equations import CROSSING, rows_of
 from lab.paper.sample import Sample
+from lab.reference.grasp import acceleration
 
 OFF = 1.001
 

@@ -11,6 +11,7 @@ from oracles import balance_of, impact, reduced_mass
 
 from grasp_ros import scene as scenes
 from lab.oracles.closed_forms import chain_speeds, elastic_period, graze, tail_rate
+from lab.reference.grasp import grasp_of
 
 
 @pytest.mark.parametrize(
@@ -65,8 +66,8 @@ def test_impact_oracle_solves_its_equation() -> None:
 def test_balance_notices_a_wrong_model() -> None:
     """O3."""
     scene = scenes.load("case_01")
-    good = balance_of(scene.grasp, scene.initial_state, 5.0)
-    coarse = balance_of(scene.grasp, scene.initial_state, 5.0, accuracy=1e-3)
+    good = balance_of(grasp_of(scene), scene.initial_state, 5.0)
+    coarse = balance_of(grasp_of(scene), scene.initial_state, 5.0, accuracy=1e-3)
     assert np.abs(good.energy).max() < 1e-12 < 1e-9 < np.abs(coarse.energy).max()
 
 

@@ -9,6 +9,7 @@ import pytest
 from oracles import energy
 
 from grasp_ros import scene as scenes
+from lab.reference.grasp import grasp_of
 from lab.studies import drift, figures, predictability
 
 
@@ -33,7 +34,7 @@ def test_discrete_gradient_does_not_drift_with_the_roundings_of_its_matrix(tmp_p
 def test_elastic_scene_is_case_2_for_longer() -> None:
     long = drift.elastic(100.0)
     assert long.duration == 100.0
-    assert energy(long.grasp, long.initial_state).V_c == pytest.approx(5.1)
+    assert energy(grasp_of(long), long.initial_state).V_c == pytest.approx(5.1)
 
 
 def test_what_a_scene_can_hold() -> None:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from gmpy2 import mpfr
 
-from grasp_ros.physics.model import Arm, Contact, Grasp
+from grasp_ros.physics.model import Arm, Contact
 from lab.reference import Reference, integrate
+from lab.reference.grasp import Grasp
 
 pytestmark = pytest.mark.slow  # 20 s in 30 digits
 

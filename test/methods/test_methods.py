@@ -13,9 +13,9 @@ from grasp_ros.methods.contract import STEP
 from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
-from grasp_ros.physics.system import System
 from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import elastic_period
+from lab.reference.grasp import system_of
 
 STEPPING = [name for name in METHODS if name != EXACT]
 LOCATING = [name for name in STEPPING if METHODS[name].events]
@@ -80,7 +80,7 @@ def test_restitution_of_one_impact(name: str) -> None:
 
 
 def test_jacobian_is_the_derivative_of_the_right_hand_side() -> None:
-    q = parameters(System.of(make_grasp(p=0.3, right=STANDARD._replace(mass=2.0)), np.zeros(6)))
+    q = parameters(system_of(make_grasp(p=0.3, right=STANDARD._replace(mass=2.0)), np.zeros(6)))
     y = np.array([0.01, 0.4, 0.002, -0.1, -0.003, 0.2])
     eps = 1e-7
     numeric = np.array([
@@ -113,7 +113,7 @@ def test_exact_is_the_default_and_its_setting_is_the_accuracy() -> None:
     assert plain.method == EXACT
     assert plain.state.tobytes() == named.state.tobytes()
     coarse = simulate(scene, method=EXACT, setting=1e-6)
-    assert coarse.state.tobytes() == simulate(scene, accuracy=1e-6).state.tobytes()
+    assert coarse.state.tobytes() == simulate(scene, setting=1e-6).state.tobytes()
     assert coarse.state.tobytes() != plain.state.tobytes()
 
 

@@ -12,9 +12,9 @@ from oracles import FREE, STANDARD, energy, flight_array, make_grasp
 from grasp_ros.methods import discrete_gradient, fixed_step
 from grasp_ros.methods.contract import Problem, Solution
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
-from grasp_ros.physics.model import Array, Grasp, acceleration
-from grasp_ros.physics.system import System
+from grasp_ros.physics.model import Array
 from grasp_ros.simulation import simulate
+from lab.reference.grasp import Grasp, acceleration, grasp_of, system_of
 
 SEVERAL = 10_000
 
@@ -26,7 +26,7 @@ def fixed(rule: int, grasp: Grasp, state: Any, grid: Any, step: float) -> Soluti
 def problem_of(grasp: Grasp, state: Any, grid: Any, step: float) -> Problem:
     """Up to the last output time."""
     times = np.asarray(grid, dtype=float)
-    return Problem(System.of(grasp, state), float(times[-1]), times, step, SEVERAL)
+    return Problem(system_of(grasp, state), float(times[-1]), times, step, SEVERAL)
 
 
 def slope(steps: Any, errors: Any) -> float:
@@ -138,8 +138,8 @@ def test_discrete_gradient_conserves_energy_through_contacts() -> None:
     scene = horizon("case_02", 20.0)
     for step in (1e-2, 1e-3):
         motion = simulate(scene, method="discrete_gradient", setting=step)
-        level = energy(scene.grasp, motion.state).V_c
-        assert (energy(scene.grasp, motion.state).mode > 0).sum() > 100
+        level = energy(grasp_of(scene), motion.state).V_c
+        assert (energy(grasp_of(scene), motion.state).mode > 0).sum() > 100
         assert np.abs(level / level[0] - 1.0).max() < 1e-12
 
 
@@ -148,7 +148,7 @@ def test_discrete_gradient_loses_what_the_damping_terms_say() -> None:
     scene = horizon("case_01", 2.0)
     step = 1e-3
     motion = simulate(scene, method="discrete_gradient", setting=step, grid=np.arange(2001) * step)
-    level = energy(scene.grasp, motion.state).V_c
+    level = energy(grasp_of(scene), motion.state).V_c
     y = motion.state
     mean = (y[1:, 1::2] + y[:-1, 1::2]) / 2.0
     lost = 2.0 * step * 0.7 * (mean[:, 0] ** 2 + mean[:, 2] ** 2)

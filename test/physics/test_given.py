@@ -101,7 +101,7 @@ def test_what_is_no_output_time_is_refused(grid: Any, word: str) -> None:
 
 @pytest.mark.parametrize(
     "settings",
-    [{"setting": 1, "method": "rk4"}, {"accuracy": np.float32(1e-9)}, {"setting": np.float32(1e-6)},
+    [{"setting": 1, "method": "rk4"}, {"setting": np.float32(1e-6)},
      {"setting": np.array(1e-9)}, {"max_events": 1e7}, {"max_work": np.int32(10**6)}, {"sampled": np.True_},
      {"sampled": 1}, {"setting": np.int64(1), "method": "rk4"}],
     ids=repr,
@@ -119,7 +119,7 @@ def test_what_a_run_takes_its_file_gives_back(tmp_path: Path, settings: dict[str
     ("settings", "words"),
     [({"max_work": float("nan")}, "max_work: nan"), ({"max_events": "9"}, "max_events: '9'"),
      ({"max_events": 2.5}, "max_events: 2.5"), ({"max_events": True}, "max_events: True"),
-     ({"accuracy": "1e-9"}, "exact: accuracy: '1e-9'"),
+     ({"setting": "1e-9"}, "exact: accuracy: '1e-9'"),
      ({"method": "rk4", "setting": "1"}, "rk4: step: '1'"), ({"max_work": -1}, "max_work: -1")],
 )
 def test_settings_that_are_none(settings: dict[str, Any], words: str) -> None:
@@ -132,7 +132,6 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda setup: ensemble(CASE, {}, setup=setup), {}, "setup: dict"),
     (lambda outcomes: ensemble(CASE, {}, outcomes), 3, "outcomes: 3"),
     (lambda sampled: ensemble(CASE, {}, setup=Setup(sampled=sampled)), "no", "sampled: 'no'"),
-    (lambda quasi: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0),), 9, quasi=quasi), "no", "quasi: 'no'"),
     (lambda log: Plan(CASE, Setup(), (Axis(GAIN, 1.0, 2.0, log=log),)), "no", f"{GAIN}: log: 'no'"),
     (lambda sampled: simulate(CASE, sampled=sampled), "no", "sampled: 'no'"),
     (lambda changes: simulate(CASE, changes=changes), [1], "changes: [1]"),

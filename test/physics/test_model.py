@@ -11,17 +11,14 @@ from oracles import STANDARD, energy, make_grasp
 from grasp_ros.physics import layout
 from grasp_ros.physics.model import (
     Contact,
-    Grasp,
     Mode,
-    acceleration,
-    feedback,
     hertzian_force,
     impact_force,
     impact_force_of,
-    impact_forces,
     in_contact,
     penetration,
 )
+from lab.reference.grasp import Grasp, acceleration, feedback, impact_forces
 
 RNG = np.random.default_rng(1990)
 GRASP = Grasp(

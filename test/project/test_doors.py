@@ -124,12 +124,12 @@ def store(path: Path, arrays: dict[str, np.ndarray], **members: bytes | None) ->
 @pytest.mark.parametrize(
     ("members", "complaint"),
     [
-        ({"t": None}, "arrays "), ({"more": b"x"}, "arrays "), ({"t": b""}, "t: no array"),
+        ({"t": None}, "digest: "), ({"more": b"x"}, "more: no array"), ({"t": b""}, "t: no array"),
         ({"t": header("'|O'", "(5,)") + b"cos\nsystem\n(S'true'\ntR."}, "t: Object arrays cannot be loaded"),
         ({"t": header("'<f8'", "(1000000000000,)")}, "t: (Unable to allocate|EOF)"),
         ({"t": header("'<f8'", "(5000,)")}, "t: EOF"),
         ({"t": header("'<f8'", "(-5,)")}, "t: negative"), ({"t": header("'<f8'", "5")}, "t: shape is not valid"),
-        ({"t": header("[('a', '<f8')]", "(5,)") + bytes(40)}, r"t: \[\('a', '<f8'\)\] of shape \(5,\) is not allowed"),
+        ({"t": header("[('a', '<f8')]", "(5,)") + bytes(40)}, "digest: "),
         ({"t": header("(" * 2000, "(5,)") + bytes(40)}, "t: .*(too many nested|EOF in)"),
         ({"t": header("'<f8', 'x': __import__('os')", "(5,)") + bytes(40)}, "t: malformed"),
         ({"scene": header("'<U1'", "()") + b"\xff\xff\xff\xff"}, "invalid maximum character"),

@@ -35,7 +35,6 @@ REFUSALS: dict[str, Callable[[Path], object]] = {
     "scene": lambda _: scenes.load("nowhere"),
     "sections": lambda _: scenes.compose("none", {}),
     "change": lambda _: scenes.load("case_01").changed({"tilt.angle_rad": 1.0}),
-    "grasp": lambda _: scenes.load("hammer").grasp,
     "accuracy": lambda _: Integrator(scenes.load("case_01").system, continuous=True, accuracy=1.0),
     "duration": lambda _: Integrator(scenes.load("case_01").system, continuous=True).advance(-1.0),
     "grid": lambda _: simulate(scenes.load("case_01"), grid=np.array([2.0, 1.0])),

@@ -80,14 +80,6 @@ def test_effects_refuse_what_makes_no_sense(name: str, settings: list[str], word
     assert all(word in str(caught.value) for word in words), str(caught.value)
 
 
-def test_only_the_paper_s_grasp_is_called_one() -> None:
-    for name in OTHERS:
-        if not name.startswith("v_jump"):
-            with pytest.raises(ValueError, match="not the paper's grasp"):
-                _ = scenes.load(name).grasp
-    assert scenes.load("case_05").grasp.left.mass == 10.0
-
-
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "add-an-effect.md"
 
 

@@ -12,6 +12,7 @@ from oracles import CASES
 from grasp_ros import scene as scenes
 from grasp_ros.scene import Scene, load, parse
 from grasp_ros.scene.validation import SceneError
+from lab.reference.grasp import grasp_of
 
 
 def bits(scene: Scene) -> list[str]:
@@ -77,11 +78,11 @@ def test_numbers_of_the_paper(name: str) -> None:
     assert any("x_l(0)" in reading for reading in scene.readings)
     left, right = expected["left_arm"], expected["right_arm"]
     assert scene.initial_state.tolist() == [left["position_m"], 0.0, 0.0, 0.0, right["position_m"], 0.0]
-    assert scene.grasp.object_mass == expected["object"]["mass_kg"]
-    assert scene.grasp.left.mass == left["mass_kg"]
-    assert scene.grasp.right.damping == right["damping_Ns_per_m"]
-    assert scene.grasp.right_contact.dissipation == expected["right_contact"]["dissipation_s_per_m"]
-    assert scene.grasp.left.position_gain == expected["left_feedback"]["position_gain_N_per_m"]
+    assert grasp_of(scene).object_mass == expected["object"]["mass_kg"]
+    assert grasp_of(scene).left.mass == left["mass_kg"]
+    assert grasp_of(scene).right.damping == right["damping_Ns_per_m"]
+    assert grasp_of(scene).right_contact.dissipation == expected["right_contact"]["dissipation_s_per_m"]
+    assert grasp_of(scene).left.position_gain == expected["left_feedback"]["position_gain_N_per_m"]
     assert (scene.period_ns, scene.ticks) == (1_000_000, 20_000)
     assert scene.time_of(scene.ticks) == 20.0
 
@@ -119,7 +120,7 @@ def test_every_way_to_write_a_number(written: str) -> None:
 
 def test_a_negative_gain_that_leaves_a_spring_is_allowed() -> None:
     assert (
-        parse(document("left_feedback", "position_gain_N_per_m", -10.0), "n", "n.yaml").grasp.left.position_gain
+        grasp_of(parse(document("left_feedback", "position_gain_N_per_m", -10.0), "n", "n.yaml")).left.position_gain
         == -10.0
     )
 
@@ -132,10 +133,10 @@ def test_periods_that_divide_the_duration(period: float) -> None:
 
 def test_settings_replace_numbers() -> None:
     scene = load("case_01", ["left_arm.mass_kg=2", "left_contact.dissipation_s_per_m=1e1", "left_arm.mass_kg=3.5"])
-    assert scene.grasp.left.mass == 3.5
-    assert scene.grasp.left_contact.dissipation == 10.0
+    assert grasp_of(scene).left.mass == 3.5
+    assert grasp_of(scene).left_contact.dissipation == 10.0
     assert bits(scene)[0:2] == bits(load("case_01"))[0:2]
-    assert load("case_01").grasp.left.mass == 1.0
+    assert grasp_of(load("case_01")).left.mass == 1.0
 
 
 def test_files_and_names(tmp_path: Path) -> None:

@@ -40,7 +40,7 @@ def test_a_page_has_its_pictures_inside_and_bodies_may_be_absent(tmp_path: Path)
     [
         ("a.png", {}, r"a\.png: \.png is not allowed; allowed: \.gif, \.html"),
         ("a", {}, "needs an ending"),
-        ("a.gif", {"speed": 0.0}, "--speed 0.0 is not allowed"),
+        ("a.gif", {"speed": 0.0}, "speed: 0.0 is not allowed"),
         ("a.gif", {"speed": 1e-4}, "pictures; allowed: at most"),
         ("no/a.gif", {"span": (0.0, 0.05)}, "cannot be written: No such file"),
     ],

@@ -11,6 +11,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.physics.energy import EnergyBalance, energy_balance
 from grasp_ros.physics.model import Array
 from grasp_ros.simulation import Trajectory, simulate
+from lab.reference.grasp import grasp_of
 
 
 @pytest.mark.parametrize("name", scenes.names())
@@ -60,8 +61,8 @@ def test_a_weak_spring_under_a_constant_force_raises_no_alarm() -> None:
 def gained_and_work(scene: scenes.Scene) -> tuple[Array, Array]:
     """Energy that the plant gains in every control period, and the work of the commands."""
     result = simulate(scene, sampled=True)
-    left, right = (arm._replace(position_gain=0.0, velocity_gain=0.0) for arm in (scene.grasp.left, scene.grasp.right))
-    stored = 0.5 * energy(scene.grasp._replace(left=left, right=right), result.state).V_c
+    left, right = (arm._replace(position_gain=0.0, velocity_gain=0.0) for arm in grasp_of(scene)[:2])
+    stored = 0.5 * energy(grasp_of(scene)._replace(left=left, right=right), result.state).V_c
     return np.diff(stored), (result.command[:-1] * np.diff(result.state[:, [0, 4]], axis=0)).sum(axis=1)
 
 

@@ -48,7 +48,7 @@ def test_rows_are_simulations_to_the_last_bit(name: str, sampled: bool) -> None:
     table = ensemble(scene, changes, OUTCOMES, setup=Setup(accuracy=1e-12, sampled=sampled))
     for i in range(ROWS):
         row = scene.changed({key: float(values[i]) for key, values in changes.items()})
-        run = simulate(row, sampled=sampled, accuracy=1e-12)
+        run = simulate(row, sampled=sampled, setting=1e-12)
         found = [table.columns[column][i] for column in GROUPS["last_state"]]
         np.testing.assert_array_equal(found, run.state[-1])
 

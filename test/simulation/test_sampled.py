@@ -18,10 +18,11 @@ from grasp_ros.physics import control
 from grasp_ros.physics.control import NO_NOISE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition
-from grasp_ros.physics.model import Array, feedback
+from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import SampledPlant, simulate
 from grasp_ros.simulation.ticks import tick_of, tick_times
+from lab.reference.grasp import feedback
 
 
 def written_out(scene: Scene, delay: int = 0) -> tuple[Array, Array]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import System
+from grasp_ros.physics.system import COLUMN, Place, System
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import Topic
 
@@ -46,8 +47,8 @@ class Oddity(NamedTuple):
         return f"{self.key}: {value!r} {self.why}; meant: {self.meant}"
 
 
-def nothing(*_: object) -> Iterable[Any]:
-    """For effects that always do something, and whose numbers go together in any way."""
+def nothing(*_: object) -> Any:
+    """For effects whose numbers go straight into arrays, go together in any way, and always do something."""
     return ()
 
 
@@ -58,15 +59,27 @@ class Effect:
     section: str  # its name in a scene; the effect is there if the scene names it
     text: str  # what it simulates, in one line
     parameters: tuple[Parameter, ...]
-    build: Callable[[Sections, System], None]  # adds its terms to the system
+    build: Callable[[Sections, System], None]  # adds to the system what is more than numbers in their places
     certificate: str  # what it does to V_c, in words
     needs: tuple[str, ...] = ()  # sections that must be there as well
+    row: int = 0  # of the numbers that have a place in arrays: a side or a body
     node: str = "plant"  # the executable that declares its parameters
     commands: Topic | None = None  # topic of the controller that it brings
     outputs: tuple[Output, ...] = ()  # what the plant publishes about it
     problems: Callable[[Sections], Iterable[Problem]] = nothing  # what is wrong beyond ranges
     oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing  # suspicious settings
     example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it
+
+    @cached_property
+    def places(self) -> dict[str, Place]:
+        """Where numbers go that enter in one place of the arrays alone, by key."""
+        return {own.key: _place(self.row, *own.place) for own in self.parameters if own.place is not None}
+
+
+def _place(row: int, array: str, column: int) -> Place:
+    if array == "state":
+        return array, COLUMN[row] + column, 0
+    return array, 0 if array == "coulomb" else int(row), int(column)
 
 
 def period_ns(sections: Sections) -> int:

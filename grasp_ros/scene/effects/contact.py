@@ -10,22 +10,17 @@ from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections
+from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections, nothing
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import CONTACTS
 
 ROUNDING = 1e-9  # of the largest position, or of 1 m: what is less deep is meant to touch
 PARAMETERS = (
-    Parameter("hertz_N_per_m1_5", *RANGES["Hertzian stiffness H"].bounds, "Hertzian stiffness of the impact, H"),
+    Parameter("hertz_N_per_m1_5", *RANGES["Hertzian stiffness H"].bounds, "Hertzian stiffness of the impact, H",
+              place=("pairs", Law.HERTZIAN)),
     Parameter("dissipation_s_per_m", *RANGES["dissipation p"].bounds, "Hunt-Crossley dissipation of the impact, p",
-              optional=True),
+              optional=True, place=("pairs", Law.DISSIPATION)),
 )
-
-
-def _build(side: str, sections: Sections, system: System) -> None:
-    numbers = sections[f"{side}_contact"]
-    row = system.pairs[SIDES[side]]
-    row[Law.HERTZIAN], row[Law.DISSIPATION] = numbers["hertz_N_per_m1_5"], numbers.get("dissipation_s_per_m", 0.0)
 
 
 def _force(side: int, system: System, _: int, state: Array) -> float:
@@ -71,9 +66,9 @@ def _pressing(system: System, side: int, depth: float) -> float:
 
 EFFECTS = tuple(
     Effect(
-        f"{side}_contact", f"the {side} arm hits the object", PARAMETERS, partial(_build, side),
+        f"{side}_contact", f"the {side} arm hits the object", PARAMETERS, nothing,
         "4/5 H u^(5/2) while u >= 0; an impact takes 2 p H u^(3/2) u'^2", needs=(f"{side}_arm", "object"),
-        oddities=partial(_odd, side), outputs=(Output(CONTACTS[side], partial(_force, SIDES[side])),),
+        row=SIDES[side], oddities=partial(_odd, side), outputs=(Output(CONTACTS[side], partial(_force, SIDES[side])),),
     )
     for side in SIDES
 )

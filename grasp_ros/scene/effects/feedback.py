@@ -5,31 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
-from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
+from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections, nothing
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import COMMANDS
 
 PARAMETERS = (
-    Parameter("position_gain_N_per_m", *RANGES["position gain"].bounds, "gain of the position feedback, Kp", live=True),
+    Parameter("position_gain_N_per_m", *RANGES["position gain"].bounds, "gain of the position feedback, Kp", live=True,
+              place=("laws", Column.POSITION_GAIN)),
     Parameter("velocity_gain_Ns_per_m", *RANGES["velocity gain"].bounds, "gain of the velocity feedback, Kv",
-              live=True),
+              live=True, place=("laws", Column.VELOCITY_GAIN)),
     Parameter("set_point_m", *RANGES["position, set-point"].bounds,
               "position that the feedback aims at; without it 0, as in the paper", optional=True, live=True,
-              smallest=0.0),
+              smallest=0.0, place=("laws", Column.SET_POINT)),
     Parameter("feed_forward_N", *RANGES["force"].bounds, "constant force added to the feedback", optional=True,
-              live=True),
+              live=True, place=("laws", Column.FEED_FORWARD)),
 )
-
-
-def _build(side: str, sections: Sections, system: System) -> None:
-    numbers = sections[f"{side}_feedback"]
-    system.laws[SIDES[side]] = ControlLaw(
-        numbers["position_gain_N_per_m"], numbers["velocity_gain_Ns_per_m"], numbers.get("set_point_m", 0.0),
-        numbers.get("feed_forward_N", 0.0),
-    )
 
 
 def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
@@ -45,9 +38,9 @@ def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
 
 EFFECTS = tuple(
     Effect(
-        f"{side}_feedback", f"controller of the {side} arm: linear state feedback", PARAMETERS, partial(_build, side),
+        f"{side}_feedback", f"controller of the {side} arm: linear state feedback", PARAMETERS, nothing,
         "Kp x^2, with a set-point or a constant force (k + Kp) (x - x_e)^2; the feedback takes 2 Kv x'^2",
-        needs=(f"{side}_arm",), node=f"{side}_controller", commands=COMMANDS[side],
+        needs=(f"{side}_arm",), row=SIDES[side], node=f"{side}_controller", commands=COMMANDS[side],
         example={"set_point_m": 0.05, "feed_forward_N": 0.5}, oddities=partial(_odd, side),
     )
     for side in SIDES

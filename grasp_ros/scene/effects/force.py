@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from itertools import pairwise
 
@@ -41,18 +41,8 @@ ROUNDING = 1e-9  # of the amplitude
 NEVER = "comes when the run has ended: nothing ever acts"
 
 
-def _pulse(section: str, sections: Sections) -> tuple[Callable[[int], float], list[int]]:
-    numbers, period = sections[section], period_ns(sections)
-    begin = round(numbers["start_s"] * NANOSECONDS) // period
-    end = begin + round(numbers["length_s"] * NANOSECONDS) // period
-    return (lambda tick: numbers["force_N"] if begin <= tick < end else 0.0), [begin, end]
-
-
-def _table(section: str, sections: Sections) -> tuple[Callable[[int], float], list[int]]:
-    numbers, period = sections[section], period_ns(sections)
-    ticks = [round(time * NANOSECONDS) // period for time in numbers["time_s"]]
-    forces = (0.0, *numbers["force_N"])
-    return (lambda tick: forces[bisect_right(ticks, tick)]), ticks
+def _nanoseconds(seconds: float) -> int:
+    return round(seconds * NANOSECONDS)
 
 
 def _add(section: str, force: ExternalForce, system: System) -> None:
@@ -60,9 +50,18 @@ def _add(section: str, force: ExternalForce, system: System) -> None:
     system.caveats.append(f"{section} does work")
 
 
-def _build_steps(steps: Callable[..., tuple[Callable[[int], float], list[int]]], section: str, body: int,
-                 sections: Sections, system: System) -> None:
-    at, ticks = steps(section, sections)
+def _build_steps(section: str, body: int, sections: Sections, system: System) -> None:
+    """A force from each tick to the next: those of a table, or of a pulse, which is one of two entries."""
+    numbers, period = sections[section], period_ns(sections)
+    if "time_s" in numbers:
+        ticks, forces = [_nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
+    else:
+        begin = _nanoseconds(numbers["start_s"]) // period
+        ticks, forces = [begin, begin + _nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
+
+    def at(tick: int) -> float:
+        return float(forces[bisect_right(ticks, tick)])
+
     _add(section, ExternalForce(body, at, lambda end: [tick for tick in ticks if 0 < tick < end]), system)
 
 
@@ -80,7 +79,7 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
 
 def _is_off(time: float, period: int) -> bool:
     """Whether a time in s is no whole number of periods in ns."""
-    nanoseconds = round(time * NANOSECONDS)
+    nanoseconds = _nanoseconds(time)
     return nanoseconds / NANOSECONDS != time or nanoseconds % period != 0
 
 
@@ -122,8 +121,8 @@ def _odd_pulse(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     start, length = numbers["start_s"], numbers["length_s"]
     if numbers["force_N"] == 0.0:
         yield Oddity(f"{section}.force_N", 0.0, NO_EFFECT, "a force that is not 0")
-    over = round(start * NANOSECONDS) + round(length * NANOSECONDS) - end
-    if round(start * NANOSECONDS) >= end:
+    over = _nanoseconds(start) + _nanoseconds(length) - end
+    if _nanoseconds(start) >= end:
         yield Oddity(f"{section}.start_s", start, NEVER, f"before time.duration_s, {end / NANOSECONDS!r}")
     elif over > 0:
         why = f"reaches {over / NANOSECONDS!r} s beyond the end of the run"
@@ -146,8 +145,8 @@ def _odd_sine(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
 
 def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
     times, forces, end = sections[section]["time_s"], sections[section]["force_N"], run_ns(sections)
-    late = [(time, force) for time, force in zip(times, forces, strict=True) if round(time * NANOSECONDS) >= end]
-    idle = [time for time, force in late if force != 0.0 or round(time * NANOSECONDS) > end]  # 0 at the end closes it
+    late = [(time, force) for time, force in zip(times, forces, strict=True) if _nanoseconds(time) >= end]
+    idle = [time for time, force in late if force != 0.0 or _nanoseconds(time) > end]  # 0 at the end closes it
     key, meant = f"{section}.time_s", f"before time.duration_s, {end / NANOSECONDS!r}"
     if not any(forces):
         yield Oddity(f"{section}.force_N", 0.0, "is every force: they have no effect", "a force that is not 0")
@@ -166,10 +165,10 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
     work = "the force does work: V_c rises by 2 f times the way at most"
     for kind, parameters, build, problems, odd, example in (
-        ("pulse", PULSE, partial(_build_steps, _pulse), partial(_off_tick, ("start_s", "length_s")),
+        ("pulse", PULSE, _build_steps, partial(_off_tick, ("start_s", "length_s")),
          _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
         ("sine", SINE, _build_sine, _sine_problems, _odd_sine, {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
-        ("table", TABLE, partial(_build_steps, _table), _table_problems, _odd_table,
+        ("table", TABLE, _build_steps, _table_problems, _odd_table,
          {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}),
     ):
         section = f"{name}_{kind}"

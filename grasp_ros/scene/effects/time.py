@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Problem, Sections, period_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Problem, Sections, nothing, period_ns
 from grasp_ros.scene.parameter import Parameter
-
-
-def _build(sections: Sections, system: System) -> None:
-    """Time is not part of the equations."""
 
 
 def _problems(sections: Sections) -> Iterable[Problem]:
@@ -34,6 +29,6 @@ EFFECTS = (
             Parameter("control_period_s", *RANGES["control period"].bounds,
                       "how long a command is held if the feedback is sampled", open_low=True),
         ),
-        _build, "none", problems=_problems,
+        nothing, "none", problems=_problems,
     ),
 )
