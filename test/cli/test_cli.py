@@ -164,6 +164,7 @@ def test_commands_are_found_in_the_files_that_have_them() -> None:
     ("from grasp_ros.cli.main import main; main(['--help'])", {"numpy", "numba", "yaml", "matplotlib", "rclpy"}),
     ("from grasp_ros.cli import graph, main; from grasp_ros.graph.nodes import monitor",
      {"numba", "scipy", "matplotlib"}),
+    ("import grasp_ros.cli.report, grasp_ros.cli.simulate", {"rosbags", "mcap", "matplotlib", "rclpy"}),
 ])
 def test_what_is_not_needed_is_not_imported(program: str, unneeded: set[str]) -> None:
     program = f"import sys; {program}; print({unneeded} & {{*sys.modules}})"
