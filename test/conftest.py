@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from grasp_ros import scene
 from grasp_ros.cli.main import main
+from grasp_ros.simulation import simulate
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))  # each has domains of its own
 os.environ["ROS_DOMAIN_ID"] = str(1 + 50 * (WORKER % 2) + os.getpid() % 50)
@@ -64,6 +66,16 @@ def _answer(
     except SystemExit as stop:  # of argparse
         status = stop.code
     return subprocess.CompletedProcess(arguments, status, *capsys.readouterr())
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag of case 1 over its first contacts, the bytes of a graph (see `two_runs`) without one."""
+    from lab.drills import recorder
+
+    path = tmp_path_factory.mktemp("recorded") / "bag"
+    recorder.write(path, simulate(scene.load("case_01", ["time.duration_s=3"]), sampled=True))
+    return path
 
 
 @pytest.fixture(scope="session")
