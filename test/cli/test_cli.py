@@ -111,6 +111,7 @@ sys.exit(main(["simulate", "arm_alone", "-o", "o.npz"]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signal", ["SIGINT", "SIGTERM"])
 def test_a_signal_whose_exception_python_drops_stops_the_command_all_the_same(signal: str, tmp_path: Path) -> None:
     result = subprocess.run([sys.executable, "-c", DROPPED.format(signal=signal)], cwd=tmp_path, capture_output=True,

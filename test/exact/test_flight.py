@@ -392,7 +392,6 @@ def test_reentry_of_a_separating_pair() -> None:
     assert 0.0 < t == pytest.approx(float(expected), rel=1e-14)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("body", [(1.0, 15.0, 0.7, 0.0), (2.0, 3.0, 30.0, 0.0), (1.0, 0.0, 2.0, 0.0), STILL])
 def test_the_bound_holds_and_is_not_idle(body: Body) -> None:
     for q, q_rate in ((1.0, 0.0), (0.2, 3.0), (-0.5, 2.0), (0.0, -1.0)):

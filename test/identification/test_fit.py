@@ -165,6 +165,7 @@ def test_residuals_of_a_wrong_model_are_not_white(held: Trajectory) -> None:
     assert np.isnan(whiteness(white[:9]))
 
 
+@pytest.mark.slow
 def test_a_bag(recorded: Path) -> None:
     recording = read_bag(recorded)
     starts = recording.scene.changed({H_LEFT: 2e3, P_LEFT: 0.5, "left_feedback.position_gain_N_per_m": 3.0})
