@@ -12,7 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from grasp_ros import scene
 from grasp_ros.cli.main import main
+from grasp_ros.simulation import simulate
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw"))  # each has domains of its own
 os.environ["ROS_DOMAIN_ID"] = str(1 + 50 * (WORKER % 2) + os.getpid() % 50)
@@ -20,6 +22,7 @@ ROOT = Path(__file__).parents[1]
 os.environ["PYTHONPATH"] = str(ROOT)  # processes, too, are those of the checkout
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # of hundreds of processes each would compile the package anew
 for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
     if signal.getsignal(number) is signal.SIG_IGN:  # as under nohup, or in the background: children would inherit it
         signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
@@ -63,6 +66,16 @@ def _answer(
     except SystemExit as stop:  # of argparse
         status = stop.code
     return subprocess.CompletedProcess(arguments, status, *capsys.readouterr())
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A bag of case 1 over its first contacts, the bytes of a graph (see `two_runs`) without one."""
+    from lab.drills import recorder
+
+    path = tmp_path_factory.mktemp("recorded") / "bag"
+    recorder.write(path, simulate(scene.load("case_01", ["time.duration_s=3"]), sampled=True))
+    return path
 
 
 @pytest.fixture(scope="session")

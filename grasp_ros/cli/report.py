@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_ros.exact.integrator import Status
-from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.verify import Verification
 from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
@@ -19,6 +17,10 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.chunk import SETTLED
 from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
+
+if TYPE_CHECKING:  # types of bags take long to import, and a simulation has none
+    from grasp_ros.graph.recording import Recording
+    from grasp_ros.graph.verify import Verification
 
 Row = tuple[str, str]
 

@@ -171,13 +171,14 @@ class RunObserver:
         self.seen, switches = self.memory.seen, self.memory.switches
         switches[Switch.WANTED] = wanted
         switches[Switch.LOSSES] = address_of(observe_losses) if wanted & Wanted.LOSSES else 0
+        self._address = address_of(observe)  # before a call: of other types on disk it would be compiled twice
         self._tables, self._block = self.memory.c, block_of(self.memory)
 
     def attach(self, tables: Tables) -> Integers:
         """What a run with this workspace calls after each segment."""
         if tables.c is not self._tables:  # a run in many pieces brings the same ones
             self._tables, self._block = tables.c, block_of(self.memory._replace(c=tables.c, size=tables.size))
-        return np.array([address_of(observe), self._block.ctypes.data])
+        return np.array([self._address, self._block.ctypes.data])
 
     def begin(self, bound: float) -> None:
         """Before a run; `bound` is the part of the largest displacement that counts as settled."""

@@ -111,6 +111,7 @@ sys.exit(main(["simulate", "arm_alone", "-o", "o.npz"]))
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signal", ["SIGINT", "SIGTERM"])
 def test_a_signal_whose_exception_python_drops_stops_the_command_all_the_same(signal: str, tmp_path: Path) -> None:
     result = subprocess.run([sys.executable, "-c", DROPPED.format(signal=signal)], cwd=tmp_path, capture_output=True,
@@ -164,6 +165,7 @@ def test_commands_are_found_in_the_files_that_have_them() -> None:
     ("from grasp_ros.cli.main import main; main(['--help'])", {"numpy", "numba", "yaml", "matplotlib", "rclpy"}),
     ("from grasp_ros.cli import graph, main; from grasp_ros.graph.nodes import monitor",
      {"numba", "scipy", "matplotlib"}),
+    ("import grasp_ros.cli.report, grasp_ros.cli.simulate", {"rosbags", "mcap", "matplotlib", "rclpy"}),
 ])
 def test_what_is_not_needed_is_not_imported(program: str, unneeded: set[str]) -> None:
     program = f"import sys; {program}; print({unneeded} & {{*sys.modules}})"

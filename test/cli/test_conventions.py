@@ -151,6 +151,7 @@ def test_an_output_that_cannot_be_written_is_no_success(words: str, unbuffered: 
     assert (result.returncode, result.stderr) == (1, "grasp: the output cannot be written: No space left on device\n")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_table_that_nobody_takes_in_time_is_no_success(unbuffered: str) -> None:
     """Into a pipe that does not wait; without a buffer Python would drop the rest without a word."""
@@ -174,6 +175,7 @@ def test_wrong_words_are_refused_where_nobody_can_read_why() -> None:
     assert shell("$GRASP bogus 2> /dev/full").returncode == 2
 
 
+@pytest.mark.slow
 def test_what_is_written_under_a_name_in_capitals_is_read_under_it(command: Any) -> None:
     for line in ("new A.YAML", "simulate A.YAML -o A.NPZ", "plot A.NPZ -o A.PNG"):
         result = command(*line.split())

@@ -11,6 +11,7 @@ from PIL import Image
 BEGINS = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", BEGINS)
 def test_scenes_side_by_side_in_every_format(command: Any, tmp_path: Path, ending: str) -> None:
     result = command("plot", "case_01", "case_03", "--set", "time.duration_s=2", "--from", "0.4", "--to", "0.6",

@@ -185,13 +185,13 @@ def test_a_fault_of_ours_is_not_taken_for_bad_input(monkeypatch: pytest.MonkeyPa
 
 FAULT = """
 import sys
-from grasp_ros.cli import simulate
+from grasp_ros.cli import scenes
 from grasp_ros.cli.main import main
 from grasp_ros.physics.errors import Refused
-def broken(*_, **__):
+def broken(*_):
     raise {raised}
-simulate.simulate = broken
-sys.exit(main(["simulate", "case_01"]))
+scenes.show = broken  # a command that begins at once
+sys.exit(main(["scenes"]))
 """
 
 

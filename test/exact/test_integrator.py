@@ -18,7 +18,9 @@ from oracles import AT_REST, CASES, Run, done, energy, kinds, make_grasp, run
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.driver.advance import advance
+from grasp_ros.exact.driver.callback import SIGNATURE
 from grasp_ros.exact.integrator import Integrator, Status
+from grasp_ros.observe.observe import observe
 from grasp_ros.observe.observer import watch
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.layout import Work
@@ -122,9 +124,9 @@ def compiled() -> dict[str, int]:
 @pytest.mark.parametrize("grid", [READ_ONLY, np.arange(2), np.float32([0.0, 0.5]), [0, 1]], ids=range(4))
 def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid: Any) -> None:
     scene = scenes.load("case_01", ["time.duration_s=1"])
-    ensemble(scene, {"object.mass_kg": [1.0]}, ("energy",))
     integrator = Integrator(scene.system, continuous=True)
     watch(integrator, Wanted.LOSSES, 0.02)
+    ensemble(scene, {"object.mass_kg": [1.0]}, ("energy",))
     for name in ("exact", "rk4", "paper", "discrete_gradient"):
         simulate(scene, method=name, grid=np.zeros(1))
     known = compiled()
@@ -139,6 +141,7 @@ def test_whatever_numbers_and_arrays_are_given_run_on_the_same_machine_code(grid
     simulate(scene, sampled=True, setting=np.float32(1e-6), max_work=np.int32(10**8), grid=grid)
     assert compiled() == known
     assert len(advance.signatures) == 1
+    assert observe.nopython_signatures == [SIGNATURE]  # as it is on disk, whoever calls it first
 
 
 def test_event_budget_stops_with_its_status() -> None:

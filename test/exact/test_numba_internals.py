@@ -81,6 +81,7 @@ def test_a_damaged_kernel_is_compiled_anew_and_says_so_once(cached: Path, caplog
         assert not caplog.messages
 
 
+@pytest.mark.slow
 def test_whoever_waits_for_the_compiler_is_told_once_and_a_quiet_command_says_nothing(tmp_path: Path) -> None:
     """Also in Python and where only a part has been compiled, as by the first fit."""
     script = tmp_path / "doors.py"

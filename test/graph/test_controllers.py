@@ -34,7 +34,7 @@ def test_a_controller_that_we_did_not_write_is_recorded_and_verified(
     other = source.replace("left", "right").replace("my_controller", "another").replace(
         "    commands.publish", '    command.header.frame_id = "7" if i else "world"\n    commands.publish')
     without = ("--without", "left_controller", "--without", "right_controller")
-    run = grasp_run("case_01", "--set", "time.duration_s=0.6", *without)
+    run = grasp_run("case_01", "--set", "time.duration_s=0.6", "--no-figure", *without)
     for text in (source, other):
         launch(sys.executable, "-c", text, stderr=subprocess.DEVNULL)
     out, err = run.communicate(timeout=DEADLINE)

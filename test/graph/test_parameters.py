@@ -193,7 +193,7 @@ def test_a_limit_of_memory_in_which_no_node_has_room_is_named(tmp_path: Path, wo
 
 
 def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:
-    run = [*GRASP, "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process"]
+    run = [*GRASP, "run", "arm_alone", "--set", "time.duration_s=0.1", "--one-process", "--no-figure"]
     found = ran(*run, env={**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}, cwd=tmp_path)
     assert found.returncode == 0, found.stderr
 

@@ -81,9 +81,9 @@ def test_markers_show_the_states_and_only_where_somebody_looks(
     assert {joint.find("parent").get("link") for joint in joints} == {FRAME}  # type: ignore[union-attr]
 
 
-def test_the_markers_show_what_the_drawing_of_the_same_state_shows(two_runs: tuple[Path, Path]) -> None:
+def test_the_markers_show_what_the_drawing_of_the_same_state_shows(recorded: Path) -> None:
     """Places of the masses in a terminal's picture, contacts and forces as the bag has them."""
-    recording = bag.read(two_runs[0] / "bag")
+    recording = bag.read(recorded)
     view, level = View(recording.scene), recording.energy
     impacts = np.column_stack([recording.outputs[topic.name] for topic in CONTACTS.values()])
     ticks = [0, *np.flatnonzero(np.diff(level.mode)), *np.argmax(impacts, axis=0)]

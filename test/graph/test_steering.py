@@ -76,7 +76,7 @@ def test_one_flipped_bit_in_a_bag_is_found_and_named(steered: tuple[Path, list[i
 
 
 def test_a_bag_is_published_again_with_its_clock(
-    two_runs: tuple[Path, Path], node: tuple[Any, SingleThreadedExecutor], launch: Any
+    recorded: Path, node: tuple[Any, SingleThreadedExecutor], launch: Any
 ) -> None:
     peer, slow = node
     slow.remove_node(peer)
@@ -86,7 +86,7 @@ def test_a_bag_is_published_again_with_its_clock(
         peer.create_subscription(kind, name, note, messages.qos(JOINT_STATES), raw=True)
     executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
     executor.add_node(peer)  # which has all its readers: a new one may be missed
-    player = launch(*GRASP, "replay", str(two_runs[0] / "bag"), "--rate", "1.5")
+    player = launch(*GRASP, "replay", str(recorded), "--rate", "1.5")
     begin = time.monotonic()
     while player.poll() is None:
         assert time.monotonic() < begin + DEADLINE
@@ -104,9 +104,9 @@ def test_a_bag_is_published_again_with_its_clock(
         assert {stamp % 1_000_000 for stamp in rows} == {0}
 
 
-def test_a_bag_is_not_published_beside_another_one(two_runs: tuple[Path, Path], launch: Any, command: Any) -> None:
+def test_a_bag_is_not_published_beside_another_one(recorded: Path, launch: Any, command: Any) -> None:
     """Nor beside a graph, which holds the same place; both would lose their states to each other."""
-    words = ("replay", str(two_runs[0] / "bag"))
+    words = ("replay", str(recorded))
     player = launch(*GRASP, *words)
     wait_for(lambda: b"player" in Path(f"/proc/{player.pid}/cmdline").read_bytes(), "the first one")
     found = command(*words)

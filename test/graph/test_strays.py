@@ -166,7 +166,7 @@ rclpy.spin(node)
 def test_a_command_beyond_the_actuator_is_named_and_does_not_act(
     launch: Any, grasp_run: Any, tmp_path: Path, kind: list[str]
 ) -> None:
-    run = grasp_run("saturation", "--set", "time.duration_s=3.0", "--without", "left_controller", *kind)
+    run = grasp_run("saturation", "--set", "time.duration_s=3.0", "--without", "left_controller", "--no-figure", *kind)
     launch(sys.executable, "-c", HARD, stderr=subprocess.DEVNULL)
     _, err = run.communicate(timeout=DEADLINE)
     assert run.returncode == 0, err

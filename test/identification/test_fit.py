@@ -166,10 +166,10 @@ def test_residuals_of_a_wrong_model_are_not_white(held: Trajectory) -> None:
 
 
 @pytest.mark.slow
-def test_a_bag(two_runs: tuple[Path, Path]) -> None:
-    recording = read_bag(two_runs[1] / "bag")
+def test_a_bag(recorded: Path) -> None:
+    recording = read_bag(recorded)
     starts = recording.scene.changed({H_LEFT: 2e3, P_LEFT: 0.5, "left_feedback.position_gain_N_per_m": 3.0})
-    found = fit(two_runs[1] / "bag", [H_LEFT, P_LEFT], starts)  # the inputs act that were recorded
+    found = fit(recorded, [H_LEFT, P_LEFT], starts)  # the inputs act that were recorded
     assert found.estimates == pytest.approx([1e4, 0.1], rel=1e-9)
     closed = fit(recording, ["left_feedback.position_gain_N_per_m", P_LEFT], starts.changed({H_LEFT: 1e4}))  # the law
     assert closed.estimates == pytest.approx([5.0, 0.1], rel=1e-9)

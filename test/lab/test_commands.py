@@ -23,6 +23,7 @@ def test_page_quick_has_all_sections_and_figures(lab_command: Any, tmp_path: Pat
     assert "275.0566374 ms" in text
 
 
+@pytest.mark.thorough
 def test_maps_quick_writes_its_page_and_figures(lab_command: Any, tmp_path: Path) -> None:
     for _ in range(2):  # the second time from what is there
         result = lab_command("maps", "--quick", "--docs", "docs", "-o", "runs")

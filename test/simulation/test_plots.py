@@ -19,6 +19,7 @@ from grasp_ros.simulation import plots, simulate
 from grasp_ros.simulation.plots import compose, contact_spans
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("names", "width"),
     [(("case_01",), None), (("case_02",), 90.0), (("case_01", "case_09", "v_jump_one_sided"), 180.0)],
