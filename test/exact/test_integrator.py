@@ -20,8 +20,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.exact.driver.advance import advance
 from grasp_ros.exact.driver.callback import SIGNATURE
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.observe.observe import observe
-from grasp_ros.observe.observer import watch
+from grasp_ros.observe.observer import observe, watch
 from grasp_ros.observe.record import Wanted
 from grasp_ros.physics.layout import Work
 from grasp_ros.simulation import ensemble, simulate
