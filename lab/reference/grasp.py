@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.control import ControlLaw
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
 from grasp_ros.physics.model import Arm, Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, System
@@ -27,7 +28,7 @@ def grasp_of(scene: Scene) -> Grasp:
     """The paper's grasp, with its gains, in a scene that is nothing else."""
     system = scene.system
     if scene.values.keys() != PAPER or any(law.set_point or law.feed_forward for law in system.laws.values()):
-        raise ValueError(f"{scene.name}: not the paper's grasp")
+        raise Refused(f"{scene.name}: not the paper's grasp")
     left, right = (Contact(*pair) for pair in system.pairs.tolist())
     return Grasp(system.arm(LEFT), system.arm(RIGHT), left, right, float(system.bodies[OBJECT, Of.MASS]))
 

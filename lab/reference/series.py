@@ -53,7 +53,7 @@ class Expansion(NamedTuple):
 
 def product(a: Sequence[Real], b: Sequence[Real]) -> Real:
     """The coefficient of the last power in the product of two series of equal length."""
-    return gmpy2.fsum(map(mul, a, b[::-1]))
+    return sum(map(mul, a, b[::-1]))
 
 
 def expand(plant: Plant, state: State, moving: Sequence[int], wall: bool, pressed: Sequence[int],

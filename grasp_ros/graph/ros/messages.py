@@ -24,6 +24,7 @@ from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
 from grasp_ros.graph.rosbag2 import Template, state_template
+from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import SCENE, Topic
@@ -163,7 +164,7 @@ class StateReader:
 
         Raises
         ------
-        RuntimeError, ValueError or struct.error, which is `UNREADABLE`
+        RuntimeError, Refused or struct.error, which is `UNREADABLE`
             If a message is none: not to be decoded, lists that differ in length, names missing or there twice, NaN.
         """
         if self._template is not None and (found := self._template.read(cdr)) is not None:
@@ -177,11 +178,11 @@ class StateReader:
             if any(len(values) != len(name) for values in lists) or not {*self._needed} <= {*name} or (
                 len({*name}) < len(name)
             ):
-                raise ValueError(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
+                raise Refused(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
             if name != self._name:
                 self._name, self._template = name, state_template(name)
             state = State(to_ns(message.header.stamp), name, *lists)
         # A finite sum says that all are, at once; one that overflows says nothing.
         if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
-            raise ValueError("a number of a state is not finite")
+            raise Refused("a number of a state is not finite")
         return state
