@@ -138,6 +138,12 @@ def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
             advance_body(motion, rates.acting, table, (block, k), OBJECT, on_l - on_r)
 
 
+@inlined
+def terms_at(n: int, share: float) -> int:
+    """Terms of a series of degree n that matter at a share of its step, where each falls by the share more."""
+    return n if not 0.0 < share < 1.0 else min(n, math.ceil(math.log(EPS) / math.log(share)))
+
+
 @kernel
 def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) -> None:
     """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""

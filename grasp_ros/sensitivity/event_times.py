@@ -14,6 +14,8 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.sensitivity.directions import Directions, closing
 
+TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = map(int, (  # numpy compares numbers faster than members of an enum
+    Transition.TOUCH, Transition.RELEASE, Transition.CLAMP, Transition.REENTRY, Transition.STICK, Transition.SLIP))
 SIDES = ((LEFT, 1.0), (RIGHT, -1.0))  # with the sign of the impact on the object
 
 
@@ -42,19 +44,19 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     body, kind, moved = events[:, Entry.BODY], events[:, Entry.KIND], moments.rates
     gained, made = accelerations(np.array(bodies), pairs, moments), events[:, Entry.TIME] <= 0.0
     if sampled or scene.system.external:
-        made |= (kind == Transition.SLIP) & _are_ticks(scene, events[:, Entry.TIME])
+        made |= (kind == SLIP) & _are_ticks(scene, events[:, Entry.TIME])
     change, rate = np.zeros((len(events), moved.shape[2])), np.ones(len(events))
-    stops = kind == Transition.STICK
+    stops = kind == STICK
     change[stops], rate[stops] = moved[stops, COLUMN[OBJECT] + 1], gained[OBJECT, stops]
-    slips = (kind == Transition.SLIP) & ~made
+    slips = (kind == SLIP) & ~made
     if slips.any():
         these = Moments(*(part[slips] for part in moments))
         change[slips], rate[slips] = _excess(pairs, changes, these, gained[:, slips])
     for side, sign in SIDES:
         ours = body == side
-        touches = np.flatnonzero(ours & ((kind == Transition.TOUCH) | (kind == Transition.RELEASE)))
+        touches = np.flatnonzero(ours & ((kind == TOUCH) | (kind == RELEASE)))
         change[touches], rate[touches] = closing(side, moved[touches])[0], closing(side, moments.state[touches])[1]
-        clamps = np.flatnonzero(ours & ((kind == Transition.CLAMP) | (kind == Transition.REENTRY)))
+        clamps = np.flatnonzero(ours & ((kind == CLAMP) | (kind == REENTRY)))
         if len(clamps):  # u' + 1/p
             loss, faster = pairs[side, Law.DISSIPATION], closing(side, moved[clamps])[1]
             change[clamps] = faster - changes.pairs[side, Law.DISSIPATION] / loss**2
