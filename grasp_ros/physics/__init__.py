@@ -34,8 +34,8 @@ Drake, `hunt_crossley_dissipation` d    k u max(0, 1 + d u'), a linear spring  d
 MuJoCo, `solref` and `solimp`           a linear spring and damper             none
 ======================================  =====================================  =====================
 
-`model` has the records and the impact force of any state, `impact_law` the force of a contact, `control` the law of a
-controller, `system` puts a scene into arrays, `layout` says what stands where in them, `energy` computes V and its
-balance, `sampled` the limits of a loop of held commands. `errors` holds the base of everything that is refused, here
-and in the rooms above.
+`model` has arm and contact as records and the impact force of any state, `impact_law` the force of a contact, `control`
+the law of a controller, `system` puts a scene into arrays, `layout` says what stands where in them, `energy` computes V
+and its balance, `sampled` the limits of a loop of held commands. `errors` holds the base of everything that is refused,
+here and in the rooms above.
 """

@@ -28,17 +28,13 @@ def signed(arrays: Mapping[str, object]) -> dict[str, Any]:
     return {**content, DIGEST: np.array(_digest(content))}
 
 
-def form_of(values: np.ndarray) -> tuple[str, tuple[int, ...]]:
-    """Type and shape of an array; texts have no width of their own."""
-    return TEXT if values.dtype.kind == TEXT else values.dtype.str, values.shape
-
-
 def _digest(arrays: Mapping[str, np.ndarray]) -> str:
-    """SHA-256 of names, types, shapes and numbers."""
+    """SHA-256 of names, types, shapes and numbers; texts have no width of their own."""
     found = hashlib.sha256()
     for name, values in sorted(arrays.items()):
-        content = repr(values.tolist()).encode() if values.dtype.kind == TEXT else values.tobytes()
-        found.update(repr((name, *form_of(values), len(content))).encode() + content)
+        text = values.dtype.kind == TEXT
+        content = repr(values.tolist()).encode() if text else values.tobytes()
+        found.update(repr((name, TEXT if text else values.dtype.str, values.shape, len(content))).encode() + content)
     return found.hexdigest()
 
 

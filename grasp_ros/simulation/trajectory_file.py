@@ -15,7 +15,7 @@ from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import decoding, reading
-from grasp_ros.scene.npz import TEXT, form_of, read_npz
+from grasp_ros.scene.npz import TEXT, read_npz
 from grasp_ros.simulation.ticks import Loop, tick_of
 from grasp_ros.simulation.trajectory import Trajectory
 
@@ -47,11 +47,15 @@ def load(path: str | os.PathLike[str]) -> Trajectory:
         if data.keys() != own.keys():
             raise Refused(f"arrays {', '.join(sorted(data))}; allowed: {', '.join(sorted(own))}")
         for name, values in own.items():
-            text = values.dtype.kind == TEXT
-            if form_of(data[name]) != form_of(values) or (text and data[name].tolist() != values.tolist()):
-                raise Refused(f"{name}: {data[name].dtype} of shape {data[name].shape} is not allowed; allowed: as this"
-                              f" run has it, {values.dtype} of shape {values.shape}")
+            said, allowed = _described(data[name]), _described(values)
+            if said != allowed:
+                raise Refused(f"{name}: {said} is not allowed; allowed for this run: {allowed}")
         return found
+
+
+def _described(values: np.ndarray) -> str:
+    """What two arrays share if one can stand for the other: texts, or the type and shape of numbers."""
+    return str(values.tolist()) if values.dtype.kind == TEXT else f"{values.dtype} of shape {values.shape}"
 
 
 def _check(found: Trajectory) -> None:
@@ -65,6 +69,8 @@ def _check(found: Trajectory) -> None:
     for name, good, allowed in (
         ("state", not done or np.isfinite(there).all(), "finite numbers"),
         ("state", np.isnan(absent).all(), "NaN for a body that is not there"),
+        ("command", found.command.shape == (len(found.t), 2), "two numbers for each output time"),
+        ("inputs", found.inputs.shape == (len(found.t), 3), "three numbers for each output time"),
         ("command", not done or np.isfinite(found.command).all(), "finite numbers"),
         ("inputs", not acted or np.isnan(found.inputs[tick_of(found.scene, found.t) == acted]).all(), "NaN at the end"),
         ("events", np.isfinite(events).all() and np.isin(events[:, 1], list(COLUMN)).all(), "events of this scene"),

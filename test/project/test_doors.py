@@ -154,7 +154,7 @@ def test_arrays_that_numpy_does_not_write_are_refused(
         ("events", np.zeros(3)), ("events", np.zeros((3, 4))), ("command", np.zeros((5, 3))), ("scene", "title: 5"),
         ("inputs", np.zeros((4, 3))), ("work", np.zeros(2)), ("method", "euler"), ("status", "FINE"),
         ("setting", "fine"), ("setting", np.zeros(2)), ("work_names", np.array(["a"] * 4)),
-        ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)),
+        ("touch_left", np.zeros(0)), ("status", np.array("DONE", dtype=object)), ("energy_of", "mine"),
     ],
 )
 def test_numbers_that_no_run_has_are_refused(
@@ -163,6 +163,18 @@ def test_numbers_that_no_run_has_are_refused(
     np.savez(tmp_path / "a.npz", **signed({**arrays, name: value}))
     with pytest.raises(Refused, match=r"a\.npz: "):
         simulation.load(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize(("name", "shape"), [("command", (4, 2)), ("command", (5, 3)), ("inputs", (5, 2))])
+def test_commands_that_do_not_go_with_the_times_of_a_sampled_run_are_refused(
+    tmp_path: Path, name: str, shape: tuple[int, int]
+) -> None:
+    simulate(scenes.load("arm_alone"), grid=np.linspace(0.0, 1.0, 5), sampled=True).save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as data:
+        arrays = {**data, name: np.zeros(shape)}
+    np.savez(tmp_path / "b.npz", **signed(arrays))
+    with pytest.raises(Refused, match=rf"b\.npz: not a file of .*: {name}: not allowed; allowed: (two|three) numbers"):
+        simulation.load(tmp_path / "b.npz")
 
 
 def test_an_encrypted_or_swollen_result_is_refused(

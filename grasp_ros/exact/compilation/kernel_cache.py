@@ -18,8 +18,8 @@ COMPILED_ROOMS = "physics", "exact", "observe", "methods", "sensitivity"
 def sources_digest() -> str:
     """A short name of the sources of all kernels, and of what they use.
 
-    numba looks for changes only in the file of the function that is called, not in those that it calls from other
-    files: without the digest an edited kernel would go on running as it was.
+    The name of a file of machine code knows the function that is called, and none of those that it calls: without the
+    digest an edited kernel would go on running as it was.
     """
     digest = hashlib.sha256()
     for room in COMPILED_ROOMS:
@@ -35,7 +35,7 @@ def _base() -> Path:
 
 @cache
 def cache_directory() -> Path:
-    """A writable directory for the kernels of these sources in this place: numba has machine code by places."""
+    """A writable directory for the kernels of these sources in this place, which is part of their keys."""
     name = hashlib.sha256(f"{sources_digest()} {PACKAGE}".encode()).hexdigest()[:16]
     try:
         (_base() / name).mkdir(parents=True, exist_ok=True)
