@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import sys
 from functools import reduce
 from importlib import import_module
@@ -52,6 +53,12 @@ def begin(law: Law | type, what: str) -> Law:
     What cannot be called as `physics.observation.asked` says is refused; `what` begins the refusal.
     """
     begun: Any = law
+    if isinstance(law, type):
+        try:
+            inspect.signature(law).bind()
+        except (TypeError, ValueError) as error:
+            raise Refused(f"{what}: {law.__name__}: {error}; allowed: a class that is called without arguments, or an"
+                          " object") from None
     try:
         if isinstance(law, type):
             begun = law()
