@@ -17,6 +17,7 @@ from grasp_ros.graph import rosbag2
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import StateReader
 from grasp_ros.graph.rosbag2 import state_template
+from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import NAMES as BODIES
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
@@ -117,7 +118,7 @@ def test_what_is_not_finite_is_refused(number: float, place: int) -> None:
     numbers = [0.0] * 9
     numbers[place] = number
     for reader in (taught(), StateReader(NAMES)):
-        assert verdict(reader, TEMPLATE.fill(7, numbers)) is ValueError
+        assert verdict(reader, TEMPLATE.fill(7, numbers)) is Refused
 
 
 def test_another_set_of_bodies_is_learnt_and_a_missing_one_refused() -> None:
@@ -127,4 +128,4 @@ def test_another_set_of_bodies_is_learnt_and_a_missing_one_refused() -> None:
         state = reader.read(other.fill(k, [k + 0.5] * 6))
         assert (tuple(state.name), state.effort) == (("left", "object"), (k + 0.5,) * 2)
     for names in (("object", "right"), ("left", "left")):
-        assert verdict(reader, state_template(names).fill(1, [1.0] * 6)) is ValueError
+        assert verdict(reader, state_template(names).fill(1, [1.0] * 6)) is Refused
