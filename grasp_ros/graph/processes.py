@@ -191,7 +191,7 @@ class Graph:
         """
         try:
             for name, process in self.processes.items():
-                for thread in Path(f"/proc/{process.pid}/task").iterdir():
+                for thread in Path(f"/proc/{process.pid}").glob("task/*"):  # none if it has ended
                     with suppress(ProcessLookupError):  # it has just ended
                         if name == "monitor":
                             os.setpriority(os.PRIO_PROCESS, int(thread.name), MONITOR_NICE)

@@ -138,18 +138,15 @@ def expand_tangents(motion: Motion, rates: Rates, table: Table, n: int) -> None:
             advance_body(motion, rates.acting, table, (block, k), OBJECT, on_l - on_r)
 
 
-@inlined
-def terms_at(n: int, share: float) -> int:
-    """Terms of a series of degree n that matter at a share of its step, where each falls by the share more."""
-    return n if not 0.0 < share < 1.0 else min(n, math.ceil(math.log(EPS) / math.log(share)))
-
-
 @kernel
 def step_tangents(motion: Motion, rates: Rates, table: Table, n: int, s: float) -> None:
-    """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`."""
+    """Write the tangents of the bodies in contact at s of a step, whose series are there, to `at`.
+
+    All six are summed, so that none waits for another; those of a body that flies are old, and are not written.
+    """
     for block in range(rates.x.shape[1] // HALF):
         x_l = v_l = x_o = v_o = x_r = v_r = spread_half(0.0)
-        for i in range(BLOCK * block + STEP * n, BLOCK * block - STEP, -STEP):  # six sums: none waits for another
+        for i in range(BLOCK * block + STEP * n, BLOCK * block - STEP, -STEP):
             x_l = add_product(load_half(table.series, i + HALF * X.L), x_l, s)
             v_l = add_product(load_half(table.series, i + HALF * V.L), v_l, s)
             x_o = add_product(load_half(table.series, i + HALF * X.O), x_o, s)

@@ -14,8 +14,6 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.sensitivity.directions import Directions, closing
 
-TOUCH, RELEASE, CLAMP, REENTRY, STICK, SLIP = map(int, (  # numpy compares numbers faster than members of an enum
-    Transition.TOUCH, Transition.RELEASE, Transition.CLAMP, Transition.REENTRY, Transition.STICK, Transition.SLIP))
 SIDES = ((LEFT, 1.0), (RIGHT, -1.0))  # with the sign of the impact on the object
 
 
@@ -42,21 +40,21 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
     """
     bodies, pairs = scene.system.bodies if sampled else scene.system.closed_loop, scene.system.pairs
     body, kind, moved = events[:, Entry.BODY], events[:, Entry.KIND], moments.rates
-    gained, made = accelerations(np.array(bodies), pairs, moments), events[:, Entry.TIME] <= 0.0
+    gained, made = accelerations(bodies, pairs, moments), events[:, Entry.TIME] <= 0.0
     if sampled or scene.system.external:
-        made |= (kind == SLIP) & _are_ticks(scene, events[:, Entry.TIME])
+        made |= (kind == Transition.SLIP) & _are_ticks(scene, events[:, Entry.TIME])
     change, rate = np.zeros((len(events), moved.shape[2])), np.ones(len(events))
-    stops = kind == STICK
+    stops = kind == Transition.STICK
     change[stops], rate[stops] = moved[stops, COLUMN[OBJECT] + 1], gained[OBJECT, stops]
-    slips = (kind == SLIP) & ~made
+    slips = (kind == Transition.SLIP) & ~made
     if slips.any():
         these = Moments(*(part[slips] for part in moments))
         change[slips], rate[slips] = _excess(pairs, changes, these, gained[:, slips])
     for side, sign in SIDES:
         ours = body == side
-        touches = np.flatnonzero(ours & ((kind == TOUCH) | (kind == RELEASE)))
+        touches = np.flatnonzero(ours & ((kind == Transition.TOUCH) | (kind == Transition.RELEASE)))
         change[touches], rate[touches] = closing(side, moved[touches])[0], closing(side, moments.state[touches])[1]
-        clamps = np.flatnonzero(ours & ((kind == CLAMP) | (kind == REENTRY)))
+        clamps = np.flatnonzero(ours & ((kind == Transition.CLAMP) | (kind == Transition.REENTRY)))
         if len(clamps):  # u' + 1/p
             loss, faster = pairs[side, Law.DISSIPATION], closing(side, moved[clamps])[1]
             change[clamps] = faster - changes.pairs[side, Law.DISSIPATION] / loss**2
@@ -68,7 +66,6 @@ def event_rates(scene: Scene, changes: Directions, sampled: bool, events: Array,
 
 def accelerations(bodies: Array, pairs: Array, moments: Moments) -> Array:
     """Accelerations (3, e) of the bodies, m/s^2."""
-    bodies[bodies[:, Of.MASS] == 0.0, Of.MASS] = 1.0  # of what is not there
     push = moments.forces[:, :, 0].T.copy()
     for body, place in COLUMN.items():
         x, v = moments.state[:, place : place + 2].T
@@ -77,7 +74,8 @@ def accelerations(bodies: Array, pairs: Array, moments: Moments) -> Array:
         force = sign * impact_force(Contact(*pairs[side]), *closing(side, moments.state))
         push[side] -= force
         push[OBJECT] += force
-    return np.asarray(push / bodies[:, Of.MASS, None])
+    masses = np.where(bodies[:, Of.MASS] > 0.0, bodies[:, Of.MASS], 1.0)  # of what is not there: any
+    return np.asarray(push / masses[:, None])
 
 
 def _excess(pairs: Array, changes: Directions, moments: Moments, gained: Array) -> tuple[Array, Array]:

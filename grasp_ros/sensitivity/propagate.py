@@ -22,7 +22,7 @@ from grasp_ros.exact.records import Array
 from grasp_ros.exact.tolerances import SURFACE
 from grasp_ros.physics.layout import EPS, LANES, LEFT, OBJECT, RIGHT, Body, Kind, Lane, Law, Of, Pair, Slide, U, V, X
 from grasp_ros.sensitivity.base_series import touches
-from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents, terms_at, variable_at
+from grasp_ros.sensitivity.contact import exact_length, expand_tangents, shift, step_tangents, variable_at
 from grasp_ros.sensitivity.flight import fly_tangent, rest_tangent
 from grasp_ros.sensitivity.held import act, enter_tick
 from grasp_ros.sensitivity.tangents import (
@@ -216,8 +216,7 @@ def pass_step(t: Tangents, begin: float, span: float, s: float, n: int) -> None:
         while next_output(t.outputs) < (t.outputs.numbers[Number.TIME] if ends else begin + reached):
             tau = since(t.outputs, begin, span)
             fly_free(t, True, tau)
-            at = variable_at(motion.c, n, part, reached, tau)
-            step_tangents(motion, rates, t.table, terms_at(n, at / part), at)
+            step_tangents(motion, rates, t.table, n, variable_at(motion.c, n, part, reached, tau))
             write_output(motion, t.outputs, rates)
         if ends:
             fly_free(t, True, span)
