@@ -29,7 +29,7 @@ from grasp_ros.scene import strict_yaml
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.topics import Topic
 
-PATIENCE_SECONDS = 5.0  # without an answer, or without progress
+PATIENCE_SECONDS = 15.0  # without an answer, or without progress; to be found takes over 5 s on a busy machine
 SPIN_SECONDS = 0.1
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
