@@ -28,6 +28,7 @@ from grasp_ros.methods.equations import (
 )
 from grasp_ros.physics.layout import LEFT, RIGHT, Law
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import PAIR_COLUMNS
 
 TOGETHER = 1e-13  # m or m/s; a gap below this at the other side's event is an event of both
 MAX_IDLE = 100  # events without progress in time
@@ -106,8 +107,7 @@ class _Gap:
 
     def __init__(self, side: int, after: int, direction: float, p: float | None, work: Any) -> None:
         self.side, self.after, self.direction, self._work = side, after, direction, work
-        rate = 0 if p is None else 1
-        self._front, self._back = 2 * side + rate, 2 * side + 2 + rate
+        self._front, self._back = (column + (p is not None) for column in PAIR_COLUMNS[side])
         self._offset = 0.0 if p is None else 1.0 / p
 
     def __call__(self, t: float, y: Array, *_: Any) -> float:

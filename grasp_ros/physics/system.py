@@ -22,6 +22,7 @@ BODIES = (LEFT, OBJECT, RIGHT)  # in the order of the state
 NAMES: dict[int, str] = {LEFT: "left", OBJECT: "object", RIGHT: "right"}
 Place = tuple[str, int, int]  # array of a system, row, column
 COLUMN: dict[int, int] = {LEFT: 0, OBJECT: 2, RIGHT: 4}  # of the position in a state (6,); the velocity is the next
+PAIR_COLUMNS: dict[int, tuple[int, int]] = {LEFT: (0, 2), RIGHT: (2, 4)}  # of the positions between which u is
 
 
 class ExternalForce(NamedTuple):
@@ -120,8 +121,8 @@ class System:
 
     def impact(self, side: int, state: Sequence[float]) -> float:
         """Impact force fw of a pair in N, in a state (6,)."""
-        front, back = (LEFT, OBJECT) if side == LEFT else (OBJECT, RIGHT)
-        u, u_rate = (state[COLUMN[front] + part] - state[COLUMN[back] + part] for part in (0, 1))
+        front, back = PAIR_COLUMNS[side]
+        u, u_rate = (state[front + part] - state[back + part] for part in (0, 1))
         hertzian, dissipation = self.pairs[side].tolist()
         return impact_force_of(hertzian, dissipation, u, u_rate)
 

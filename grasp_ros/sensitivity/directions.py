@@ -14,9 +14,9 @@ import numpy as np
 
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT, Of
+from grasp_ros.physics.layout import Of
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.system import PAIR_COLUMNS, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import build
 from grasp_ros.scene.parameter import Parameter
@@ -152,5 +152,5 @@ def law_rows(system: System) -> Array:
 
 def closing(side: int, state: Array) -> tuple[Array, Array]:
     """u in m and u' in m/s of a pair, (8), from states (m, 6), or their derivatives from those of states (m, 6, n)."""
-    front, back = (COLUMN[side], COLUMN[OBJECT]) if side == LEFT else (COLUMN[OBJECT], COLUMN[side])
+    front, back = PAIR_COLUMNS[side]
     return state[:, front] - state[:, back], state[:, front + 1] - state[:, back + 1]

@@ -14,9 +14,9 @@ from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.impact_law import elastic_force, stored_energy
-from grasp_ros.physics.layout import LEFT, OBJECT, Entry, Law, Of
+from grasp_ros.physics.layout import Entry, Law, Of
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, System
+from grasp_ros.physics.system import COLUMN, PAIR_COLUMNS, System
 from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.directions import Directions, closing, directions
 from grasp_ros.sensitivity.event_times import Moments, event_rates
@@ -138,9 +138,9 @@ def level_rates(system: System, changes: Directions, state: Array, rates: Array)
     for side in system.contacts:
         pressed = np.maximum(closing(side, state)[0], 0.0)
         push = 2.0 * elastic_force(system.pairs[side, Law.HERTZIAN], pressed)
-        front, back = (side, OBJECT) if side == LEFT else (OBJECT, side)  # u is the place of one less that of the other
-        gradient[:, COLUMN[front]] += push
-        gradient[:, COLUMN[back]] -= push
+        front, back = PAIR_COLUMNS[side]
+        gradient[:, front] += push
+        gradient[:, back] -= push
         explicit.append(2.0 * stored_energy(1.0, pressed))
         weights.append(changes.pairs[side, Law.HERTZIAN])
     return np.asarray(np.einsum("mi,min->mn", gradient, rates) + np.stack(explicit, axis=1) @ np.array(weights))
