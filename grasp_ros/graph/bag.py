@@ -20,7 +20,8 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph.opening import Opened, decoding_bag
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording, acted_from
-from grasp_ros.graph.rosbag2 import BagError, decode, force_template, lyapunov_template, state_template
+from grasp_ros.graph.rosbag2 import BagError, decode
+from grasp_ros.graph.serialization import force_template, lyapunov_template, state_template
 from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array

@@ -23,6 +23,7 @@ from grasp_ros.graph.chunks import Messages
 from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
 from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
+from grasp_ros.graph.serialization import clock_template
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import writing
@@ -75,7 +76,7 @@ class Recorder:
         topics = {f"{rosbag2.TOPIC}{topic.name}": name for topic, name in (names or {}).items()}
         self._custom = {"scene": scene.to_yaml(), "run": (running or Running()).to_yaml(), **words, **topics}
         self._names = rosbag2.names_of(scene, self._custom)
-        self._clock = rosbag2.clock_template()
+        self._clock = clock_template()
         with writing(path, BagError):
             path.mkdir(parents=True)
             self._sink = Sink(path / f"{path.name}.mcap", path / ".reserve")

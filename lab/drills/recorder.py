@@ -14,9 +14,10 @@ from typing import NamedTuple
 import numpy as np
 from tqdm import tqdm
 
-from grasp_ros.graph import bag, rosbag2
+from grasp_ros.graph import bag
 from grasp_ros.graph.recorder import FLUSH_SECONDS, Recorder
 from grasp_ros.graph.recover import recover
+from grasp_ros.graph.serialization import force_message, list_message
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
@@ -41,12 +42,15 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
             scene.system.laws, scene.controllers.values(), strict=True)}
         forces |= {output.topic: output.value(scene.system, tick, state) for output in scene.outputs}
         column = np.array([COLUMN[body] for body in bodies])
-        states = rosbag2.list_message(
-            time_ns, [NAMES[body] for body in bodies], state[column], state[column + 1], effort[tick, bodies]
+        states = list_message(
+            time_ns, [NAMES[body] for body in bodies],
+            *(numbers.tolist() for numbers in (state[column], state[column + 1], effort[tick, bodies])),
         )
-        own = [level.V[tick], level.V_c[tick], level.V_rate[tick], level.mode[tick], 0.0, 0.0, alone[tick], 0.0, 1.0]
-        rest = [(topic, rosbag2.force_message(time_ns, force)) for topic, force in forces.items()]
-        lyapunov = rosbag2.list_message(time_ns, LYAPUNOV_NAMES, np.array(own, dtype=float))
+        own: list[float] = [
+            level.V[tick], level.V_c[tick], level.V_rate[tick], level.mode[tick], 0.0, 0.0, alone[tick], 0.0, 1.0
+        ]
+        rest = [(topic, force_message(time_ns, force)) for topic, force in forces.items()]
+        lyapunov = list_message(time_ns, LYAPUNOV_NAMES, own)
         yield time_ns, [(JOINT_STATES, states), *rest, (LYAPUNOV, lyapunov)]
 
 

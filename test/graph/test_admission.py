@@ -20,6 +20,7 @@ from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.lockstep.synchronizer import PATIENCE_TICKS, Arrival, Synchronizer
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import MOST_BYTES, raw_force
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
 from lab.drills.nodes import plain_messages
@@ -44,7 +45,7 @@ def test_a_force_is_read_from_the_bytes_whatever_the_frame() -> None:
     for length in range(20):
         message = plain_messages.wrench(7, -1.5)
         message.header.frame_id = "x" * length
-        assert messages.raw_force(serialize_message(message)) == -1.5
+        assert raw_force(serialize_message(message)) == -1.5
 
 
 def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
@@ -55,7 +56,7 @@ def test_messages_that_cannot_be_true_are_refused_by_kind() -> None:
     nobody = plain_messages.joint_state(PERIOD, BODIES, np.zeros(6), np.zeros(3))
     nobody.name = ["nobody"]
     long = plain_messages.wrench(0, 1.0)
-    long.header.frame_id = "x" * messages.MOST_BYTES
+    long.header.frame_id = "x" * MOST_BYTES
     for topic, cdr, arrival in (
         (JOINT_STATES, serialize_message(strange), Arrival.REFUSED),
         (JOINT_STATES, serialize_message(nobody), Arrival.REFUSED),
@@ -91,7 +92,7 @@ def test_a_state_that_comes_again_is_one_tick_and_a_reset_is_two() -> None:
         assert found.put(JOINT_STATES, state(tick)) is Arrival.TAKEN
     rows = list(iter(found.take, None))
     assert [(row.time_ns, row.restarted) for row in rows] == [(0, True), (PERIOD, False)]
-    assert [messages.raw_force(row.found[LEFT_COMMAND]) for row in rows] == [7.0, 7.0]
+    assert [raw_force(row.found[LEFT_COMMAND]) for row in rows] == [7.0, 7.0]
     assert found.put(JOINT_STATES, state(0)) is Arrival.TAKEN
     found.put(LEFT_COMMAND, command(0))
     assert found.take() is not None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from array import array
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,16 +12,25 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_typestore
 from sensor_msgs.msg import JointState
 
-from grasp_ros.graph import rosbag2
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import StateReader
-from grasp_ros.graph.rosbag2 import state_template
+from grasp_ros.graph.serialization import (
+    Template,
+    clock_template,
+    force_template,
+    list_message,
+    lyapunov_template,
+    raw_force,
+    raw_stamp_ns,
+    state_template,
+)
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.system import NAMES as BODIES
-from grasp_ros.scene.topics import LYAPUNOV_NAMES
+from grasp_ros.scene.topics import CLOCK, FORCE, FRAME, LYAPUNOV_NAMES, NAMED_LIST
 from lab.drills.nodes import plain_messages
 
 NAMES = ("left", "object", "right")
@@ -30,11 +40,20 @@ STATE, INPUTS = np.array([0.1, -0.0, np.inf, 5e-324, -1e300, 0.6]), np.array([7.
 NUMBERS = st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=9, max_size=9)
 
 
-def test_lists_are_those_of_the_bag() -> None:
-    template = rosbag2.lyapunov_template()
-    for values in (np.arange(len(LYAPUNOV_NAMES)), np.full(len(LYAPUNOV_NAMES), np.nan)):
-        expected = rosbag2.list_message(TIME_NS, LYAPUNOV_NAMES, values.astype(float))
-        assert template.fill(TIME_NS, values.tolist()) == expected
+@pytest.mark.parametrize("names", [[], ["left"], ["left", "object", "right"], ["k_N_per_m", "é", ""]])
+@pytest.mark.parametrize("frame", ["", "7", "1234567"])
+def test_messages_are_those_of_a_library(names: list[str], frame: str) -> None:
+    types, kind = get_typestore(Stores.ROS2_JAZZY), get_typestore(Stores.ROS2_JAZZY).types
+    header = kind["std_msgs/msg/Header"](kind["builtin_interfaces/msg/Time"](*divmod(TIME_NS, 10**9)), frame)
+    for lists in ([STATE, INPUTS, np.zeros(0)], [np.zeros(0), STATE, STATE[:1]]):
+        expected = types.serialize_cdr(kind[NAMED_LIST](header, names, *lists), NAMED_LIST)
+        assert list_message(TIME_NS, names, *(part.tolist() for part in lists), frame=frame) == expected
+    header.frame_id, zero = FRAME, kind["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
+    wrench = kind["geometry_msgs/msg/Wrench"](replace(zero, x=-0.1), zero)
+    assert force_template().fill(TIME_NS, [-0.1]) == types.serialize_cdr(kind[FORCE](header, wrench), FORCE)
+    assert clock_template().fill(TIME_NS, ()) == types.serialize_cdr(kind[CLOCK.type](header.stamp), CLOCK.type)
+    numbers = [math.nan, *range(len(LYAPUNOV_NAMES) - 1)]
+    assert lyapunov_template().fill(TIME_NS, numbers) == list_message(TIME_NS, LYAPUNOV_NAMES, numbers)
 
 
 @pytest.mark.parametrize("bodies", [[LEFT, OBJECT, RIGHT], [LEFT, OBJECT], [RIGHT]])
@@ -49,18 +68,18 @@ def test_states_are_those_of_the_message(bodies: list[int]) -> None:
 
 
 def test_forces_and_clocks_have_their_time_and_number() -> None:
-    cdr = rosbag2.force_template().fill(TIME_NS, [-0.1])
-    assert (messages.raw_stamp_ns(cdr), messages.raw_force(cdr)) == (TIME_NS, -0.1)
-    assert messages.raw_stamp_ns(rosbag2.clock_template().fill(TIME_NS, ())) == TIME_NS
+    cdr = force_template().fill(TIME_NS, [-0.1])
+    assert (raw_stamp_ns(cdr), raw_force(cdr)) == (TIME_NS, -0.1)
+    assert raw_stamp_ns(clock_template().fill(TIME_NS, ())) == TIME_NS
 
 
 def test_a_wrong_number_of_numbers_is_refused() -> None:
-    refused = {rosbag2.force_template(): 2, rosbag2.lyapunov_template(): 8, rosbag2.clock_template(): 1}
+    refused = {force_template(): 2, lyapunov_template(): 8, clock_template(): 1}
     for template, count in refused.items():
         with pytest.raises(ValueError, match="sequence of size"):
             template.fill(0, [1.0] * count)
     with pytest.raises(ValueError, match="subsection"):
-        rosbag2.Template(lambda _: b"nothing of it", 1)
+        Template(lambda _: b"nothing of it", 1)
 
 
 def verdict(reader: StateReader, cdr: bytes) -> Any:

@@ -13,7 +13,7 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.rosbag2 import list_message
+from grasp_ros.graph.serialization import list_message
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study

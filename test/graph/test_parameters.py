@@ -19,11 +19,12 @@ from rclpy.parameter import Parameter
 from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene
-from grasp_ros.graph import bag, rosbag2
+from grasp_ros.graph import bag
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
+from grasp_ros.graph.serialization import list_message
 from grasp_ros.graph.verify import laws_of
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import CHANGES, NAMED_LIST
@@ -111,7 +112,7 @@ def test_an_announcement_that_is_lost_is_seen_in_the_bag(tmp_path: Path) -> None
     ticks, numbers, types = [], run.scene.numbers_of("left_controller"), get_typestore(Stores.ROS2_JAZZY)
     for tick, (time_ns, rows) in enumerate(recorder.ticks_of(run)):
         values = np.array([*{**numbers, GAIN: 5.0 + tick}.values()])
-        said = types.deserialize_cdr(rosbag2.list_message(time_ns, list(numbers), values), NAMED_LIST)
+        said = types.deserialize_cdr(list_message(time_ns, list(numbers), values), NAMED_LIST)
         said.header.frame_id = str(1 + 2 * tick)  # its number
         beside = [(CHANGES["left"], bytes(types.serialize_cdr(said, NAMED_LIST)))] if tick < 3 else []
         ticks.append((time_ns, [*beside, *rows]))

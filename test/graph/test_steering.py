@@ -24,6 +24,7 @@ from sensor_msgs.msg import JointState
 from grasp_ros import scene
 from grasp_ros.graph import bag
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import raw_stamp_ns
 from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills import steering
@@ -82,7 +83,7 @@ def test_a_bag_is_published_again_with_its_clock(
     slow.remove_node(peer)
     seen: dict[str, list[int]] = {"states": [], "clock": []}
     for kind, name, rows in ((JointState, "joint_states", seen["states"]), (Clock, "/clock", seen["clock"])):
-        note = partial(lambda rows, cdr: rows.append(messages.raw_stamp_ns(cdr)), rows)
+        note = partial(lambda rows, cdr: rows.append(raw_stamp_ns(cdr)), rows)
         peer.create_subscription(kind, name, note, messages.qos(JOINT_STATES), raw=True)
     executor = EventsExecutor(context=peer.context)  # whoever is slower than the player loses messages
     executor.add_node(peer)  # which has all its readers: a new one may be missed

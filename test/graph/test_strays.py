@@ -22,8 +22,7 @@ from std_msgs.msg import String
 
 from grasp_ros.graph import bag
 from grasp_ros.graph.lockstep.synchronizer import GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer
-from grasp_ros.graph.ros import messages
-from grasp_ros.graph.rosbag2 import force_message
+from grasp_ros.graph.serialization import force_message, raw_force
 from grasp_ros.graph.verify import verify
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import ALIVE, JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT, SCENE
@@ -55,7 +54,7 @@ def test_where_two_may_have_sent_the_effort_of_a_later_state_decides(delay: int)
     ticks.put(JOINT_STATES, state(delay + 1, effort=2.0))
     found = ticks.take()
     assert found is not None
-    assert (messages.raw_force(found.found[LEFT_COMMAND]), found.lost, found.restored) == (2.0, 0, 0)
+    assert (raw_force(found.found[LEFT_COMMAND]), found.lost, found.restored) == (2.0, 0, 0)
 
 
 def test_a_command_that_did_not_come_is_what_acted() -> None:
@@ -74,7 +73,7 @@ def test_a_command_that_did_not_come_is_what_acted() -> None:
     ticks.put(JOINT_STATES, state(0, effort=7.0))  # the plant was reset: neither of them acts
     last = ticks.take(UNCERTAIN_SECONDS + 0.1)
     assert last is not None
-    assert messages.raw_force(last.found[LEFT_COMMAND]) == 6.0
+    assert raw_force(last.found[LEFT_COMMAND]) == 6.0
 
 
 def test_what_nothing_stands_for_is_given_up_later() -> None:

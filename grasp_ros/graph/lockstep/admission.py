@@ -16,8 +16,8 @@ from rclpy.event_handler import QoSSubscriptionEventType
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.subscription import Subscription
 
-from grasp_ros.graph.ros.messages import Command
 from grasp_ros.graph.ros.node import GraspNode
+from grasp_ros.graph.serialization import Command
 from grasp_ros.scene import Scene
 from grasp_ros.scene.topics import CHANGES, COMMANDS, Topic
 

@@ -20,9 +20,8 @@ import numpy as np
 from grasp_ros.graph.health.peers import Gone, Need
 from grasp_ros.graph.lockstep.admission import Limits
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.ros import messages
-from grasp_ros.graph.rosbag2 import numbers_message
 from grasp_ros.graph.running import Running
+from grasp_ros.graph.serialization import numbers_message, raw_command
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
@@ -96,7 +95,7 @@ class FreeRunning:
         self._anchor = time.monotonic() - self._plant.tick * self._period
 
     def _on_command(self, side: str, topic: Topic, cdr: bytes) -> None:
-        plant, held, command = self._plant, self._held[side], messages.raw_command(cdr)
+        plant, held, command = self._plant, self._held[side], raw_command(cdr)
         stamp, force = command or (0, math.nan)
         tick = stamp // plant.scene.period_ns if stamp else plant.tick
         if command is None or tick > plant.tick:

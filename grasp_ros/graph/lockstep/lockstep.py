@@ -17,8 +17,8 @@ import numpy as np
 from grasp_ros.graph.health.peers import Gone, Need
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.steering import Steering
-from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import NEW
+from grasp_ros.graph.serialization import raw_command
 from grasp_ros.scene.topics import LYAPUNOV, WINDOW, Topic
 
 if TYPE_CHECKING:  # it imports this one
@@ -119,7 +119,7 @@ class Lockstep:
         return self._plant.outrun(0 if self._steering.reset_due or self._plant.at_end else WINDOW)
 
     def _on_command(self, side: int, topic: Topic, cdr: bytes) -> None:
-        command = messages.raw_command(cdr)
+        command = raw_command(cdr)
         if command is None:
             self._plant.refuse("refused commands", topic)
         elif not self._plant.begun or command[0] != self._plant.tick * self._plant.scene.period_ns:

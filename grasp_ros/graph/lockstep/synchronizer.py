@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
-from grasp_ros.graph.rosbag2 import force_message
+from grasp_ros.graph.serialization import MOST_BYTES, force_message, raw_force, raw_stamp_ns
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
@@ -79,10 +79,10 @@ class Synchronizer:
 
     def put(self, topic: Topic, cdr: bytes, sure: bool = True) -> Arrival:
         """Add a serialized message, if it can be true; a command may not be sure to be of the right source."""
-        if len(cdr) > messages.MOST_BYTES:
+        if len(cdr) > MOST_BYTES:
             return Arrival.REFUSED
         try:
-            stamp = messages.raw_stamp_ns(cdr)
+            stamp = raw_stamp_ns(cdr)
             if stamp % self._period_ns or not 0 <= stamp <= self.end_ns:
                 return Arrival.STAMP
             return self._put_state(stamp, cdr) if topic == JOINT_STATES else self._put_other(topic, stamp, cdr, sure)
@@ -101,12 +101,12 @@ class Synchronizer:
     def _put_other(self, topic: Topic, stamp: int, cdr: bytes, sure: bool) -> Arrival:
         if stamp > max(self._newest, 0) + self._ahead_ns:
             return Arrival.STAMP
-        if topic.type == FORCE and not math.isfinite(messages.raw_force(cdr)):
+        if topic.type == FORCE and not math.isfinite(raw_force(cdr)):
             return Arrival.REFUSED
         queue = self._others[topic]
         known = queue.get(stamp, NOTHING)
         others = [other for other in known.found
-                  if topic.type == FORCE and messages.raw_force(other) != messages.raw_force(cdr)]
+                  if topic.type == FORCE and raw_force(other) != raw_force(cdr)]
         # A late repetition of the last tick, or what a reset brings before its state: the newer one is right.
         if known.sure and (stamp != self._before or not sure):
             return Arrival.CONTRADICTS if others else Arrival.REPEATED
@@ -146,7 +146,7 @@ class Synchronizer:
             to_come = len(self._states) <= self._wait < WINDOW
             return (there[-1] if there and late and not to_come else None), False
         for cdr in there:
-            if messages.raw_force(cdr) == force:
+            if raw_force(cdr) == force:
                 return cdr, False
         return (force_message(time_ns, force), True) if late else (None, False)
 

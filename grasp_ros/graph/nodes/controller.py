@@ -16,7 +16,7 @@ from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.rosbag2 import force_template, numbers_message
+from grasp_ros.graph.serialization import force_template, numbers_message
 from grasp_ros.physics.control import command_of, limited
 from grasp_ros.physics.errors import Refused, described
 from grasp_ros.physics.observation import Observation, asked, check

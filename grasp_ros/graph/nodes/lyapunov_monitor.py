@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.graph.lockstep.synchronizer import Tick
-from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import raw_force
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
@@ -128,7 +128,7 @@ class LyapunovMonitor:
         for side, topic in COMMANDS.items():
             if topic not in tick.found:
                 continue
-            body, force = SIDES[side], messages.raw_force(tick.found[topic])
+            body, force = SIDES[side], raw_force(tick.found[topic])
             law = self._scene.system.laws[body]
             x, v = state[COLUMN[body]], state[COLUMN[body] + 1]
             expected = law.command(tick.time_ns // self._scene.period_ns, x, v)

@@ -27,8 +27,9 @@ from grasp_ros.graph.nodes.picture import Picture
 from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.rosbag2 import BagError, lyapunov_template
+from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
+from grasp_ros.graph.serialization import lyapunov_template, raw_command
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
@@ -193,7 +194,7 @@ class Monitor(PeerNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = sources is None or (sources.alone() and self._limits.allow(topic, messages.raw_command(cdr)))
+        sure = sources is None or (sources.alone() and self._limits.allow(topic, raw_command(cdr)))
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()

@@ -23,8 +23,8 @@ from grasp_ros.graph.lockstep.lockstep import Lockstep
 from grasp_ros.graph.lockstep.steering import Steering
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.rosbag2 import clock_template, force_template, state_template
 from grasp_ros.graph.running import Running, check_factor
+from grasp_ros.graph.serialization import SHORTEST, clock_template, force_template, raw_stamp_ns, state_template
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -111,7 +111,7 @@ class Plant(PeerNode):
         return self.monitored and self.tick - self._recorded > lead
 
     def _on_lyapunov(self, cdr: bytes) -> None:
-        stamp = messages.raw_stamp_ns(cdr) if len(cdr) >= messages.SHORTEST else -1
+        stamp = raw_stamp_ns(cdr) if len(cdr) >= SHORTEST else -1
         tick, rest = divmod(stamp, self.scene.period_ns)
         if rest or not max(self._recorded, 0) <= tick <= self.tick:
             self.refuse("refused records", LYAPUNOV)

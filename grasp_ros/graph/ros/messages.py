@@ -1,6 +1,6 @@
 """Messages of ROS: their types, qualities of service, and what is read of them.
 
-Those with numbers are serialized by `graph.rosbag2`: rclpy would pad them with stray bytes.
+`graph.serialization` writes and reads those with numbers.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-from grasp_ros.graph.rosbag2 import Template, state_template
+from grasp_ros.graph.serialization import Template, state_template
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
@@ -37,14 +37,9 @@ TYPES = {
     "diagnostic_msgs/msg/DiagnosticArray": DiagnosticArray,
     "visualization_msgs/msg/MarkerArray": MarkerArray,
 }
-_STAMP = struct.Struct("<iI")  # sec, nanosec of the header that a stamped message begins with
-_LENGTH, _NUMBER = struct.Struct("<I"), struct.Struct("<d")
-_HEAD = 4  # bytes of CDR before the content
-SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
 READER_DEPTH = 10  # of texts, which may be large
 FOREVER = Infinite.nanoseconds
 AUTOMATIC = LivelinessPolicy.SYSTEM_DEFAULT, LivelinessPolicy.AUTOMATIC
-Command = tuple[int, float]  # time in ns of the state that it answers, force in N
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
 
 
@@ -98,31 +93,6 @@ def to_time(time_ns: int) -> Time:
 def to_ns(stamp: Time) -> int:
     """Integer time in ns of a stamp."""
     return int(stamp.sec) * NANOSECONDS + int(stamp.nanosec)
-
-
-def raw_stamp_ns(cdr: bytes) -> int:
-    """Integer time in ns of a serialized stamped message, without deserializing it."""
-    sec, nanosec = _STAMP.unpack_from(cdr, _HEAD)
-    return int(sec * NANOSECONDS + nanosec)
-
-
-def raw_force(cdr: bytes) -> float:
-    """Force along the line in N of a serialized WrenchStamped, without deserializing it."""
-    (length,) = _LENGTH.unpack_from(cdr, _HEAD + _STAMP.size)
-    begin = _STAMP.size + _LENGTH.size + length  # of the numbers, which are aligned to their size
-    (force,) = _NUMBER.unpack_from(cdr, _HEAD + -(-begin // _NUMBER.size) * _NUMBER.size)
-    return float(force)
-
-
-def raw_command(cdr: bytes) -> Command | None:
-    """Time in ns and force in N of a serialized WrenchStamped; None if a plant cannot take it, or a bag not hold it."""
-    if not SHORTEST <= len(cdr) <= MOST_BYTES:
-        return None
-    try:
-        force = raw_force(cdr)
-    except struct.error:
-        return None
-    return (raw_stamp_ns(cdr), force) if math.isfinite(force) else None
 
 
 def text(content: str) -> String:

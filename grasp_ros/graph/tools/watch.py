@@ -24,6 +24,7 @@ from grasp_ros.graph.host import place
 from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
+from grasp_ros.graph.serialization import MOST_BYTES, SHORTEST, raw_force, raw_stamp_ns
 from grasp_ros.graph.terminal import Key, Keys, Moment, View, named
 from grasp_ros.physics.errors import printable
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
@@ -47,7 +48,7 @@ class Newest:
 
     def put(self, topic: Topic, cdr: bytes, needed: Set[Topic]) -> None:
         """Take a message; `needed` is what belongs to a state."""
-        stamp = messages.raw_stamp_ns(cdr)
+        stamp = raw_stamp_ns(cdr)
         if topic == JOINT_STATES:
             if stamp < self._state:
                 self._open.clear()
@@ -105,7 +106,7 @@ class Watch(GraspNode):
         self._lockstep = runnings.parse(message.data).lockstep
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
-        if messages.SHORTEST <= len(cdr) <= messages.MOST_BYTES and (topic in self._needed or topic == JOINT_STATES):
+        if SHORTEST <= len(cdr) <= MOST_BYTES and (topic in self._needed or topic == JOINT_STATES):
             self._newest.put(topic, cdr, self._needed)
 
     def _look(self) -> None:
@@ -167,13 +168,13 @@ class Watch(GraspNode):
     def _moment(self, found: dict[Topic, bytes], alone: bool) -> Moment:
         """One state and all that belongs to it."""
         assert self._view is not None
-        now, (before, earlier), stamp = time.monotonic(), self._before, messages.raw_stamp_ns(found[JOINT_STATES])
+        now, (before, earlier), stamp = time.monotonic(), self._before, raw_stamp_ns(found[JOINT_STATES])
         if now - before > 1.0:
             self._rate = max(stamp - earlier, 0) / self._view.scene.period_ns / (now - before)
             self._before = now, stamp
         state, inputs = state_of(_read(JOINT_STATES, found))
         commands, impacts = (
-            {side: messages.raw_force(found[topic]) for side, topic in topics.items() if topic in found}
+            {side: raw_force(found[topic]) for side, topic in topics.items() if topic in found}
             for topics in (COMMANDS, CONTACTS)
         )
         if not self._lockstep:

@@ -16,6 +16,7 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import raw_stamp_ns
 from grasp_ros.physics.system import BODIES
 from grasp_ros.scene.topics import (
     CLOCK,
@@ -87,7 +88,7 @@ class Bare(Node):
     def _on_anything(self, cdr: bytes) -> None:
         self._now_ns += 1
         if self._now_ns % len(INPUTS) == 0:
-            self._outputs[0].publish(plain_messages.lyapunov(messages.raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
+            self._outputs[0].publish(plain_messages.lyapunov(raw_stamp_ns(cdr), [0.0] * len(LYAPUNOV_NAMES)))
 
 
 def main(name: str, ticks: int) -> None:

@@ -23,6 +23,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.serialization import raw_stamp_ns
 from grasp_ros.scene.topics import COMMANDS, DEPTH, DIAGNOSTICS, JOINT_STATES, Topic
 from lab.drills.nodes import plain_messages
 
@@ -71,7 +72,7 @@ class Stranger:
         self._context.shutdown()
 
     def _on_tick(self, cdr: bytes) -> None:
-        self._latest_ns = messages.raw_stamp_ns(cdr)
+        self._latest_ns = raw_stamp_ns(cdr)
         tick = self._latest_ns // self._period_ns
         if 0 <= tick < len(self._times) and not self._times[tick]:
             self._times[tick] = time.monotonic()

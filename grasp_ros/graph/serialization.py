@@ -1,0 +1,145 @@
+"""The layout of the messages with numbers, as CDR serializes them: written and read here without a library of ROS.
+
+rclpy pads them with stray bytes, so that equal runs would not give equal bags; loading the types of `rosbags`, which
+reads every other message, takes as long as rclpy.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from grasp_ros.scene.effects.base import NANOSECONDS
+from grasp_ros.scene.topics import FRAME, LYAPUNOV_NAMES
+
+Command = tuple[int, float]  # time in ns of the state that it answers, force in N
+SHORTEST, MOST_BYTES = 16, 4096  # of a message that comes with every state
+_HEAD = b"\0\1\0\0"  # CDR, little endian; what follows is aligned from its end on
+_STAMP, _LENGTH, _NUMBER = struct.Struct("<iI"), struct.Struct("<I"), struct.Struct("<d")
+_MARK = 1.2345678901234567e-200  # of which nothing else in a message has a multiple
+
+
+def list_message(
+    time_ns: int, names: Sequence[str], position: Sequence[float], velocity: Sequence[float] = (),
+    effort: Sequence[float] = (), frame: str = "",
+) -> bytes:
+    """A JointState, serialized: a stamped list of numbers with names."""
+    content = _length(_header(time_ns, frame), names)
+    for name in names:
+        content = _text(content, name)
+    for numbers in (position, velocity, effort):
+        content = _numbers(_length(content, numbers), numbers)
+    return _HEAD + content
+
+
+def numbers_message(time_ns: int, numbers: Mapping[str, float], number: int = 0) -> bytes:
+    """The same of numbers by their names; numbered where none may be missed."""
+    return list_message(time_ns, [*numbers], [*numbers.values()], frame=str(number or ""))
+
+
+def force_message(time_ns: int, force: float) -> bytes:
+    """A WrenchStamped, serialized: a stamped force along the line in N."""
+    return _HEAD + _numbers(_header(time_ns, FRAME), (force, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+
+def _header(time_ns: int, frame: str) -> bytes:
+    return _text(_STAMP.pack(*divmod(time_ns, NANOSECONDS)), frame)
+
+
+def _text(content: bytes, word: str) -> bytes:
+    """Content of a message with a text behind it."""
+    text = word.encode() + b"\0"
+    return _length(content, text) + text
+
+
+def _length(content: bytes, behind: Sequence[Any]) -> bytes:
+    """Content of a message with the length of what comes behind it."""
+    return _aligned(content, _LENGTH) + _LENGTH.pack(len(behind))
+
+
+def _numbers(content: bytes, numbers: Sequence[float]) -> bytes:
+    """Content of a message with some numbers behind it."""
+    return _aligned(content, _NUMBER) + struct.pack(f"<{len(numbers)}d", *numbers) if len(numbers) else content
+
+
+def _aligned(content: bytes, kind: struct.Struct) -> bytes:
+    return content + bytes(-len(content) % kind.size)
+
+
+class Template:
+    """A message that is serialized once; with another time and other numbers it costs a tenth of making it anew.
+
+    `serialize` makes it of a list of `count` numbers; it begins with a stamp. What it writes it also reads.
+    """
+
+    def __init__(self, serialize: Callable[[list[float]], bytes], count: int) -> None:
+        self.count, size = count, _NUMBER.size
+        marks = [_MARK * (number + 1) for number in range(count)]
+        cdr = serialize(marks)
+        places = [cdr.index(_NUMBER.pack(mark)) for mark in marks]
+        ends = [len(_HEAD) + _STAMP.size, *(place + size for place in places)]
+        gaps = [begin - end for end, begin in zip(ends, [*places, len(cdr)], strict=True)]  # before, between and behind
+        self._form = struct.Struct(f"<{len(_HEAD)}siI" + "d".join(f"{gap}s" for gap in gaps))
+        self._parts = list(self._form.unpack(cdr))  # head, seconds, nanoseconds; then gaps and numbers in turn
+        self._gaps = tuple(self._parts[3::2])
+
+    def fill(self, time_ns: int, numbers: Sequence[float]) -> bytes:
+        """The serialized message of a time and some numbers."""
+        self._parts[1:3] = divmod(time_ns, NANOSECONDS)
+        self._parts[4::2] = numbers
+        return self._form.pack(*self._parts)
+
+    def read(self, cdr: bytes) -> tuple[Any, ...] | None:
+        """Seconds, nanoseconds and numbers of a message that differs in nothing else; None of any other."""
+        if len(cdr) != self._form.size:
+            return None
+        parts = self._form.unpack(cdr)
+        return parts[1:3] + parts[4::2] if parts[0] == self._parts[0] and parts[3::2] == self._gaps else None
+
+
+def lyapunov_template() -> Template:
+    """Of what the monitor computes at a tick, see `topics.LYAPUNOV_NAMES`."""
+    return Template(lambda numbers: list_message(0, LYAPUNOV_NAMES, numbers), len(LYAPUNOV_NAMES))
+
+
+def clock_template() -> Template:
+    """Of simulated times."""
+    return Template(lambda _: _HEAD + _STAMP.pack(0, 0), 0)
+
+
+def state_template(names: Sequence[str]) -> Template:
+    """Of the states of some bodies: all positions, all velocities, all input forces."""
+    n = len(names)
+    return Template(lambda all: list_message(0, names, all[:n], all[n : 2 * n], all[2 * n :]), 3 * n)
+
+
+def force_template() -> Template:
+    """Of forces along the line, in N."""
+    return Template(lambda numbers: force_message(0, *numbers), 1)
+
+
+def raw_stamp_ns(cdr: bytes) -> int:
+    """Integer time in ns of a serialized stamped message."""
+    sec, nanosec = _STAMP.unpack_from(cdr, len(_HEAD))
+    return int(sec * NANOSECONDS + nanosec)
+
+
+def raw_force(cdr: bytes) -> float:
+    """Force along the line in N of a serialized WrenchStamped."""
+    (length,) = _LENGTH.unpack_from(cdr, len(_HEAD) + _STAMP.size)
+    begin = _STAMP.size + _LENGTH.size + length  # of the numbers, which are aligned to their size
+    (force,) = _NUMBER.unpack_from(cdr, len(_HEAD) + -(-begin // _NUMBER.size) * _NUMBER.size)
+    return float(force)
+
+
+def raw_command(cdr: bytes) -> Command | None:
+    """Time in ns and force in N of a serialized WrenchStamped; None if a plant cannot take it, or a bag not hold it."""
+    if not SHORTEST <= len(cdr) <= MOST_BYTES:
+        return None
+    try:
+        force = raw_force(cdr)
+    except struct.error:
+        return None
+    return (raw_stamp_ns(cdr), force) if math.isfinite(force) else None
