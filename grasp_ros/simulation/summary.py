@@ -10,9 +10,10 @@ import numpy as np
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
+from grasp_ros.physics.layout import OBJECT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS
 from grasp_ros.simulation.losses import losses_of
 from grasp_ros.simulation.outcomes import GROUPS
@@ -29,7 +30,6 @@ from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
 MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
-ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
 PEAKS = (*GROUPS["peak_input"], *GROUPS["peak_impact"])  # in the order of FORCES
 
@@ -53,8 +53,8 @@ def summary(run: Trajectory) -> dict[str, Any]:
     if run.at_rest is not None:
         found["at_rest_s"] = run.at_rest
     if method.events:
-        found["touches"] = {name: len(run.times(Transition.TOUCH, side)) for side, name in ARMS.items()}
-        found["clamped"] = {name: len(run.times(Transition.CLAMP, side)) for side, name in ARMS.items()}
+        found["touches"] = {name: len(run.times(Transition.TOUCH, side)) for name, side in SIDES.items()}
+        found["clamped"] = {name: len(run.times(Transition.CLAMP, side)) for name, side in SIDES.items()}
         found["sticks"] = len(run.times(Transition.STICK, OBJECT))
     if len(run.t):
         found |= _amounts(run)
