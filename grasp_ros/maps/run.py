@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable
+from contextlib import closing, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -38,12 +38,8 @@ def run(
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(plan.variants(*span), plan.setup, stop)
 
-    with ExitStack() as stack:
-        found: Iterator[tuple[Span, Chunk]]
-        if workers or scheduler:
-            found = cluster.on_cluster(stack.enter_context(cluster.connect(workers, scheduler)), plan, spans)
-        else:
-            found = stack.enter_context(closing(in_threads(work, spans)))
+    with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client, closing(
+            in_threads(work, spans) if client is None else cluster.on_cluster(client, plan, spans)) as found:
         for span, chunk in found:
             store.write(span, chunk)
             done += span[1] - span[0]
