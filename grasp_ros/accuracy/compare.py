@@ -28,50 +28,32 @@ class Advice(NamedTuple):
 
 
 def compare(scene: Scene, contenders: Sequence[Contender], truth: Truth, effort: Effort = QUICK,
-            seconds: float = SECONDS, progress: Callable[[float], object] | None = None) -> list[Record]:
+            seconds: float = SECONDS, progress: Callable[[float], object] | None = None
+            ) -> tuple[list[Record], list[str]]:
     """Measure solvers from their loosest setting on until the time is over: next is who has had the least of it.
 
     Nobody begins before those ahead have had as much as the patience, so that a fast solver is through at once; who
     takes longer than that climbs no further. No measurement begins after so many seconds; the progress is told those
-    gone by.
+    gone by. Also returned are the names of solvers with settings that nobody came to, because the time was over.
     """
     begin = time.monotonic()
     records: list[Record] = []
-    climbing = {contender: iter(contender.ladder) for contender in contenders}
+    climbing = {contender: list(contender.ladder) for contender in contenders if contender.ladder}
     spent: dict[Contender, float] = {}
     while climbing and time.monotonic() - begin <= seconds:
         contender = min(climbing, key=lambda one: spent.get(one, effort.patience))
-        setting = next(climbing[contender], None)
-        if setting is None:
-            del climbing[contender]
-            continue
         started = time.monotonic()
-        record = attempt(contender, scene, setting, truth, effort)
+        record = attempt(contender, scene, climbing[contender].pop(0), truth, effort)
         records.append(record)
         spent[contender] = spent.get(contender, 0.0) + time.monotonic() - started
-        if _given_up(record, effort):
+        slow = record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience
+        if slow or not climbing[contender]:
             del climbing[contender]
         if progress is not None:
             progress(min(time.monotonic() - begin, seconds))
     names = [contender.name for contender in contenders]
-    return sorted(records, key=lambda record: names.index(record.method))
-
-
-def unfinished(records: Iterable[Record], contenders: Sequence[Contender], effort: Effort = QUICK) -> list[str]:
-    """Names of solvers with settings that nobody came to, because the time was over."""
-    groups = by_method(records)
-
-    def left(contender: Contender) -> bool:
-        group = groups.get(contender.name, [])
-        more = len(group) < len(contender.ladder)
-        return more and not (group and _given_up(group[-1], effort))
-
-    return [contender.name for contender in contenders if left(contender)]
-
-
-def _given_up(record: Record, effort: Effort) -> bool:
-    """Whether a solver climbs no further."""
-    return record.status == NOT_INSTALLED or (record.least or record.first) > effort.patience
+    return (sorted(records, key=lambda record: names.index(record.method)),
+            [contender.name for contender in contenders if contender in climbing])
 
 
 def by_method(records: Iterable[Record]) -> dict[str, list[Record]]:

@@ -6,7 +6,6 @@ import math
 import statistics
 import time
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 from grasp_ros.accuracy.contender import DONE, Answer, Contender, Solve
@@ -68,19 +67,20 @@ class Record(NamedTuple):
 
 
 def attempt(contender: Contender, scene: Scene, setting: float, truth: Truth, effort: Effort) -> Record:
-    """Build a solver, run it, repeat it."""
-    noted = partial(record_of, contender, scene, setting, truth)
-    begin = time.perf_counter()
+    """Build a solver, run it, and repeat it at least once, then as long as the effort lets it."""
+    answer, error, begin = None, None, time.perf_counter()
     try:
         solve = contender.build(scene, setting)
         answer = solve(truth.grid)
     except ImportError:
-        return noted(NOT_INSTALLED, [time.perf_counter() - begin])
-    first = time.perf_counter() - begin
-    if len(answer.state) < len(truth.grid):
-        return noted(answer.status, [first], answer)
-    error = max(distance(truth, answer.state), truth.uncertainty)  # nothing is known better than that
-    return noted(answer.status, [first, *repeat(solve, truth.grid, effort.budget, effort.most)], answer, error)
+        pass
+    times = [time.perf_counter() - begin]
+    if answer is not None and len(answer.state) == len(truth.grid):
+        error = max(distance(truth, answer.state), truth.uncertainty)  # nothing is known better than that
+        while len(times) == 1 or (sum(times[1:]) < effort.budget and len(times) <= effort.most):
+            times.append(seconds(solve, truth.grid))
+    return record_of(contender, scene, setting, truth, NOT_INSTALLED if answer is None else answer.status, times,
+                     answer, error)
 
 
 def record_of(
@@ -93,14 +93,6 @@ def record_of(
         scene.name, contender.family, contender.name, contender.knob, setting, error,
         statistics.median(warm) if warm else None, min(warm, default=None), len(warm), first,
         answer and answer.steps, answer and answer.right_hand_sides, answer and answer.touches, truth.touches, status)
-
-
-def repeat(solve: Solve, grid: Array, budget: float, most: int) -> list[float]:
-    """Seconds of warm runs: at least one, then as long as there is budget in s, and no more than that many."""
-    times: list[float] = []
-    while not times or (sum(times) < budget and len(times) < most):
-        times.append(seconds(solve, grid))
-    return times
 
 
 def seconds(solve: Solve, grid: Array) -> float:

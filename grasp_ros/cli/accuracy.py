@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest, unfinished
+from grasp_ros.accuracy.compare import SECONDS, Advice, advise, by_method, check_wish, compare, fastest
 from grasp_ros.accuracy.contender import own_contenders
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
@@ -44,10 +44,9 @@ def _accuracy(options: argparse.Namespace) -> int:
     prepare()
     truth = finest(scene)
     with bar(options.seconds, "s", scene.name) as progress:
-        records = compare(scene, contenders, truth, seconds=options.seconds, progress=progress)
+        records, late = compare(scene, contenders, truth, seconds=options.seconds, progress=progress)
     advice = advise(records, options.error, options.budget) if wished else None
     again = " ".join([options.scene, *(f"--set {setting}" for setting in options.settings)])
-    late = unfinished(records, contenders)
     more = [f"after {options.seconds:g} s not all settings were measured, --seconds allows more: {', '.join(late)}"]
     text = [*_table(truth, records), *(more if late else []), *_not_here(others),
             *([] if advice is None else _advice(again, options, advice))]

@@ -26,28 +26,26 @@ def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tupl
     A touch is its time in s and its side. Recorded inputs act as they were; without them the controllers of the scene.
     A run that does not get there is refused.
     """
-    if data.inputs is None:
-        return _closed_loop(data, scene, keys, data.t[:rows])
-    scene = _plant(scene)
-    integrator = Integrator(scene.system, continuous=False)
-    carrier = carry(scene, integrator, directions(scene, keys, True), data.t[:rows], True)
-    plant = SampledPlant(scene.system, scene.period_ns, integrator)
-    states = plant.follow(data.inputs[: rows - 1])
-    if plant.status is not Status.DONE:
-        raise Refused(f"{scene.name}: {plant.stop}")
-    carrier.finish(data.t[rows - 1])
-    return np.concatenate([states, plant.state[None]]), carrier.out, _touches(integrator)
-
-
-def _closed_loop(data: Measured, scene: Scene, keys: Sequence[str], times: Array) -> tuple[Array, Array, Array]:
-    ticks = int(tick_of(scene, times[-1:])[0]) + 1
-    if ticks < scene.ticks:
-        scene = scene.changed({"time.duration_s": scene.time_of(ticks)})
+    times, recorded = data.t[:rows], data.inputs is not None
+    scene = _plant(scene) if recorded else _until(scene, times)
     integrator = Integrator(scene.system, continuous=not data.sampled)
     carrier = carry(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
-    states = complete(scene, integrator, data.sampled, times)
-    carrier.finish(scene.duration)
-    return states, carrier.out, _touches(integrator)
+    if data.inputs is None:
+        states = complete(scene, integrator, data.sampled, times)
+    else:
+        plant = SampledPlant(scene.system, scene.period_ns, integrator)
+        states = np.vstack([plant.follow(data.inputs[: rows - 1]), plant.state])
+        if plant.status is not Status.DONE:
+            raise Refused(f"{scene.name}: {plant.stop}")
+    carrier.finish(times[-1] if recorded else scene.duration)
+    events = integrator.event_table
+    return states, carrier.out, events[events[:, Entry.KIND] == Transition.TOUCH][:, [Entry.TIME, Entry.BODY]]
+
+
+def _until(scene: Scene, times: Array) -> Scene:
+    """A scene that ends at the first tick behind the last of some times, if not before."""
+    ticks = int(tick_of(scene, times[-1:])[0]) + 1
+    return scene.changed({"time.duration_s": scene.time_of(ticks)}) if ticks < scene.ticks else scene
 
 
 def _plant(scene: Scene) -> Scene:
@@ -56,8 +54,3 @@ def _plant(scene: Scene) -> Scene:
         section: numbers for section, numbers in scene.values.items()
         if BY_SECTION[section].node == "plant" and section != "loop" and not section.endswith(OUTSIDE)
     })
-
-
-def _touches(integrator: Integrator) -> Array:
-    events = integrator.event_table
-    return np.asarray(events[events[:, Entry.KIND] == Transition.TOUCH][:, [Entry.TIME, Entry.BODY]])

@@ -7,7 +7,7 @@ is written once, because it is written here.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from functools import cache
 from itertools import islice
 from typing import Any
@@ -46,7 +46,7 @@ def connect(workers: int, scheduler: str) -> Any:
         raise Refused(f"--scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
 
 
-def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Iterator[tuple[Span, Chunk]]:
+def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Generator[tuple[Span, Chunk], None, None]:
     """Do chunks on a cluster, and hand each over when it is done."""
     from distributed import CancelledError, KilledWorker, as_completed
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable
+from contextlib import closing, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from grasp_ros.simulation.ensemble import Span, chunk_rows, in_threads
 def run(
     plan: Plan, path: str | os.PathLike[str], *, workers: int = 0, scheduler: str = "",
     progress: Callable[[int], object] | None = None,
-) -> Store:
+) -> None:
     """Compute what a file does not have yet: a new directory, or the map of the same plan.
 
     `workers` are processes of a Dask cluster that is started for it, 0: threads of this process; `scheduler` is the
@@ -30,26 +29,18 @@ def run(
     """
     check(plan)
     store = Store(Path(path), plan, chunk_rows(plan.scene, plan.setup))
-    spans, begin = store.spans, time.monotonic()
+    spans = store.spans
     done, told = plan.rows - sum(last - first for first, last in spans), progress or (lambda _: None)
     told(done)
     if not spans:
-        return store
+        return
 
     def work(span: Span, stop: NDArray[np.int64]) -> Chunk:
         return compute(plan.variants(*span), plan.setup, stop)
 
-    try:
-        with ExitStack() as stack:
-            found: Iterator[tuple[Span, Chunk]]
-            if workers or scheduler:
-                found = cluster.on_cluster(stack.enter_context(cluster.connect(workers, scheduler)), plan, spans)
-            else:
-                found = stack.enter_context(closing(in_threads(work, spans)))
-            for span, chunk in found:
-                store.write(span, chunk)
-                done += span[1] - span[0]
-                told(done)
-    finally:
-        store.add_seconds(time.monotonic() - begin)
-    return store
+    with cluster.connect(workers, scheduler) if workers or scheduler else nullcontext() as client, closing(
+            in_threads(work, spans) if client is None else cluster.on_cluster(client, plan, spans)) as found:
+        for span, chunk in found:
+            store.write(span, chunk)
+            done += span[1] - span[0]
+            told(done)

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -66,19 +64,12 @@ class Store:
         import zarr
 
         part = slice(span[0] // self._lines, span[1] // self._lines)
-        with _writing(self.path), zarr.config.set(ALL_FILES):
-            for name, values in {**chunk.columns, STATUS: chunk.status}.items():
-                self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
-
-    @property
-    def seconds(self) -> float:
-        """Time in s that went into it so far."""
-        return float(self._group.attrs["seconds"])
-
-    def add_seconds(self, seconds: float) -> None:
-        """Count time that went into it."""
-        with _writing(self.path):
-            self._group.attrs["seconds"] = self.seconds + seconds
+        try:
+            with writing(self.path), zarr.config.set(ALL_FILES):
+                for name, values in {**chunk.columns, STATUS: chunk.status}.items():
+                    self._group[name][part] = values.reshape(-1, *self.plan.shape[1:])
+        except Refused as error:
+            raise Refused(f"{error}; what is done is kept: the same command goes on") from None
 
 
 def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> None:
@@ -89,7 +80,7 @@ def _create(path: Path, plan: Plan, document: dict[str, Any], height: int) -> No
     with replaced(path) as part, zarr.config.set(ALL_FILES):
         path.parent.mkdir(parents=True, exist_ok=True)
         group = zarr.create_group(part, zarr_format=3, attributes={
-            "format": FORMAT, "plan": document, "versions": versions(), "statuses": list(STATUSES), "seconds": 0.0})
+            "format": FORMAT, "plan": document, "versions": versions(), "statuses": list(STATUSES)})
         packed = {"compressors": zarr.codecs.ZstdCodec(checksum=True)}
         grid = {"shape": plan.shape, "chunks": (height, *plan.shape[1:]), "dimension_names": names, **packed}
         for column in find(plan.setup.outcomes):
@@ -112,7 +103,7 @@ def open_group(path: Path, mode: str = "r") -> Any:
         if group.attrs.get("format") != FORMAT:
             raise Refused(f"{path}: not a map; allowed: a new path, or what `grasp map` has written")
         missing = [name for name in (*_columns(group), *_axes(group)) if not (path / name / "zarr.json").is_file()]
-        missing += [name for name in ("versions", "seconds") if name not in group.attrs]
+        missing += ["versions"] if "versions" not in group.attrs else []
         missing = missing or [name for name in _axes(group) if group[name].nchunks_initialized < group[name].nchunks]
         if missing:
             raise Refused(f"{path}: a damaged map: without {', '.join(missing)}; allowed: a whole one")
@@ -160,13 +151,3 @@ def read(path: str | os.PathLike[str]) -> Any:
 def columns_of(data: Any) -> list[str]:
     """Names of the outcomes of a map."""
     return [name for name in data.data_vars if name != STATUS]
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """Refuse a path that cannot be written, and say that what is done is kept."""
-    try:
-        with writing(path):
-            yield
-    except Refused as error:
-        raise Refused(f"{error}; what is done is kept: the same command goes on") from None

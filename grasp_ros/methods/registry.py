@@ -20,10 +20,9 @@ EXACT = "exact"
 MOST_STEPS = 1e9
 
 
-def _tens(first: float, last: float, per_decade: int = 1) -> tuple[float, ...]:
+def _tens(first: int, last: int) -> tuple[float, ...]:
     """10**-first ... 10**-last."""
-    return tuple(float(f"{10.0 ** -(k / per_decade):.1e}") for k in range(round(first * per_decade),
-                                                                        round(last * per_decade) + 1))
+    return tuple(float(f"1e-{k}") for k in range(first, last + 1))
 
 
 _STEPS = tuple(base * 10.0**-decade for decade in range(2, 6) for base in (1.0, 0.5, 0.2))

@@ -7,7 +7,7 @@ each generation is one ensemble.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,14 +151,13 @@ def front(problem: Problem, seed: int = 0, progress: Told | None = None) -> list
     most, least = add(first, problem.bounds).outcomes[second], add(second, problem.bounds).outcomes[second]
     for level in np.linspace(most, least, FRONT)[1:]:
         add(first, (*problem.bounds, Bound(second, max(float(level), least))))
-    return sorted(_undominated(choices, first, second), key=lambda own: own.outcomes[first])
+    return _undominated(choices, first, second)
 
 
-def _undominated(choices: Sequence[Design], first: str, second: str) -> list[Design]:
-    """Those than which no other one is better in one outcome and as good in the other."""
-    def beats(other: Design, own: Design) -> bool:
-        pairs = [(other.outcomes[name], own.outcomes[name]) for name in (first, second)]
-        return all(a <= b for a, b in pairs) and any(a < b for a, b in pairs)
-
-    best = [own for own in choices if not any(beats(other, own) for other in choices)]
-    return [*{(own.outcomes[first], own.outcomes[second]): own for own in reversed(best)}.values()]
+def _undominated(choices: Iterable[Design], first: str, second: str) -> list[Design]:
+    """Those than which no other one is better in one outcome and as good in the other, by their first outcome."""
+    best: list[Design] = []
+    for own in sorted(choices, key=lambda own: (own.outcomes[first], own.outcomes[second])):
+        if not best or own.outcomes[second] < best[-1].outcomes[second]:
+            best.append(own)
+    return best

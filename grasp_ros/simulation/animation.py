@@ -10,10 +10,9 @@ import numpy as np
 from matplotlib.animation import FuncAnimation
 from matplotlib.patches import Rectangle
 
-from grasp_ros.physics.energy import pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
-from grasp_ros.physics.model import Array, Contact, impact_force
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.files import format_of, replaced
 from grasp_ros.simulation import canvas
@@ -65,12 +64,10 @@ def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Ar
 
 def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
     """The figure, and what draws its picture k."""
-    system = motion.scene.system
-    positions = {body: np.interp(times, motion.t, motion.state[:, COLUMN[body]]) for body in system.present}
-    forces = {}
-    for side, u, d in pairs_of(system, motion.state):
-        force = impact_force(Contact(*system.pairs[side]), u, d)
-        forces[side] = np.maximum.reduceat(force, np.searchsorted(motion.t, times, side="right").clip(1) - 1)
+    positions = {body: np.interp(times, motion.t, motion.state[:, COLUMN[body]])
+                 for body in motion.scene.system.present}
+    first = np.searchsorted(motion.t, times, side="right").clip(1) - 1  # output time of each picture
+    touched = np.logical_or.reduceat((motion.impacts > 0.0).any(axis=1), first)
     figure, (line, past) = canvas.subplots(2, 1, figsize=(width_mm / MM, width_mm / MM * HEIGHT_MM / WIDTH_MM),
                                            height_ratios=(2, 3), layout="constrained")
     low, high = (float(pick(list(positions.values()))) for pick in (np.min, np.max))
@@ -91,8 +88,7 @@ def _stage(motion: Motion, times: Array, width_mm: float) -> tuple[Figure, Any]:
                 back = x[k] - FRONTS[body] * THICK * reach + (0.0 if body == LEFT else THICK * reach)
                 coils[body].set_xdata(np.linspace(wall, back, len(COILS)))
         if OBJECT in bodies:
-            touched = any(force[k] > 0.0 for force in forces.values())
-            bodies[OBJECT].set_facecolor(PRESSED if touched else COLORS[OBJECT])
+            bodies[OBJECT].set_facecolor(PRESSED if touched[k] else COLORS[OBJECT])
         now.set_xdata([times[k], times[k]])
         return ()
 

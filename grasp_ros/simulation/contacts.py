@@ -45,16 +45,16 @@ def contact_table(system: System, event_table: Array, side: int, breaks: Array, 
     rows["begin"], rows["end"], rows["speed_in"], rows["speed_out"] = *found.T[:3], -found[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
         rows["restitution"] = rows["speed_out"] / rows["speed_in"]
-    spans = [np.unique(np.concatenate([[a, b], breaks[(breaks > a) & (breaks < b)]])) for a, b in found[:, :2]]
-    group = np.repeat(np.arange(len(spans)), [len(span) - 1 for span in spans])
-    begins, ends = (np.concatenate([np.zeros(0), *(span[part] for span in spans)])
-                    for part in (slice(None, -1), slice(1, None)))
-    n = len(found)
-    pieces = expand(states, _quantities_of(system, side), begins, ends, group)
+    if not len(found):
+        return rows
+    begins, ends = breaks[:-1], breaks[1:]
+    group = np.searchsorted(found[:, 0], begins, side="right") - 1
+    within = (group >= 0) & (ends <= found[group, 1])
+    pieces = expand(states, _quantities_of(system, side), begins[within], ends[within], group[within])
     for name, column in (("impulse", 0), ("loss", 1)):
-        rows[name] = pieces.integral(column, n) if n else 0.0
+        rows[name] = pieces.integral(column, len(found))
     for name, column in (("peak_force", 0), ("deepest", 2)):
-        rows[name] = pieces.largest(column, n) if n else 0.0
+        rows[name] = pieces.largest(column, len(found))
     return rows
 
 

@@ -59,27 +59,25 @@ def losses(run: Trajectory) -> Losses:
         If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
     row = None if check_run(run).sampled and run.scene.system.external else as_row(run, "energy")
-    return losses_by_ticks(at_every_tick(run)) if row is None else losses_in(run, row)
+    return losses_of(at_every_tick(run) if row is None else run, row)
 
 
-def losses_in(run: Trajectory, row: Mapping[str, float]) -> Losses:
-    """The losses of an exact run from its row, see `quantities.as_row`, that has its energies."""
-    found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
-    return found if not run.sampled else _with_commands(run, found, row["work_inputs"])
+def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
+    """The losses from the row of an exact run that has its energies, see `quantities.as_row`.
 
-
-def losses_by_ticks(run: Trajectory) -> Losses:
-    """The losses of a run whose output times hold every control period, by the trapezoidal rule."""
-    found = Losses(*(np.asarray(np.trapezoid(rate, run.t)) for rate in power_lost(run.scene.system, run.state)))
-    moves = np.diff(np.nan_to_num(run.state[:, [COLUMN[side] for side in (LEFT, RIGHT)]]), axis=0)
-    return found if not run.sampled else _with_commands(run, found, float((run.inputs[:-1, :OBJECT] * moves).sum()))
-
-
-def _with_commands(run: Trajectory, found: Losses, work: float) -> Losses:
-    """The losses where commands did so much work: what they have not stored in V_c is lost."""
-    system = run.scene.system
+    Without a row by the trapezoidal rule, of a run whose output times hold every control period.
+    """
+    system, arms = run.scene.system, [COLUMN[LEFT], COLUMN[RIGHT]]
+    if row is None:
+        found = Losses(*(np.asarray(np.trapezoid(rate, run.t)) for rate in power_lost(system, run.state)))
+    else:
+        found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
+    if not run.sampled:
+        return found
+    moves = np.diff(np.nan_to_num(run.state[:, arms]), axis=0)
+    work = float((run.inputs[:-1, :OBJECT] * moves).sum()) if row is None else row["work_inputs"]
     own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
     _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
-    ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, [COLUMN[LEFT], COLUMN[RIGHT]]]
+    ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, arms]
     before, after = (0.5 * stiffness * ends**2 - force * ends).sum(axis=1)
-    return found._replace(feedback=np.asarray(before - after - work))
+    return found._replace(feedback=np.asarray(before - after - work))  # what commands have not stored in V_c

@@ -16,6 +16,7 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import U
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.simulation.tables import COLUMNS
 
@@ -60,7 +61,6 @@ def _peak(q: int) -> Callable[[Runs], Array]:
     return lambda runs: np.maximum(runs.seen[:, Seen.HIGH + q], 0.0)
 
 
-_SIDES = ("left", "right")
 _GROUPS: dict[str, tuple[Outcome, ...]] = {
     "settling_time": (Outcome(
         "settling_time", "s", "from then on no mass leaves the bound, a part of the largest initial displacement, for"
@@ -74,17 +74,17 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
         " proof of what follows; inf: at its end", Wanted.BOUND, _column("seen", Seen.LAST_OUTSIDE)),),
     "touches": tuple(
         Outcome(f"touches_{name}", "1", f"touches of the {name} arm", NOTHING, _column("touches", side))
-        for side, name in enumerate(_SIDES)),
+        for side, name in enumerate(SIDES)),
     "peak_input": tuple(
         Outcome(f"peak_input_{name}", "N", f"largest input of the {name} arm: command and external force",
                 Wanted.INPUTS, _largest(q))
-        for q, name in zip((Quantity.INPUT_L, Quantity.INPUT_R), _SIDES, strict=True)),
+        for q, name in zip((Quantity.INPUT_L, Quantity.INPUT_R), SIDES, strict=True)),
     "peak_impact": tuple(
         Outcome(f"peak_impact_{name}", "N", f"largest impact force of the {name} arm", Wanted.IMPACTS, _peak(q))
-        for q, name in zip((Quantity.IMPACT_L, Quantity.IMPACT_R), _SIDES, strict=True)),
+        for q, name in zip((Quantity.IMPACT_L, Quantity.IMPACT_R), SIDES, strict=True)),
     "peak_penetration": tuple(
         Outcome(f"peak_penetration_{name}", "m", f"largest penetration of the {name} arm", Wanted.IMPACTS, _peak(q))
-        for q, name in zip((U.L, U.R), _SIDES, strict=True)),
+        for q, name in zip((U.L, U.R), SIDES, strict=True)),
     "energy": tuple(
         Outcome(name, "J", text, Wanted.LOSSES, _column("seen", place)) for name, text, place in (
             ("lost_dampers", "energy that the dampers of the arms took", Seen.DAMPERS),

@@ -17,7 +17,7 @@ from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending, instance, names, number, rows
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
-from grasp_ros.physics.model import Array, Mode
+from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import PAPER
 from grasp_ros.scene.files import format_of, replacing
@@ -187,13 +187,9 @@ def contact_spans(motion: Motion, side: int) -> list[tuple[float, float]]:
     """Begin and length of the contacts of one side in s: from the events, or as the output times show them."""
     if isinstance(motion, Trajectory) and len(motion.event_table):
         return [(a, b - a) for a, b in contact_intervals(motion, side).tolist()]
-    flag = Mode.LEFT if side == LEFT else Mode.RIGHT
-    touching = np.concatenate([[0], (np.nan_to_num(motion.energy.mode).astype(int) & int(flag)) != 0, [0]])
-    edges = np.flatnonzero(np.diff(touching.astype(int)))
-    last = len(motion.t) - 1
-    return [
-        (float(motion.t[a]), float(motion.t[min(b, last)] - motion.t[a])) for a, b in edges.reshape(-1, 2).tolist()
-    ]
+    edges = np.flatnonzero(np.diff(motion.impacts[:, side] > 0.0, prepend=False, append=False))
+    begins, ends = motion.t[edges.reshape(-1, 2).clip(max=len(motion.t) - 1)].T
+    return [*zip(begins.tolist(), (ends - begins).tolist(), strict=True)]
 
 
 def shade_contacts(axes: Axes, motion: Motion) -> None:

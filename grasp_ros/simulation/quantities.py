@@ -76,19 +76,18 @@ def settling_times(run: Trajectory, horizons: int = HORIZONS) -> Array:
     """
     if not may_settle(check_run(run)):
         return np.full(3, np.nan)
-    if (row := as_row(run, "settling_times", horizons=whole("horizons", horizons, 1))) is not None:
-        return settled_in(run, row)
+    return settled_of(run, as_row(run, "settling_times", horizons=whole("horizons", horizons, 1)))
+
+
+def settled_of(run: Trajectory, row: Mapping[str, float] | None) -> Array:
+    """The same of a run that may settle, from a row that has them, or without one by its output times."""
     system, distance = run.scene.system, settled_distance(run.scene)
+    if row is not None:  # 0 for a mass that is not there
+        return np.array([row[f"settling_time_{NAMES[body]}"] if body in system.present else 0.0 for body in COLUMN])
     ahead = displacement_bound(system, float(run.energy.V_c[-1])) if len(run.t) else np.full(3, np.inf)
     if not np.isfinite(ahead).all():
         return np.full(3, np.nan)
     return last_outside(run.t, run.state[:, 0::2], distance) if (ahead <= distance).all() else np.full(3, np.inf)
-
-
-def settled_in(run: Trajectory, row: Mapping[str, float]) -> Array:
-    """The same of a row that has them; 0 for a mass that is not there."""
-    return np.array([row[f"settling_time_{NAMES[body]}"] if body in run.scene.system.present else 0.0
-                     for body in COLUMN])
 
 
 def may_rise(run: Trajectory) -> bool:

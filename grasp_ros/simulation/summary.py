@@ -10,11 +10,12 @@ import numpy as np
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Transition
+from grasp_ros.physics.layout import OBJECT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS
-from grasp_ros.simulation.losses import losses_by_ticks, losses_in
+from grasp_ros.simulation.losses import losses_of
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import (
     as_row,
@@ -22,15 +23,13 @@ from grasp_ros.simulation.quantities import (
     may_rise,
     may_settle,
     settled_distance,
-    settled_in,
-    settling_times,
+    settled_of,
 )
 from grasp_ros.simulation.repeat import at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 MOTION, OUTPUTS, TICKS = "motion", "output times", "control periods"  # what a number is of
 MOST_TICKS = 1_000_000  # for which a run is repeated for the sake of a table
-ARMS = {LEFT: NAMES[LEFT], RIGHT: NAMES[RIGHT]}
 FORCES = ("f_l", "f_r", "fw_l", "fw_r")
 PEAKS = (*GROUPS["peak_input"], *GROUPS["peak_impact"])  # in the order of FORCES
 
@@ -54,8 +53,8 @@ def summary(run: Trajectory) -> dict[str, Any]:
     if run.at_rest is not None:
         found["at_rest_s"] = run.at_rest
     if method.events:
-        found["touches"] = {name: len(run.times(Transition.TOUCH, side)) for side, name in ARMS.items()}
-        found["clamped"] = {name: len(run.times(Transition.CLAMP, side)) for side, name in ARMS.items()}
+        found["touches"] = {name: len(run.times(Transition.TOUCH, side)) for name, side in SIDES.items()}
+        found["clamped"] = {name: len(run.times(Transition.CLAMP, side)) for name, side in SIDES.items()}
         found["sticks"] = len(run.times(Transition.STICK, OBJECT))
     if len(run.t):
         found |= _amounts(run)
@@ -72,13 +71,11 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     if not METHODS[run.method].energy_check:
         V_c = known.energy.V_c
         found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
-    settled = settled_in(run, row) if row is not None and settles else settling_times(known)
-    if may_rise(run) and distance > 0.0:
-        if dense is not None:
-            found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
-    elif not np.isnan(settled).any():
+    if settles and not np.isnan(settled := settled_of(known, row)).any():
         found["settled_s"] = _by_body(run, settled)
         found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * run.scene.duration
+    if may_rise(run) and distance > 0.0 and dense is not None:
+        found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
     if row is None:
         found["largest_of"] = OUTPUTS if dense is None else TICKS
         largest = [*np.abs(known.command).max(axis=0).tolist(), *known.impacts.max(axis=0).tolist()]
@@ -87,8 +84,7 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))
     told = row is not None or (dense is not None and len(dense.t) > 1)
     if told and not run.scene.system.external:
-        lost = losses_by_ticks(known) if row is None else losses_in(run, row)
-        found["lost_J"] = {cause: float(value) for cause, value in lost._asdict().items()}
+        found["lost_J"] = {cause: float(value) for cause, value in losses_of(known, row)._asdict().items()}
         found["lost_by"] = TICKS if row is None else MOTION
     return found
 

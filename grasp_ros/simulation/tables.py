@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple, Protocol
 import numpy as np
 
 from grasp_ros.physics.energy import Energy
-from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import BODIES, NAMES
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import needing, opened
 from grasp_ros.scene.parameter import UNITS as KEYS
 
@@ -70,14 +70,14 @@ class Column(NamedTuple):
     text: str
 
 
-_BODIES, _ARMS = [NAMES[body] for body in BODIES], (NAMES[LEFT], NAMES[RIGHT])
+_BODIES = [NAMES[body] for body in BODIES]
 TIME = Column("t", "s", "time")
 COLUMNS: tuple[Column, ...] = (
     *(Column(f"{symbol}_{name}", unit, f"{text} of the {name} mass")
       for name in _BODIES for symbol, unit, text in (("x", "m", "position"), ("v", "m/s", "velocity"))),
-    *(Column(f"command_{name}", "N", f"command of the {name} controller") for name in _ARMS),
+    *(Column(f"command_{name}", "N", f"command of the {name} controller") for name in SIDES),
     *(Column(f"input_{name}", "N", f"force of controller and outside on the {name} mass") for name in _BODIES),
-    *(Column(f"impact_{name}", "N", f"impact force of the {name} contact") for name in _ARMS),
+    *(Column(f"impact_{name}", "N", f"impact force of the {name} contact") for name in SIDES),
     Column("V", "J", "the paper's Lyapunov function (16)"),
     Column("V_c", "J", "its continuous repair, twice the energy"),
     Column("V_rate", "W", "its rate (18)"),

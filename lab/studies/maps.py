@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import time
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -87,9 +88,14 @@ def settling(directory: Path, pixels: int = PIXELS) -> Settling:
 
 def _computed(plan: Plan, path: Path) -> tuple[Any, float]:
     """The outcomes of a plan, and the time that they took in s."""
-    with tqdm(total=plan.rows, unit="run", desc=path.stem, file=sys.stderr, smoothing=0.05) as bar:
-        seconds = run(plan, path, progress=lambda done: bar.update(done - bar.n)).seconds
-    return store.read(path), seconds
+    begin = time.monotonic()
+    try:
+        with tqdm(total=plan.rows, unit="run", desc=path.stem, file=sys.stderr, smoothing=0.05) as bar:
+            run(plan, path, progress=lambda done: bar.update(done - bar.n))
+    finally:  # a study that was interrupted goes on with its map
+        about = store.open_group(path, "r+").attrs
+        about["seconds"] = about.get("seconds", 0.0) + time.monotonic() - begin
+    return store.read(path), about["seconds"]
 
 
 def _window(plan: Plan, jumps: Array, size: int, pixels: int) -> tuple[Axis, Axis]:

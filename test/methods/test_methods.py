@@ -42,16 +42,8 @@ def test_methods_agree_with_exact_for_some_contacts(name: str) -> None:
 
 @pytest.mark.parametrize("name", LOCATING)
 def test_condition_10_is_an_event_in_both_directions(name: str) -> None:
-    """The scene v_jump_symmetric: both pairs pass u' = -1/p at once, come back through it, and then release."""
-    settings = [
-        f"{key}={value}"
-        for side in ("left", "right")
-        for key, value in (
-            (f"{side}_feedback.position_gain_N_per_m", 50), (f"{side}_feedback.velocity_gain_Ns_per_m", 5),
-            (f"{side}_contact.dissipation_s_per_m", 10),
-        )
-    ]
-    scene = horizon("case_01", 0.4, "object.mass_kg=1", "right_arm.position_m=0.3", *settings)
+    """Both pairs pass u' = -1/p at once, come back through it, and then release."""
+    scene = horizon("v_jump_symmetric", 0.4)
     motion = simulate(scene, method=name, setting=PRECISE[METHODS[name].knob])
     tolerance = 1e-4 if name == "paper" else 1e-6
     for side in (LEFT, RIGHT):
@@ -63,14 +55,9 @@ def test_condition_10_is_an_event_in_both_directions(name: str) -> None:
 def test_restitution_of_one_impact(name: str) -> None:
     """O2: two bodies that are free; the exit speed depends on p v alone."""
     law = impact(reduced_mass(1, 5), 1e4, "0.5", 1)
-    settings = [
-        f"{section}.{key}=0"
-        for side in ("left", "right")
-        for section, key in (
-            (f"{side}_arm", "stiffness_N_per_m"), (f"{side}_arm", "damping_Ns_per_m"),
-            (f"{side}_feedback", "position_gain_N_per_m"), (f"{side}_feedback", "velocity_gain_Ns_per_m"),
-        )
-    ]
+    settings = [f"{side}_{key}=0" for side in ("left", "right") for key in (
+        "arm.stiffness_N_per_m", "arm.damping_Ns_per_m", "feedback.position_gain_N_per_m",
+        "feedback.velocity_gain_Ns_per_m")]
     scene = horizon(
         "case_01", 0.5, *settings, "left_arm.position_m=-0.1", "left_arm.velocity_m_per_s=1", "right_arm.position_m=9",
         "left_contact.dissipation_s_per_m=0.5",
@@ -120,9 +107,7 @@ def test_exact_is_the_default_and_its_setting_is_the_accuracy() -> None:
 def test_elastic_arm_keeps_its_period() -> None:
     """O12 with located events: 50 periods of 0.8893 s."""
     period = float(elastic_period(1, 15, 10_000, "0.3"))
-    scene = horizon(
-        "case_02", 50.0, "left_arm.position_m=-0.3", "right_arm.position_m=0.3",
-    )
+    scene = horizon("case_02", 50.0, "left_arm.position_m=-0.3", "right_arm.position_m=0.3")
     motion = simulate(scene, method="rk4_events", setting=1e-4)
     assert ELASTIC.damping == 0.0
     touches = motion.times(Transition.TOUCH, LEFT)

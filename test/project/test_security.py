@@ -111,8 +111,7 @@ def test_a_map_of_another_version_is_not_opened(tmp_path: Path) -> None:
     """Its arrays may name any codec, pickle among them."""
     zarr = pytest.importorskip("zarr")
     path = tmp_path / "a.zarr"
-    attributes = {"format": store.FORMAT, "plan": {"axes": [], "setup": {"outcomes": []}}, "versions": {},
-                  "seconds": 0.0}
+    attributes = {"format": store.FORMAT, "plan": {"axes": [], "setup": {"outcomes": []}}, "versions": {}}
     zarr.create_group(path, zarr_format=2, attributes=attributes)
     (path / store.STATUS).mkdir()
     (path / store.STATUS / "zarr.json").write_text("{}")

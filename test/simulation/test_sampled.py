@@ -148,17 +148,6 @@ def test_a_loop_that_grows_without_bound_ends_with_a_status() -> None:
     assert 1e9 < np.abs(run.state[:, :2]).max() <= 1e12
 
 
-def test_quantised_measurements_are_whole_steps() -> None:
-    document = {**scenes.load("noise").values}
-    for side in ("left", "right"):
-        document[f"{side}_sensor"] = {"noise_seed": 0, "position_step_m": 0.01}
-    scene = scenes.compose("steps", document)
-    motion = simulate(scene)
-    measured = (motion.command[:, 0] + 0.5 * motion.state[:, 1]) / -5.0
-    assert np.abs(measured / 0.01 - np.round(measured / 0.01)).max() < 1e-9
-    assert np.abs(measured - motion.state[:, 0]).max() <= 0.005 + 1e-12
-
-
 def test_changes_act_from_their_tick_on() -> None:
     scene = scenes.load("case_01", ["time.duration_s=2.0"])
     plain = simulate(scene, sampled=True)
