@@ -99,15 +99,10 @@ def distance(q: Any, y: Any, side: int, mode: int, after: int) -> float:
 @kernel
 def next_mode(q: Any, y: Any, side: int, mode: int) -> int:
     """Mode that a frozen pair should have at y; its own if nothing has happened."""
-    u, d = relative(y, side)
-    if mode == OPEN:
-        return CONTACT if u > 0.0 else OPEN
-    if u < 0.0:
+    other = CONTACT if mode != CONTACT else CLAMPED
+    if mode != OPEN and distance(q, y, side, mode, OPEN) > 0.0:
         return OPEN
-    rest = damping_factor(q[4 + 5 * side], d)
-    if mode == CONTACT:
-        return CLAMPED if rest < 0.0 else CONTACT
-    return CONTACT if rest > 0.0 else CLAMPED
+    return other if distance(q, y, side, mode, other) > 0.0 else mode
 
 
 @kernel
