@@ -66,8 +66,8 @@ def _recover(options: argparse.Namespace) -> int:
 
     new = options.output or options.bag.parent / f"{options.bag.stem}_recovered"
     found = recover(options.bag, new)
-    for offset, size, why in found.left_out:
-        print(f"left out: {size} bytes from byte {offset} on: {why}")
+    for words in found.left_out:
+        print(f"left out: {words}")
     print(f"{found.ticks} ticks written to {new}")
     return 0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import select
 import signal
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from inspect import isfunction
@@ -15,6 +16,7 @@ from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.own_law import begin, find_law
 
 MOST_BYTES = 2**16  # of a refusal
+QUIET_SECONDS = 5.0  # of an import that nothing is said of
 
 
 def sides_of(words: Sequence[str]) -> dict[str, str]:
@@ -58,7 +60,10 @@ def check_controllers(words: Sequence[str], seconds: float) -> None:
         os.setpgid(child, child)
     os.close(writer)
     try:
-        refusal = os.read(reader, MOST_BYTES).decode() if select.select([reader], [], [], seconds)[0] else ""
+        if not (ready := select.select([reader], [], [], QUIET_SECONDS)[0]):
+            print(f"grasp: waits for the import of {', '.join(words)}", file=sys.stderr)
+            ready = select.select([reader], [], [], seconds - QUIET_SECONDS)[0]
+        refusal = os.read(reader, MOST_BYTES).decode() if ready else ""
     finally:
         os.close(reader)
         with suppress(ProcessLookupError):

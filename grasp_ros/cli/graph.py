@@ -10,6 +10,7 @@ import signal
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
@@ -124,10 +125,9 @@ def _run(options: argparse.Namespace) -> int:
     )
     try:
         stopped = _live(graph, spent)
-        begun = not stopped or _has_ticks(graph.bag)
+        begun = not stopped or _was_closed(graph.bag)
     except GraphError as error:
-        there = f"; {graph.bag} has what was recorded" if graph.bag.exists() else ""
-        print(f"grasp: {error}{there}", file=sys.stderr)
+        print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
     if not begun:
         print("grasp: interrupted before the first tick", file=sys.stderr)
@@ -135,14 +135,25 @@ def _run(options: argparse.Namespace) -> int:
     return _report(graph, stopped, spent, options)
 
 
-def _has_ticks(path: Path) -> bool:
+def _was_closed(path: Path) -> bool:
     """Whether there is a bag with a state; with one that comes from elsewhere a run waits with a bag that has none."""
-    from grasp_ros.graph.opening import Opened
-
     if path.exists() and not (path / "metadata.yaml").exists():  # the monitor has said why, or was killed
         raise GraphError(f"{path}: was not closed")
+    return _has_ticks(path)
+
+
+def _has_ticks(path: Path) -> bool:
+    from grasp_ros.graph.opening import Opened
+
     messages = Opened(path).messages if path.exists() else ()
     return any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in messages)
+
+
+def _what_is_there(bag: Path) -> str:
+    """What a run that failed has left, as the end of a sentence."""
+    with suppress(Refused):
+        return f"; {bag} has what was recorded" if _has_ticks(bag) else ""
+    return ""
 
 
 def _in_words(spent: Sequence[tuple[float, str]]) -> str:

@@ -5,11 +5,13 @@
 
 from __future__ import annotations
 
+import math
 import os
 from array import array
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,14 +23,14 @@ from grasp_ros.graph.opening import Opened, decoding_bag
 from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, Recorder, checksum
 from grasp_ros.graph.recording import Recording, acted_from
 from grasp_ros.graph.rosbag2 import BagError, decode
-from grasp_ros.graph.serialization import force_template, lyapunov_template, state_template
+from grasp_ros.graph.serialization import clock_template, force_template, lyapunov_template, state_template
 from grasp_ros.graph.storage import Storage, Stored
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
-from grasp_ros.scene.topics import CHANGES, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic, state_of
+from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic, state_of
 
 __all__ = ["BagError", "Recorder", "Recording", "read"]
 MOST_NS = 2**63 - 1
@@ -45,8 +47,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     opened = Opened(path)
     with decoding_bag(opened.path):
         scene, changes, timing = opened.scene, _Changes(), list[Any]()
-        columns = {topic: _Columns(opened.names[topic], topic, scene) for topic in scene.topics
-                   if topic not in opened.held}  # with one message for each tick
+        columns = columns_of(opened)
         takers: dict[Topic, Callable[[Stored], object]] = {
             **{topic: column.add for topic, column in columns.items()},
             **{topic: partial(changes.add, topic, scene) for topic in CHANGES.values()},
@@ -67,16 +68,42 @@ def read(path: str | os.PathLike[str]) -> Recording:
         return _recording(opened, columns, changes, {topic.name: count for topic, count in counts.items()}, timing)
 
 
+def columns_of(opened: Opened) -> dict[Topic, Columns]:
+    """An empty table for each topic that has one message for each tick."""
+    return {topic: Columns(opened.names[topic], topic, opened.scene) for topic in (CLOCK, *opened.scene.topics)
+            if topic not in opened.held}
+
+
+def stamp_of(columns: Mapping[Topic, Columns], tick: Mapping[Topic, bytes]) -> int:
+    """Stamp in ns of the messages of one tick.
+
+    Raises
+    ------
+    BagError, or what `decoding_bag` makes one of
+        If they are not such as `read` takes.
+    """
+    rows = {topic: columns[topic].numbers(cdr) for topic, cdr in tick.items() if topic in columns}
+    if not all(map(math.isfinite, chain(*(row for topic, row in rows.items() if topic != LYAPUNOV)))):
+        raise BagError("a number is not finite")
+    stamps = {tuple(row[:2]) for row in rows.values()}
+    if len(stamps) > 1:
+        raise BagError("its messages have different stamps")
+    [(seconds, nanoseconds)] = stamps
+    return int(seconds) * NANOSECONDS + int(nanoseconds)
+
+
 def _check_metadata(path: Path, storage: Storage) -> None:
     """Refuse a metadata.yaml that is not the one that was written when the bag was closed."""
     file = path / "metadata.yaml"
     there = storage.closed and LOST_RECORD in storage.records and path.is_dir() and file.exists()
+    if there and not file.is_file():
+        raise BagError(f"{file}: not a file")
     if there and checksum(read_text(file, BagError)) != storage.records[LOST_RECORD][BESIDE]:
         raise BagError(f"{file}: was changed; `grasp recover` makes a new bag with metadata of its own")
 
 
 def _recording(
-    opened: Opened, columns: Mapping[Topic, _Columns], changes: _Changes, counts: dict[str, int], timing: Sequence[Any]
+    opened: Opened, columns: Mapping[Topic, Columns], changes: _Changes, counts: dict[str, int], timing: Sequence[Any]
 ) -> Recording:
     """All of it, as arrays."""
     scene, states = opened.scene, columns[JOINT_STATES]
@@ -86,12 +113,15 @@ def _recording(
     effort = np.ascontiguousarray(inputs[:, [LEFT, RIGHT]])
 
     def aligned(topic: Topic) -> Array:
-        found, values, _ = columns[topic].of()
+        found, values, stamped = columns[topic].of()
         result = np.full((len(ticks), values.shape[1]), np.nan)
         _, here, there = np.intersect1d(ticks, found, return_indices=True)
+        columns[topic].refuse(found[there], stamped[there] != stamps[here], "its stamp is not that of the state")
         result[here] = values[there]
         return result
 
+    aligned(CLOCK)
+    states.refuse(ticks, inputs[:, OBJECT] != 0.0, "an effort of the object; allowed: 0")
     command = np.zeros((len(ticks), 2))
     for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
         command[:, side] = aligned(topic)[:, 0] if topic in columns else acted_from(ticks, effort[:, side])
@@ -103,7 +133,7 @@ def _recording(
     )
 
 
-class _Columns:
+class Columns:
     """Ticks and numbers of one topic, taken as they come.
 
     A recorder writes messages that differ from each other in time and numbers alone; any other is decoded as a whole.
@@ -113,36 +143,54 @@ class _Columns:
         self._name, self._topic = name, topic
         self._period_ns, self._end_ns = scene.period_ns, scene.ticks * scene.period_ns
         self.names = [NAMES[body] for body in scene.system.present]
-        self._template = (state_template(self.names) if topic == JOINT_STATES else
-                          lyapunov_template() if topic == LYAPUNOV else force_template())
+        self._template = (state_template(self.names) if topic == JOINT_STATES else lyapunov_template()
+                          if topic == LYAPUNOV else clock_template() if topic == CLOCK else force_template())
         self.times, self._rows = array("Q"), array("d")
 
     def add(self, stored: Stored) -> None:
         """Take a message."""
+        self._rows.extend(self.numbers(stored.cdr))
         self.times.append(stored.time_ns)
-        self._rows.extend(self._template.read(stored.cdr) or self._decoded(stored.cdr))
+
+    def numbers(self, cdr: bytes) -> Sequence[float]:
+        """Seconds, nanoseconds and numbers of a message."""
+        return self._template.read(cdr) or self._decoded(cdr)
 
     def _decoded(self, cdr: bytes) -> list[float]:
         """Time and numbers of a message of another make, in the order of those of a recorder."""
-        message = decode(self._topic, cdr)
+        message, names = decode(self._topic, cdr), self.names
+        if self._topic == CLOCK:
+            return [message.clock.sec, message.clock.nanosec]
         numbers = [message.wrench.force.x] if self._topic.type == FORCE else message.position
         if self._topic == JOINT_STATES:
-            rows = [message.name.index(name) for name in self.names]
-            numbers = np.array([message.position, message.velocity, message.effort])[:, rows].ravel()
+            lists = message.position, message.velocity, message.effort
+            if any(len(values) != len(message.name) for values in lists) or not {*names} <= {*message.name}:
+                raise BagError(f"{self._name}: {', '.join(message.name)}; allowed: three numbers of {', '.join(names)}")
+            numbers = np.array(lists)[:, [message.name.index(name) for name in names]].ravel()
         if len(numbers) != self._template.count:
             raise BagError(f"{self._name}: {len(numbers)} numbers; allowed: {self._template.count}")
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
+
+    def refuse(self, ticks: np.ndarray, wrong: np.ndarray, why: str) -> None:
+        """Refuse the first tick (n,) that is wrong."""
+        if wrong.any():
+            raise BagError(f"{self._name}: tick {ticks[np.argmax(wrong)]}: {why}")
 
     def of(self) -> tuple[np.ndarray, Array, Array]:
         """Ticks (n,), rows (n, k) of numbers, and their stamps (n,) in ns."""
         rows, times = np.array(self._rows).reshape(-1, 2 + self._template.count), np.array(self.times)
         ticks, stamps = (times // np.uint64(self._period_ns)).astype(np.int64), rows[:, :2] @ (NANOSECONDS, 1)
         wrong = (times % np.uint64(self._period_ns) != 0) | (times > MOST_NS) | (np.diff(ticks, prepend=-1) <= 0)
-        if self._topic == JOINT_STATES:
-            wrong |= stamps > self._end_ns
         if wrong.any():
             time_ns = times[int(np.argmax(wrong))]
             raise BagError(f"{self._name}: {time_ns} ns; allowed: ticks of the scene in their order")
+        if self._topic == JOINT_STATES:
+            step, passed = np.diff(stamps, prepend=0.0), np.diff(ticks, prepend=0) * self._period_ns
+            # Or the plant was reset, perhaps in a gap.
+            follows = (step == passed) | (step <= 0.0) | (passed > self._period_ns)
+            self.refuse(ticks, (stamps > self._end_ns) | ~follows, "its stamp is not the next one of the scene")
+        if self._topic != LYAPUNOV:
+            self.refuse(ticks, ~np.isfinite(rows).all(axis=1), "a number is not finite")
         return ticks, rows[:, 2:], stamps
 
 
@@ -156,6 +204,8 @@ class _Changes(dict[int, dict[str, float]]):
 
     def add(self, topic: Topic, scene: scenes.Scene, stored: Stored) -> None:
         message, tick = decode(topic, stored.cdr), stored.time_ns // scene.period_ns
+        if len(message.name) != len(message.position):
+            raise BagError(f"{stored.topic}: tick {tick}: {len(message.name)} names of {len(message.position)} numbers")
         numbers = dict(zip(message.name, message.position.tolist(), strict=True))
         self.unheard[topic.name] += self._numbers[topic].take(message)
         known = {name: number for node in scene.controllers for name, number in scene.numbers_of(node).items()}

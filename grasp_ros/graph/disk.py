@@ -34,6 +34,7 @@ class Sink:
 
     def write(self, data: bytes) -> int:
         """Write all of it."""
+        self.check()  # the system would fill with zeros what is cut off
         rest = memoryview(data)
         while rest:
             try:
@@ -47,6 +48,11 @@ class Sink:
             self._size += done
             rest = rest[done:]
         return len(data)
+
+    def check(self) -> None:
+        """Raise an OSError if the file is shorter than what was written."""
+        if os.fstat(self.file).st_size < self._size:
+            raise OSError(errno.EIO, "was cut off by another program during the recording")
 
     def tell(self) -> int:
         """Bytes written so far."""

@@ -28,6 +28,7 @@ PROFILE = CONFIG / "this_host.xml"
 OTHER_WISHES = ("ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER", "FASTDDS_DEFAULT_PROFILES_FILE", PROFILES)
 MIDDLEWARE, OURS = "RMW_IMPLEMENTATION", "rmw_fastrtps_cpp"  # the one that the profile is for
 LEAST_BYTES = 2**31  # that a node can address: with its libraries and threads it takes up to 1.8e9
+LEAST_FILES = 32  # that a node has open: its libraries, and the sockets of DDS
 INDEX = "share/ament_index/resource_index/rmw_typesupport"  # where an installation of ROS lists those that it has
 
 
@@ -83,6 +84,9 @@ def check_reach(given: Mapping[str, str], alone: bool = False) -> None:
     memory, _ = resource.getrlimit(resource.RLIMIT_AS)
     if 0 <= memory < LEAST_BYTES:  # too little has as many words as libraries
         raise Refused(f"memory (`ulimit -v`): {memory >> 10} kB is not allowed; allowed: {LEAST_BYTES >> 10} or more")
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if 0 <= files < LEAST_FILES:
+        raise Refused(f"open files (`ulimit -n`): {files} is not allowed; allowed: {LEAST_FILES} or more")
     domain, reach, middleware = (given.get(name, "") for name in (DOMAIN, RANGE, MIDDLEWARE))
     if domain and not (domain.isascii() and domain.isdecimal() and int(domain) <= MOST_DOMAIN):
         raise Refused(f"{DOMAIN}: {domain!r} is not allowed; allowed: 0 to {MOST_DOMAIN}")

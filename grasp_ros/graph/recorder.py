@@ -191,11 +191,10 @@ class Recorder:
 
     def _see_whether_there(self) -> None:
         """Nobody has taken the file away or cut it off: its end would be written where it is not."""
-        written, file = self._sink.tell(), os.fstat(self._sink.file)
+        self._sink.check()
+        file = os.fstat(self._sink.file)
         if not file.st_nlink:
             raise BagError(f"{self._path}: was deleted during the recording")
-        if file.st_size < written:
-            raise BagError(f"{self._path}: was cut off by another program during the recording")
         there = self._path / f"{self._path.name}.mcap"
         if not there.exists() or not os.path.samestat(file, there.stat()):
             raise BagError(f"{self._path}: was moved during the recording, which ends there; `grasp recover` closes it")

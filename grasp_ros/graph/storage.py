@@ -80,8 +80,7 @@ class Storage:
                     raise EOFError("the rest of a record is missing")
                 opcode, body = data[offset], data[offset + HEAD.size : end]
                 if opcode == Opcode.DATA_END:
-                    if data[-FOOTER_BYTES:][: HEAD.size] == FOOTER_HEAD and not self.closed and not self._salvage:
-                        self._refuse("its last bytes are not the end of an MCAP file")
+                    self._check_end(offset, end)
                     return
                 yield from self._read(opcode, body)
                 offset = end
@@ -89,6 +88,16 @@ class Storage:
                 offset = self._behind_damage(offset, " ".join(str(error).split()) or type(error).__name__)
         if self.closed and not self._salvage:
             self._refuse("its data have no end")
+
+    def _check_end(self, offset: int, end: int) -> None:
+        """Refuse a record of the data's end that is not where the index begins, and a footer that is not the last."""
+        if self._salvage:
+            return
+        footer = self._data.find(FOOTER_HEAD, end)
+        if not self.closed and 0 <= footer <= len(self._data) - FOOTER_BYTES:
+            self._refuse("its last bytes are not the end of an MCAP file")
+        if end != offset + DATA_END_BYTES:
+            self._refuse("the end of its data is not as long as it should be")
 
     def _end_of(self, offset: int) -> int | None:
         """Where a record ends; None if it is not all there."""

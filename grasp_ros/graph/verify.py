@@ -6,7 +6,7 @@ impact forces, and what the monitor computed. Which law gave the commands is a q
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from copy import copy
 from itertools import pairwise
 from typing import NamedTuple
@@ -15,7 +15,7 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.graph.recording import Recording, check_recording
-from grasp_ros.physics.energy import energy
+from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -72,13 +72,14 @@ _Column = tuple[str, str, Array, Array]  # topic, name, what was recorded, and w
 def verify(recording: Recording) -> Verification:
     """Simulate the scene of a bag with its recorded inputs, and compare every number that follows from them."""
     ticks, first = 0, None
-    problem = _gap(check_recording(recording))
+    problem, lost = _gap(check_recording(recording)), _lost(recording)
     for rows in _episodes(recording):
         states, stop = _simulate(recording, rows)
         ticks += len(states)
         problem = problem or stop
         part = rows[: len(states)]
-        found = [found for column in _columns(recording, part, states) if (found := _first(recording, part, *column))]
+        found = [found for column in _columns(recording, part, states)
+                 if (found := _first(recording, part, lost, *column))]
         if found:
             first = min(found, key=lambda difference: difference.tick)
             break
@@ -132,7 +133,7 @@ def answers_of(recording: Recording) -> dict[str, Answers]:
 def _same_without_ros(recording: Recording, answers: dict[str, Answers]) -> bool | None:
     """Whether the scene with its own laws has the recorded states and commands, without a graph."""
     others = any(found.differs or found.commands < len(recording.tick) for found in answers.values())
-    if others or not recording.running.lockstep or len(recording.starts) > 1:
+    if others or not recording.running.lockstep or not recording.whole:
         return None
     run = simulate(recording.scene, sampled=True, grid=recording.t, setting=recording.running.accuracy,
                    changes=recording.changes)
@@ -151,14 +152,19 @@ def _gap(recording: Recording) -> str:
     missing = np.flatnonzero(np.diff(recording.tick) != 1)
     if len(missing):
         return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
-    columns = {**recording.outputs, LYAPUNOV.name: recording.lyapunov[:, LYAPUNOV_NAMES.index("V_plant")]}
+    words = [f"{name} of {np.count_nonzero(lost)} ticks, the first {recording.tick[np.argmax(lost)]}"
+             for name, lost in _lost(recording).items() if lost.any()]
+    return f"the bag lacks {' and '.join(words)}" if words else ""
+
+
+def _lost(recording: Recording) -> dict[str, np.ndarray]:
+    """Whether the message of a tick (n,) is lost, by topic: a bag holds no NaN, but for V of unknown laws."""
+    columns = {**recording.outputs}
     if recording.running.lockstep:
         columns |= {topic.name: recording.command[:, SIDES[name.removesuffix("_controller")]]
                     for name, topic in recording.scene.controllers.items()}
-    lost = {name: np.flatnonzero(np.isnan(values)) for name, values in columns.items()}
-    words = [f"{name} of {len(rows)} ticks, the first {recording.tick[rows[0]]}" for name, rows in lost.items()
-             if len(rows)]
-    return f"the bag lacks {' and '.join(words)}" if words else ""
+    return {**{name: np.isnan(values) for name, values in columns.items()},
+            LYAPUNOV.name: np.asarray(np.isnan(recording.lyapunov).all(axis=1))}
 
 
 def _episodes(recording: Recording) -> Iterator[np.ndarray]:
@@ -194,29 +200,48 @@ def _columns(recording: Recording, rows: np.ndarray, states: Array) -> Iterator[
         wait = system.delay + 1
         for body in system.laws:
             acted = np.concatenate([np.zeros(wait), recording.command[rows, body]])[: len(rows)]
-            yield (JOINT_STATES.name, f"{NAMES[body]} effort", recording.effort[rows, body], acted)
+            effort = recording.effort[rows, body]
+            yield (JOINT_STATES.name, f"{NAMES[body]} effort", effort, np.where(np.isnan(acted), effort, acted))
     u_l, d_l, u_r, d_r = penetration(states)
     for side, u, d in (("left", u_l, d_l), ("right", u_r, d_r)):
         if (topic := CONTACTS[side].name) in recording.outputs:
             force = impact_force(Contact(*system.pairs[SIDES[side]]), u, d)
             yield (topic, "force", recording.outputs[topic][rows], force)
-    external = system.external_over(np.arange(len(rows))) if system.external else None
+    external = system.external_over(np.arange(len(rows))) if system.external else np.zeros((len(rows), 3))
     for name, body in SECTIONS.items():
-        if external is not None and (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
+        if (topic := EXTERNAL_FORCES[name].name) in recording.outputs:
             yield (topic, "force", recording.outputs[topic][rows], external[:, body])
-    alone = energy(system, states, feedback=False)
-    for name, values in (("V_plant", alone.V_c), ("mode", alone.mode.astype(float))):
-        yield (LYAPUNOV.name, name, recording.lyapunov[rows, LYAPUNOV_NAMES.index(name)], values)
+    for column, values in enumerate(_lyapunov(recording, rows, states, external)):
+        yield (LYAPUNOV.name, LYAPUNOV_NAMES[column], recording.lyapunov[rows, column], values)
+
+
+def _lyapunov(recording: Recording, rows: np.ndarray, states: Array, external: Array) -> list[Array]:
+    """What the monitor has computed, by LYAPUNOV_NAMES; `closed` is what it knew, so that only 0 and 1 are compared."""
+    system = recording.scene.system
+    closed = recording.lyapunov[rows, LYAPUNOV_NAMES.index("closed")] == 1.0
+    V = np.full((3, len(rows)), np.nan)
+    for scene, part in recording.parts:
+        own = closed & (rows >= part.start) & (rows < part.stop)
+        if own.any():
+            V[:, own] = energy(scene.system, states[own], external[own])[:3]
+    held = external[:-1].copy()
+    held[:, [LEFT, RIGHT]] += recording.effort[rows[1:]]
+    balance = energy_balance(system, states[:-1], states[1:], held)
+    residual, alarm, work = (np.append(0.0, part) for part in (balance.residual, balance.alarm, balance.work))
+    alone = energy(system, states, external, feedback=False)
+    return [*V, alone.mode, residual, alarm, alone.V_c, work, closed]
 
 
 def _first(
-    recording: Recording, rows: np.ndarray, topic: str, name: str, recorded: Array, computed: Array
+    recording: Recording, rows: np.ndarray, lost: Mapping[str, np.ndarray], topic: str, name: str, recorded: Array,
+    computed: Array,
 ) -> Difference | None:
-    """The first number whose bits differ; NaN, in place of what the bag has lost, is left out, and named by `_gap`."""
+    """The first number whose bits differ; those of lost messages are left out, and named by `_gap`."""
     recorded, computed = (np.ascontiguousarray(part, dtype=float) for part in (recorded, computed))
-    lost = np.isnan(recorded) | np.isnan(computed)
-    differ = np.flatnonzero((recorded.view(np.int64) != computed.view(np.int64)) & ~lost)
-    if not len(differ):
+    differs = (recorded.view(np.int64) != computed.view(np.int64)) & ~(np.isnan(recorded) & np.isnan(computed))
+    if topic in lost:
+        differs &= ~lost[topic][rows]
+    if not differs.any():
         return None
-    place = int(differ[0])
+    place = int(np.argmax(differs))
     return Difference(int(recording.tick[rows[place]]), topic, name, float(recorded[place]), float(computed[place]))

@@ -24,7 +24,7 @@ def place_of(error: BaseException) -> str:
 def described(error: BaseException) -> str:
     """What went wrong in somebody else's code, and where: "ValueError: words, file, line n"."""
     try:
-        words = str(error)
+        words = " ".join(str(error).split())
     except Exception:  # its `__str__` is somebody else's, too
         words = "without words"
     return ": ".join(filter(None, [type(error).__name__, words])) + f", {place_of(error)}"

@@ -18,7 +18,7 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.recorder import FLUSH_SECONDS, Recorder
 from grasp_ros.graph.recover import recover
 from grasp_ros.graph.serialization import force_message, list_message
-from grasp_ros.physics.energy import energy
+from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
@@ -34,6 +34,8 @@ Tick = tuple[int, list[tuple[Topic, bytes]]]
 def ticks_of(run: Trajectory) -> Iterator[Tick]:
     """What a monitor would record of a sampled run: time in ns, and messages, its own last."""
     scene, level, alone = run.scene, run.energy, energy(run.scene.system, run.state, feedback=False).V_c
+    balance = energy_balance(scene.system, run.state[:-1], run.state[1:], run.inputs[:-1])
+    residual, alarm, work = (np.append(0.0, part) for part in (balance.residual, balance.alarm, balance.work))
     bodies = [body for body in (LEFT, OBJECT, RIGHT) if body not in scene.system.absent]
     effort = np.vstack([np.zeros(3), run.inputs[:-1]])
     for tick, state in enumerate(run.state):
@@ -46,9 +48,8 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
             time_ns, [NAMES[body] for body in bodies],
             *(numbers.tolist() for numbers in (state[column], state[column + 1], effort[tick, bodies])),
         )
-        own: list[float] = [
-            level.V[tick], level.V_c[tick], level.V_rate[tick], level.mode[tick], 0.0, 0.0, alone[tick], 0.0, 1.0
-        ]
+        columns = level.V, level.V_c, level.V_rate, level.mode, residual, alarm, alone, work
+        own = [*(float(column[tick]) for column in columns), 1.0]
         rest = [(topic, force_message(time_ns, force)) for topic, force in forces.items()]
         lyapunov = list_message(time_ns, LYAPUNOV_NAMES, own)
         yield time_ns, [(JOINT_STATES, states), *rest, (LYAPUNOV, lyapunov)]

@@ -13,7 +13,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
+from grasp_ros.graph.recover import recover
 from grasp_ros.graph.serialization import list_message
+from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
@@ -89,6 +91,67 @@ def test_a_list_of_another_length_is_refused(tmp_path: Path) -> None:
     written(tmp_path / "bag", run.scene, ticks)
     with pytest.raises(bag.BagError, match="/lyapunov: 8 numbers; allowed: 9"):
         bag.read(tmp_path / "bag")
+
+
+def changed(topic: Topic, cdr: bytes, path: str, value: Any) -> bytes:
+    """A message with another value somewhere: "position.1" or "header.stamp.nanosec", say."""
+    content: Any = STORE.deserialize_cdr(cdr, topic.type)
+    *parents, last = path.split(".")
+    place = content
+    for name in parents[: -1 if last.isdecimal() else None]:
+        place = getattr(place, name)
+    if last.isdecimal():
+        last, number = parents[-1], int(last)
+        values = getattr(place, last).copy()
+        values[number], value = value, values
+    setattr(place, last, value)
+    return bytes(STORE.serialize_cdr(content, topic.type))
+
+
+@pytest.mark.parametrize(
+    ("topic", "path", "value", "words"),
+    [
+        (JOINT_STATES, "position.1", np.nan, "tick 5: a number is not finite"),
+        (JOINT_STATES, "effort.2", np.inf, "tick 5: a number is not finite"),
+        (LEFT_COMMAND, "wrench.force.x", np.nan, "tick 5: a number is not finite"),
+        (JOINT_STATES, "effort.1", 99.0, "tick 5: an effort of the object; allowed: 0"),
+        (JOINT_STATES, "header.stamp.nanosec", 7, "tick 6: its stamp is not the next one of the scene"),
+        (LEFT_COMMAND, "header.stamp.nanosec", 4_000_000, "tick 5: its stamp is not that of the state"),
+        (LYAPUNOV, "header.stamp.sec", 1, "tick 5: its stamp is not that of the state"),
+        (JOINT_STATES, "name.2", "foot", "left, object, foot; allowed: three numbers of left, object, right"),
+        (JOINT_STATES, "effort", np.zeros(2), "left, object, right; allowed: three numbers of left, object, right"),
+    ],
+)
+def test_a_tick_that_cannot_be_true_is_refused_and_left_out_of_what_is_recovered(
+    tmp_path: Path, topic: Topic, path: str, value: Any, words: str
+) -> None:
+    run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    there = dict(ticks[5][1])
+    ticks[5] = ticks[5][0], [*{**there, topic: changed(topic, there[topic], path, value)}.items()]
+    written(tmp_path / "bag", run.scene, ticks)
+    with pytest.raises(bag.BagError, match=words):
+        bag.read(tmp_path / "bag")
+    found = recover(tmp_path / "bag", tmp_path / "new")
+    if "object;" not in words:  # of which a reader cannot say that it is wrong before all is there
+        assert [left.partition(":")[0] for left in found.left_out] == ["tick 5"]
+        assert bag.read(tmp_path / "new").tick.tolist() == [tick for tick in range(11) if tick != 5]
+
+
+@pytest.mark.parametrize("name", LYAPUNOV_NAMES)
+@pytest.mark.parametrize("value", [1e9, np.nan])
+def test_every_number_of_the_monitor_is_verified(tmp_path: Path, name: str, value: float) -> None:
+    run = simulate(scenes.load("everything", ["time.duration_s=0.05"]), sampled=True)
+    ticks = list(study.ticks_of(run))
+    there = dict(ticks[40][1])
+    cdr = changed(LYAPUNOV, there[LYAPUNOV], f"position.{LYAPUNOV_NAMES.index(name)}", value)
+    ticks[40] = ticks[40][0], [*{**there, LYAPUNOV: cdr}.items()]
+    written(tmp_path / "bag", run.scene, ticks)
+    found = verify(bag.read(tmp_path / "bag"))
+    assert found.difference is not None
+    assert not found.holds
+    assert (found.difference.tick, found.difference.topic) == (40, "lyapunov")
+    assert found.difference.name == ("V" if name == "closed" else name)  # V is not there where it is not closed
 
 
 @pytest.mark.parametrize("times", [(0, 1, 1), (0, 2, 1), (0, 1, 0.5)])

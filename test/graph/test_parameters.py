@@ -187,10 +187,17 @@ def test_a_run_whose_nodes_refuse_what_they_are_given_is_refused(tmp_path: Path,
 
 
 @pytest.mark.parametrize("words", [[*START, "plant"], [*GRASP, "run", "case_01"]])
-def test_a_limit_of_memory_in_which_no_node_has_room_is_named(tmp_path: Path, words: list[str]) -> None:
-    found = ran("sh", "-c", 'ulimit -v 1000000; exec "$@"', "sh", *words, cwd=tmp_path)
+@pytest.mark.parametrize(
+    ("limit", "said"),
+    [
+        ("-v 1000000", "memory (`ulimit -v`): 1000000 kB is not allowed; allowed: 2097152 or more"),
+        ("-n 25", "open files (`ulimit -n`): 25 is not allowed; allowed: 32 or more"),
+    ],
+)
+def test_a_limit_in_which_no_node_has_room_is_named(tmp_path: Path, words: list[str], limit: str, said: str) -> None:
+    found = ran("sh", "-c", f'ulimit {limit}; exec "$@"', "sh", *words, cwd=tmp_path)
     assert (found.returncode, len(found.stderr.splitlines())) == (2, 1)
-    assert "memory (`ulimit -v`): 1000000 kB is not allowed; allowed: 2097152 or more" in found.stderr
+    assert said in found.stderr
 
 
 def test_one_process_needs_to_find_nobody(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
@@ -188,3 +189,20 @@ def test_without_a_plant_ctl_says_so(tmp_path: Path) -> None:
     found = grasp("ctl", "status", "--namespace", "/nobody", cwd=tmp_path)
     assert (found.returncode, found.stdout) == (1, "")
     assert "no plant answers in ROS domain" in found.stderr
+
+
+def test_an_answer_that_is_no_plants_is_named(node: tuple[Any, SingleThreadedExecutor], launch: Any) -> None:
+    def answer(_: Any, response: Trigger.Response) -> Trigger.Response:
+        response.success, response.message = True, "hello"
+        return response
+
+    node[0].create_service(Trigger, "plant/status", answer)
+    asks = launch(*GRASP, "ctl", "status", **PIPES)
+    wait_for(lambda: node[1].spin_once(timeout_sec=0.05) is None and asks.poll() is not None, "an answer")
+    assert (asks.communicate()[1], asks.returncode) == ("plant/status: 'hello' is no answer of a plant\n", 1)
+
+
+def test_a_number_of_steps_that_no_plant_can_do_is_refused() -> None:
+    found = ran(*GRASP, "ctl", "step", "1" * 5000)
+    assert found.returncode == 2
+    assert found.stderr.endswith("1: not allowed; allowed: a whole number >= 1\n")

@@ -31,6 +31,7 @@ from grasp_ros.scene.topics import Topic
 
 PATIENCE_SECONDS = 15.0  # without an answer, or without progress; to be found takes over 5 s on a busy machine
 SPIN_SECONDS = 0.1
+MOST_DIGITS = 20  # of a whole number; a plant refuses those that it cannot do itself
 FAREWELL = ("quit", "exit", "q")
 HELP = "pause, resume, step [N], reset, status, get NODE [NAME ...], set NODE NAME VALUE, echo TOPIC [N]"
 
@@ -115,9 +116,13 @@ class Remote(GraspNode):
 
     def _status(self, service: str) -> dict[str, Any]:
         answer = self._ask(Trigger, f"plant/{service}", Trigger.Request())
-        found: dict[str, Any] = json.loads(answer.message)
+        try:
+            found: dict[str, Any] = json.loads(answer.message)
+            said = _line(found) if answer.success else found["why"]
+        except (ValueError, TypeError, KeyError):
+            raise Failed(f"plant/{service}: {answer.message!r} is no answer of a plant") from None
         if not answer.success:
-            raise Failed(found["why"])
+            raise Failed(said)
         return found
 
     def get(self, node: str, *names: str) -> str:
@@ -200,7 +205,7 @@ class Remote(GraspNode):
 
 
 def _whole(word: str) -> int:
-    if not word.isdecimal() or not int(word):
+    if not word.isdecimal() or len(word) > MOST_DIGITS or not int(word):
         raise Refused(f"{word}: not allowed; allowed: a whole number >= 1")
     return int(word)
 
