@@ -23,7 +23,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         against: Mapping[str, float] = MappingProxyType({}), by_sensors: bool = False) -> Fit:
     """Estimate numbers of a scene from a measured motion, with confidence intervals.
 
-    Positive numbers are estimated by their logarithm. The noise of each channel is estimated as well, and weights it.
+    Positive numbers are searched by their logarithm; their intervals are symmetric, but never below 0. The noise of
+    each channel is estimated as well, and weights it.
 
     Parameters
     ----------
@@ -77,12 +78,12 @@ def _result(problem: Problem, y: Array, against: Mapping[str, float]) -> Fit:
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
     covariance, reach, unseen = identifiability_of(slopes, values, len(y))
     estimates = problem.values(y)
-    scale = [number.slope(value) for number, value in zip(problem.numbers, estimates.values(), strict=True)]
-    low, high = ([float(number.at(end)) for number, end in zip(problem.numbers, ends.tolist(), strict=True)]
-                 for ends in (y - reach, y + reach))
+    found = np.array([*estimates.values()])
+    scale = np.array([number.slope(value) for number, value in zip(problem.numbers, found.tolist(), strict=True)])
+    least = [0.0 if number.positive else -np.inf for number in problem.numbers]
     return Fit(
-        problem.scene_at(y), data.name, data.acting, tuple(estimates), np.array([*estimates.values()]), np.array(low),
-        np.array(high), covariance * np.outer(scale, scale),
+        problem.scene_at(y), data.name, data.acting, tuple(estimates), found,
+        np.maximum(found - scale * reach, least), found + scale * reach, covariance * np.outer(scale, scale),
         tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
         residual_table(values.reshape(rows, -1), data.t, touches),

@@ -68,6 +68,16 @@ def test_intervals_hold_the_truth_as_often_as_they_say(held: Trajectory) -> None
     assert (hits < 40).any()
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("p", [0.0, 1e-5])
+def test_intervals_hold_a_truth_that_is_zero_or_hardly_more(p: float) -> None:
+    run = simulate(SCENE.changed({P_LEFT: p, P_RIGHT: p}), sampled=True)
+    for seed in range(5):
+        found = fit(noisy(run, seed), [H_LEFT, P_LEFT], SCENE.changed({P_RIGHT: p}), against={P_LEFT: p})
+        assert 0.0 <= found.low[1] <= p <= found.high[1] < 1e-3
+        assert not found.against[P_LEFT].rejected
+
+
 def test_data_without_noise_give_the_numbers_back(held: Trajectory, tmp_path: Path, command: Any) -> None:
     held.save(tmp_path / "run.npz")
     result = command("fit", "run.npz", "--free", *CONTACTS, "--set", f"{H_LEFT}=3000", "--against", f"{P_LEFT}=0",
