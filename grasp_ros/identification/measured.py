@@ -6,6 +6,7 @@ import csv
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from stat import S_ISDIR
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -69,7 +70,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
     if not isinstance(source, (Recording, Trajectory)):
         path = Path(given.instance("data", source, (str, os.PathLike), "a path, a Recording or a Trajectory"))
         with reading(path):
-            directory = path.is_dir()
+            directory = S_ISDIR(path.stat().st_mode)
         source = bag.read(path) if directory or path.suffix.lower() == ".mcap" else path
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")

@@ -265,6 +265,11 @@ def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, 
     assert complaint in result.stderr
 
 
+def test_a_file_that_is_not_there_is_named() -> None:
+    with pytest.raises(Refused, match=r"^nope\.csv: cannot be read: No such file or directory$"):
+        fit("nope.csv", [P_LEFT])
+
+
 def test_the_law_of_another_controller_has_no_numbers() -> None:
     run = simulate(SCENE, controllers={"left": lambda tick, time, x, v: -5.0 * x - 0.6 * v})
     assert fit(run, [P_LEFT], SCENE.changed({P_LEFT: 0.2})).estimates == pytest.approx([0.1], rel=1e-9)
