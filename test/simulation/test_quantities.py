@@ -9,7 +9,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
@@ -125,12 +125,15 @@ def test_they_are_those_of_an_observed_run(name: str) -> None:
 
 def test_contacts_of_case_1() -> None:
     run = simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 20001))
-    for side in (LEFT, RIGHT):
-        spans = contact_intervals(run, side)
+    for side, name in ((LEFT, "left"), (RIGHT, "right")):
+        spans = contact_intervals(run, name)
         inside = ((run.t[:, None] > spans[:, 0]) & (run.t[:, None] < spans[:, 1])).any(axis=1)
         assert np.array_equal(run.impacts[:, side] > 0.0, inside)
+    begin_of_first = run.times(Transition.TOUCH, LEFT)[0]
     begun = simulate(scenes.load("case_01", ["left_arm.position_m=0.01"]))
-    assert contact_intervals(begun, LEFT)[0, 0] == 0.0
+    assert contact_intervals(begun, "left")[0, 0] == 0.0
+    [cut] = contact_intervals(simulate(scenes.load("case_01", ["time.duration_s=0.45"]), grid=[0.0, 0.1]), "left")
+    assert cut.tolist() == [begin_of_first, 0.45]
 
 
 def test_a_settling_time_is_that_of_the_scene_whatever_its_horizon() -> None:
