@@ -153,7 +153,10 @@ class Trajectory(Tabular, Frozen):
 
     @property
     def epsilon(self) -> Array:
-        """Epsilon of (35), (36): the largest deformation of each pair up to an output time, (n, 2) in m."""
+        """Epsilon of (35), (36) as the output times show it: the largest deformation of each pair so far, (n, 2) in m.
+
+        Between output times it may be larger: `contacts` has the `deepest` u of each contact.
+        """
         return largest_deformation(self.scene.system, self.state)
 
     @property
