@@ -1,8 +1,8 @@
 """What solvers are held against: the exact method at its finest, with an estimate of its own error.
 
 A motion in double precision is known no better than the scene amplifies roundings. So the estimate is the largest
-difference to runs that begin one rounding beside the initial state; or, if that is more, a tenth of the difference to a
-run with ten times the first neglected term.
+difference to runs that begin a rounding of the largest position beside the initial state; or, if that is more, a tenth
+of the difference to a run with ten times the first neglected term.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from grasp_ros.exact.integrator import Status
 from grasp_ros.physics.accuracy import FINEST
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import EPS, LEFT, RIGHT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
@@ -40,18 +40,17 @@ def finest(scene: Scene) -> Truth:
     run = simulate(scene, grid=grid, setting=FINEST)
     if run.status is not Status.DONE:
         raise Refused(f"{scene.name}: {run.stop}; allowed here: a scene that runs to its end")
+    rounding = EPS * float(np.nanmax(np.abs(run.state[:, 0::2])))
     apart = [distance(run, simulate(scene, grid=grid, setting=FINER * FINEST).state) / FINER, *(
-        distance(run, simulate(_beside(scene, section), grid=grid, setting=FINEST).state)
+        distance(run, simulate(_beside(scene, section, rounding), grid=grid, setting=FINEST).state)
         for section in SECTIONS.values() if section in scene.values)]
     left, right = (len(run.times(Transition.TOUCH, side)) for side in (LEFT, RIGHT))
     return Truth(grid, run.state, (left, right), max(apart))
 
 
-def _beside(scene: Scene, section: str) -> Scene:
-    """A scene whose body begins one rounding of the scene's length farther right."""
-    length = max(abs(scene.initial_state[0::2]).max(), np.finfo(float).tiny)
-    place = scene.values[section]["position_m"]
-    return scene.changed({f"{section}.position_m": float(place + np.spacing(length))})
+def _beside(scene: Scene, section: str, rounding: float) -> Scene:
+    """A scene whose body begins a rounding in m farther right."""
+    return scene.changed({f"{section}.position_m": float(scene.values[section]["position_m"] + rounding)})
 
 
 def distance(truth: Truth | Trajectory, state: Array) -> float:

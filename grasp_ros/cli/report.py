@@ -47,11 +47,10 @@ def describe_trajectory(trajectory: Trajectory, found: dict[str, Any]) -> list[R
         ("work", ", ".join(f"{number} {name}" for name, number in found["work"].items())),
     ]
     if "V_c_J" in found:
-        ends = "both ends" if trajectory.status is Status.DONE else "first and last output"
+        ends = "both ends" if found["V_c_at_s"] == [0.0, found["duration_s"]] else "first and last output"
         rows.append((f"V_c of {PLANT_ALONE}" if own else f"V_c at {ends}", _ends(found["V_c_J"])))
         rows += _amounts(found)
-    known = trajectory.scene.certificate_in_words(trajectory.sampled)
-    rows.append(("certificate", "none: V_c needs the energy of every controller" if own else known))
+    rows.append(("certificate", found["certificate"]))
     if "V_c_rise_J" in found:
         rows.append(("risen by the method", f"{found['V_c_rise_J']:.3g} J of V_c"))
     return _with_words(trajectory.scene, rows, other=bool(own))
@@ -76,6 +75,8 @@ def _amounts(found: dict[str, Any]) -> list[Row]:
         parts = [f"{name} {value:.4g}" for name, value in found["lost_J"].items() if value != 0.0]
         how = "; trapezoidal rule at the control periods" if parts and found["lost_by"] == TICKS else ""
         rows.append(("energy lost, J", (", ".join(parts) or "none") + how))
+    if "work_external_J" in found:
+        rows.append(("external work, J", f"{found['work_external_J']:.4g}"))
     return rows
 
 

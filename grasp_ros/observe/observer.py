@@ -8,11 +8,11 @@ import numpy as np
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, inlined, kernel
-from grasp_ros.exact.driver.callback import FINISH, address_of, block_of, call
-from grasp_ros.exact.impact import stored_energy
+from grasp_ros.exact.driver.callback import FINISH, REST, address_of, block_of, call
+from grasp_ros.exact.impact import elastic_force, stored_energy
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.exact.records import Array, Integers, Plant, State, Tables
-from grasp_ros.observe.extremes import extremes_of, may_exceed, write_ranges
+from grasp_ros.observe.extremes import extremes_of, may_exceed, owner, weights, write_ranges
 from grasp_ros.observe.losses import add_losses
 from grasp_ros.observe.record import (
     QUANTITIES,
@@ -64,13 +64,34 @@ def is_wanted(segment: SegmentRecord, q: int, wanted: int) -> bool:
 
 
 @inlined
+def keep(seen: Array, q: int, low: float, high: float) -> None:
+    """Keep the least and the largest value of a quantity."""
+    seen[Seen.LOW + q] = min(seen[Seen.LOW + q], low)
+    seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
+
+
+@inlined
 def watch_quantities(segment: SegmentRecord, seen: Array, wanted: int) -> None:
     """Keep the extremes of what is wanted, where its range may hold new ones."""
     for q in range(QUANTITIES):
         if is_wanted(segment, q, wanted) and may_exceed(segment, q, seen[Seen.LOW + q], seen[Seen.HIGH + q]):
-            low, high = extremes_of(segment, q)
-            seen[Seen.LOW + q] = min(seen[Seen.LOW + q], low)
-            seen[Seen.HIGH + q] = max(seen[Seen.HIGH + q], high)
+            keep(seen, q, *extremes_of(segment, q))
+
+
+@kernel
+def watch_rest(segment: SegmentRecord, seen: Array, wanted: int) -> None:
+    """The same where nothing moves: a run may begin so, and under other inputs than before."""
+    y, pairs = segment.m.y, segment.m.pairs
+    for q in range(QUANTITIES):
+        if is_wanted(segment, q, wanted):
+            if q < Quantity.IMPACT_L:
+                value = y[q]
+            elif q < Quantity.INPUT_L:
+                value = elastic_force(pairs[q % 2, Law.HERTZIAN], y[U.L + q % 2])
+            else:
+                (a, b, c), lane = weights(segment, q), velocity_lane(owner(q))
+                value = a * y[lane - 1] + b * y[lane] + c
+            keep(seen, q, value, value)
 
 
 @kernel
@@ -114,7 +135,7 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
     """Remember what is wanted of a segment of t s, which has just ended; called by `callback.notify`.
 
     Before a run it is called with BEGIN and the part of the largest displacement that counts as settled; after it with
-    FINISH.
+    FINISH, and with REST where nothing moves.
     """
     m = memory_at(address)
     if kind == BEGIN:
@@ -124,6 +145,9 @@ def observe(address: int, kind: int, t: float, s: float, degree: int) -> int:
         finish(m)
         return 0
     segment, seen, wanted = SegmentRecord(kind, t, s, degree, m), m.seen, m.switches[Switch.WANTED]
+    if kind == REST:
+        watch_rest(segment, seen, wanted)
+        return 0
     if not math.isfinite(m.y.sum() + t):
         return 0
     bound = wanted & (Wanted.SETTLING.value | Wanted.BOUND.value)

@@ -56,6 +56,7 @@ def energy(system: System, state: Array, external: Array | None = None, *, feedb
     """
     state = given.rows("state", state, 6)
     external = None if external is None else given.rows("external", external, 3)
+    given.check_rows(state=state, external=external)
     bodies = given.instance("system", system, System, "a System").closed_loop if feedback else system.bodies
     V = _mechanical(system, bodies, state)
     V_c = V
@@ -102,6 +103,7 @@ def energy_balance(system: System, before: Array, after: Array, forces: Array) -
     """
     before, after = given.rows("before", before, 6), given.rows("after", after, 6)
     forces, levels = given.rows("forces", forces, 3), []
+    given.check_rows(before=before, after=after, forces=forces)
     given.instance("system", system, System, "a System")
     rounding: Array = np.zeros(np.shape(before)[:-1])
     for state in (before, after):

@@ -157,6 +157,16 @@ def rows(name: str, values: Any, width: int) -> NDArray[np.float64]:
     return array.astype(np.float64, copy=False)
 
 
+def check_rows(**arrays: NDArray[np.float64] | None) -> None:
+    """Refuse arrays (..., k) that do not have equally many rows, or one, each."""
+    shapes = {name: np.shape(array) for name, array in arrays.items() if array is not None}
+    try:
+        np.broadcast_shapes(*(shape[:-1] for shape in shapes.values()))
+    except ValueError:
+        shown = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise Refused(f"shape of {shown} is not allowed; allowed: as many rows in each, or one") from None
+
+
 def _array(name: str, values: Any) -> NDArray[Any]:
     """What numpy makes of it."""
     if type(values) is np.ndarray and values.dtype.kind == "f":  # most are: what follows costs a short run its time

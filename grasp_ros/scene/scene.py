@@ -201,7 +201,7 @@ def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Sce
     reference : str or path
     settings : sequence of str
         "section.key=value": numbers that replace those of the file, or name what it does not. "section={}" names a
-        section without numbers; if it is there, it stays as it is.
+        section without numbers, which has none in the file. Each once, in any order.
 
     Raises
     ------
@@ -239,8 +239,7 @@ def parse(text: str, name: str, source: str, settings: Sequence[str] = ()) -> Sc
     if settings := given.names("settings", settings):
         with suppress(SceneError):  # what is wrong without settings may be right with them
             before = read_sections(source, document)
-    for setting in settings:
-        apply(setting, document)
+    apply(settings, document)
     return _read(document, name, source, before)
 
 

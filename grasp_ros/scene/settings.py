@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 from grasp_ros.physics.errors import Refused
@@ -12,11 +14,19 @@ from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.validation import SceneError
 
 
-def apply(setting: str, document: dict[Any, Any]) -> None:
-    """Put a setting into the document of a scene, which is changed in place, before it is validated.
+def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
+    """Put settings into the document of a scene, which is changed in place, before it is validated; in any order.
 
-    "section.key=value" gives a number; "section={}" names a section without numbers, or leaves it as it is.
+    "section.key=value" gives a number; "section={}" names a section for which the document has no numbers.
     """
+    for target, count in Counter(setting.partition("=")[0] for setting in settings).items():
+        if count > 1:
+            raise SceneError(f"--set {target}: given {count} times; allowed: once")
+    for setting in sorted(settings, key=lambda one: not one.endswith("={}")):  # before others give the section numbers
+        _apply(setting, document)
+
+
+def _apply(setting: str, document: dict[Any, Any]) -> None:
     match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
     if match is None:
         raise SceneError(f"--set {setting}: not understood; allowed: section.key=value, or section={{}}")
@@ -24,7 +34,8 @@ def apply(setting: str, document: dict[Any, Any]) -> None:
     if key is None:
         if section not in BY_SECTION:
             raise SceneError(f"--set {setting}: no such section; {allowed(section, BY_SECTION)}")
-        document.setdefault(section, {})
+        if document.setdefault(section, {}):
+            raise SceneError(f"--set {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
         return
     known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
     if f"{section}.{key}" not in known:

@@ -14,7 +14,7 @@ import math
 
 from grasp_ros.exact.compensated import velocity_lane
 from grasp_ros.exact.compilation.jit import door, kernel
-from grasp_ros.exact.driver.callback import FINISH
+from grasp_ros.exact.driver.callback import FINISH, REST
 from grasp_ros.exact.impact import damping_factor, elastic_force, elastic_slope
 from grasp_ros.exact.kinematics import approach, arm_of, own_acceleration, surface_factor
 from grasp_ros.exact.numerics.roots import value_and_rate
@@ -260,6 +260,8 @@ def propagate(address: int, kind: int, span: float, s: float, degree: int) -> in
 
     After a run it is called with FINISH and the time of its end.
     """
+    if kind == REST:  # what acts then is asked for when the next segment, or the end of the run, arrives
+        return 0
     t = tangents_at(address)
     clock, ends = t.motion.clock, kind == FINISH
     begin = span if ends else (clock[0] + clock[1] - span) + clock[2]

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import pairs_of
+from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.given import text
 from grasp_ros.physics.impact_law import elastic_slope
-from grasp_ros.physics.layout import EPS, Entry, Transition
+from grasp_ros.physics.layout import EPS, Body, Entry, Transition
+from grasp_ros.physics.lyapunov import deformation
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import System
-from grasp_ros.simulation.smooth import Quantity, States, expand
+from grasp_ros.scene.effects.base import SIDES
+from grasp_ros.simulation.repeat import breaks_of, reached
+from grasp_ros.simulation.smooth import Quantity, expand
+
+if TYPE_CHECKING:  # it imports this file
+    from grasp_ros.simulation.trajectory import Trajectory
 
 UNITS = {
     "begin": "s", "end": "s", "speed_in": "m/s", "speed_out": "m/s", "restitution": "1", "peak_force": "N",
@@ -18,28 +29,37 @@ UNITS = {
 ROUNDINGS = 8.0 * EPS  # of a position, in the difference of two
 
 
-def intervals(event_table: Array, side: int, end: float) -> Array:
-    """Begin and end of every stretch with u > 0 of one side up to a time, (n, 4): s, and u' at both, m/s.
+def side_of(name: str) -> Body:
+    """A side by its name."""
+    if text("side", name) not in SIDES:
+        raise Refused(f"side {name!r} is not allowed; allowed: {' or '.join(SIDES)}")
+    return SIDES[name]
+
+
+def intervals(run: Trajectory, side: Body) -> Array:
+    """Begin and end of every stretch with u > 0 of one side, (n, 4): s, and u' at both, m/s.
 
     u' is NaN at a begin or an end that is that of the run.
     """
-    own = event_table[event_table[:, Entry.BODY] == side]
-    begins, ends = (own[own[:, Entry.KIND] == kind][:, [Entry.TIME, Entry.RATE]].tolist()
-                    for kind in (Transition.TOUCH, Transition.RELEASE))
-    if ends and (not begins or ends[0][0] < begins[0][0]):
-        begins.insert(0, [0.0, np.nan])  # it began in contact
+    if not METHODS[run.method].events:
+        known = ", ".join(name for name, method in METHODS.items() if method.events)
+        raise Refused(f"{run.scene.name}: {run.method} does not look for contacts; allowed: a run by {known}")
+    touch, release = Transition.TOUCH, Transition.RELEASE
+    own = run.event_table[run.event_table[:, Entry.BODY] == side]
+    own = own[np.isin(own[:, Entry.KIND], (touch, release))]
+    begins, ends = (own[own[:, Entry.KIND] == kind][:, [Entry.TIME, Entry.RATE]].tolist() for kind in (touch, release))
+    closed = deformation(run.scene.system, run.scene.initial_state)[side] > 0.0
+    if own[0, Entry.KIND] == release if len(own) else closed:
+        begins.insert(0, [0.0, np.nan])
     if len(begins) > len(ends):
-        ends.append([end, np.nan])
+        ends.append([reached(run), np.nan])
     rows = [(a[0], b[0], a[1], b[1]) for a, b in zip(begins, ends, strict=True)]
     return np.reshape(rows, (-1, 4))
 
 
-def contact_table(system: System, event_table: Array, side: int, breaks: Array, states: States) -> np.ndarray:
-    """The contacts of one side, see `trajectory.Trajectory.contacts`.
-
-    `breaks` (k,) in s are begin and end of the run, and between them all times at which the motion is not smooth.
-    """
-    found = intervals(event_table, side, float(breaks[-1]))
+def contact_table(run: Trajectory, side: Body) -> np.ndarray:
+    """The contacts of one side, see `trajectory.Trajectory.contacts`."""
+    found, breaks = intervals(run, side), breaks_of(run)
     found = found[found[:, 1] > found[:, 0]]
     rows = np.zeros(len(found), dtype=[(name, "f8") for name in UNITS])
     rows["begin"], rows["end"], rows["speed_in"], rows["speed_out"] = *found.T[:3], -found[:, 3]
@@ -50,7 +70,7 @@ def contact_table(system: System, event_table: Array, side: int, breaks: Array, 
     begins, ends = breaks[:-1], breaks[1:]
     group = np.searchsorted(found[:, 0], begins, side="right") - 1
     within = (group >= 0) & (ends <= found[group, 1])
-    pieces = expand(states, _quantities_of(system, side), begins[within], ends[within], group[within])
+    pieces = expand(run.at, _quantities_of(run.scene.system, side), begins[within], ends[within], group[within])
     for name, column in (("impulse", 0), ("loss", 1)):
         rows[name] = pieces.integral(column, len(found))
     for name, column in (("peak_force", 0), ("deepest", 2)):

@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.physics.energy import pairs_of
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Of
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Of
 from grasp_ros.physics.model import Array, Contact, hertzian_force, impact_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.simulation.quantities import as_row
 from grasp_ros.simulation.repeat import at_every_tick
+from grasp_ros.simulation.ticks import tick_of
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 
 
@@ -51,15 +52,38 @@ def losses(run: Trajectory) -> Losses:
     """Energy lost by each cause over the whole run, in J, or up to the last output time where these tell it.
 
     What a held command does is not a loss of Kv: under sampled feedback `feedback` is the work that the commands took
-    out of the arms, beside what they have stored in V_c.
+    out of the arms, beside what they have stored in V_c. Half of what V_c fell by is the total less the work of
+    external forces.
 
     Raises
     ------
     Refused
         If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
-    row = None if check_run(run).sampled and run.scene.system.external else as_row(run, "energy")
+    row = as_row(check_run(run), "energy") if told_by_row(run) else None
     return losses_of(at_every_tick(run) if row is None else run, row)
+
+
+def told_by_row(run: Trajectory) -> bool:
+    """Whether a row tells the losses: it has one work for held commands and external forces together."""
+    return not (run.sampled and run.scene.system.external)
+
+
+def external_work(run: Trajectory, row: Mapping[str, float] | None) -> float:
+    """Work of the external forces in J, over what `losses_of` is of."""
+    if row is not None:
+        return 0.0 if run.sampled else row["work_inputs"]
+    return float((_external(run) * _moves(run)).sum())
+
+
+def _moves(run: Trajectory) -> Array:
+    """How far the bodies LEFT, RIGHT, OBJECT come from output to output, (n - 1, 3) in m; 0 for an absent one."""
+    return np.diff(np.nan_to_num(run.state[:, [COLUMN[body] for body in Body]]), axis=0)
+
+
+def _external(run: Trajectory) -> Array:
+    """The external forces meanwhile, (n - 1, 3) in N."""
+    return run.scene.system.external_over(tick_of(run.scene, run.t[:-1]))
 
 
 def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
@@ -74,8 +98,8 @@ def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
         found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
     if not run.sampled:
         return found
-    moves = np.diff(np.nan_to_num(run.state[:, arms]), axis=0)
-    work = float((run.inputs[:-1, :OBJECT] * moves).sum()) if row is None else row["work_inputs"]
+    held = (run.inputs[:-1] - _external(run)) * _moves(run)
+    work = float(held.sum()) if row is None else row["work_inputs"]
     own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
     _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
     ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, arms]

@@ -13,6 +13,7 @@ from typing import BinaryIO, NamedTuple
 
 import numpy as np
 
+from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending, instance, names, number, rows
@@ -185,8 +186,8 @@ def energies(axes: Axes, motion: Motion) -> None:
 
 def contact_spans(motion: Motion, side: int) -> list[tuple[float, float]]:
     """Begin and length of the contacts of one side in s: from the events, or as the output times show them."""
-    if isinstance(motion, Trajectory) and len(motion.event_table):
-        return [(a, b - a) for a, b in contact_intervals(motion, side).tolist()]
+    if isinstance(motion, Trajectory) and METHODS[motion.method].events:
+        return [(a, b - a) for a, b in contact_intervals(motion, NAMES[side]).tolist()]
     edges = np.flatnonzero(np.diff(motion.impacts[:, side] > 0.0, prepend=False, append=False))
     begins, ends = motion.t[edges.reshape(-1, 2).clip(max=len(motion.t) - 1)].T
     return [*zip(begins.tolist(), (ends - begins).tolist(), strict=True)]

@@ -13,15 +13,13 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import EXACT
-from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import whole
-from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.lyapunov import displacement_bound
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup, compute
-from grasp_ros.simulation.contacts import intervals
+from grasp_ros.simulation.contacts import intervals, side_of
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.repeat import UNLIMITED
 from grasp_ros.simulation.trajectory import Trajectory, check_run
@@ -100,8 +98,6 @@ def may_settle(run: Trajectory) -> bool:
     return not (run.sampled or may_rise(run)) and settled_distance(run.scene) > 0.0
 
 
-def contact_intervals(run: Trajectory, side: int) -> Array:
-    """Begin and end of every stretch with u > 0 of one side, (n, 2) in s."""
-    if side not in (LEFT, RIGHT):
-        raise Refused(f"side {side!r} is not allowed; allowed: {LEFT:d} or {RIGHT:d}, left or right")
-    return intervals(check_run(run).event_table, side, float(run.t[-1]) if len(run.t) else 0.0)[:, :2]
+def contact_intervals(run: Trajectory, side: str) -> Array:
+    """Begin and end of every stretch with u > 0 of the "left" or "right" arm, (n, 2) in s."""
+    return intervals(check_run(run), side_of(side))[:, :2]

@@ -52,8 +52,8 @@ class SampledPlant:
     ----------
     system : System
         Its delay and its external forces act here.
-    period_ns : float, ns
-        Control period, whole in a scene. Time is a whole number of periods, rounded once for each tick.
+    period_ns : int, ns
+        Control period. Time is a whole number of periods, rounded once for each tick.
     integrator : Integrator, optional
         Integrates the system from its initial state, with `continuous=False`. Default: a new one.
 
@@ -67,12 +67,12 @@ class SampledPlant:
         `effort` and the external forces together. 0 before the first period.
     """
 
-    def __init__(self, system: System, period_ns: float, integrator: Integrator | None = None) -> None:
+    def __init__(self, system: System, period_ns: int, integrator: Integrator | None = None) -> None:
         self.tick = 0
         self.effort: Array = np.zeros(3)
         self.inputs: Array = np.zeros(3)
         given.instance("system", system, System, "a System")
-        period_ns = given.number("period_ns", period_ns)
+        period_ns = given.whole("period_ns", period_ns, 1)
         self._system, self._period_ns, self._period = system, period_ns, float(period_ns / NANOSECONDS)
         self._integrator = Integrator(system, continuous=False) if integrator is None else integrator
         self._waiting = np.zeros((system.delay, 3))  # until the first command arrives nothing acts

@@ -48,16 +48,15 @@ class Pieces(NamedTuple):
         return np.asarray(np.bincount(self.group, own, groups), dtype=float)
 
     def largest(self, column: int, groups: int) -> Array:
-        """Largest value of one quantity, by group: at the nodes, or where the derivative of a series is 0."""
+        """Largest value of one quantity, by group: at the nodes, at ends, or where the derivative of a series is 0."""
         found = np.full(groups, -np.inf)
         np.maximum.at(found, self.group, self.values[..., column].max(axis=1))
         beyond = np.abs(np.diff(self.values[..., column], axis=1)).max(axis=1)  # what may hide between two nodes
         near = self.values[..., column].max(axis=1) + beyond >= found[self.group]
         for k in np.flatnonzero(near).tolist():
             series = self.series[k, :, column]
-            turns = real_roots(np.asarray(legendre.legder(series), dtype=float))
-            if len(turns):
-                found[self.group[k]] = max(found[self.group[k]], float(legendre.legval(turns, series).max()))
+            turns = [-1.0, *real_roots(np.asarray(legendre.legder(series), dtype=float)), 1.0]
+            found[self.group[k]] = max(found[self.group[k]], float(legendre.legval(turns, series).max()))
         return found
 
     def times(self, k: int, x: Array) -> Array:

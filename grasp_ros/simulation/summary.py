@@ -9,13 +9,14 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Status
 from grasp_ros.methods.registry import METHODS
+from grasp_ros.physics.energy import energy
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import OBJECT, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS
-from grasp_ros.simulation.losses import losses_of
+from grasp_ros.simulation.losses import external_work, losses_of, told_by_row
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import (
     as_row,
@@ -40,7 +41,8 @@ def summary(run: Trajectory) -> dict[str, Any]:
 
     `settled_s` has infinity where V_c does not prove within `settled_within_s` that a mass has settled. Where V_c may
     rise, `last_outside_s` has the last times outside the same bound, at output times and control periods, in its place.
-    `touches` is left out for methods that do not look for them. V_c is twice the energy.
+    `touches` is left out for methods that do not look for them. V_c is twice the energy, at two times: half of
+    what it falls by between them is what was lost less the work of external forces.
     """
     scene, method = check_run(run).scene, METHODS[run.method]
     found: dict[str, Any] = {
@@ -49,6 +51,8 @@ def summary(run: Trajectory) -> dict[str, Any]:
         "status": run.status.name, "stop": run.stop, "duration_s": scene.duration, "output_times": len(run.t),
         "reached_s": scene.duration if run.status is Status.DONE else float(max([0.0, *run.t[-1:]])),
         "method": method.name, method.knob: run.setting, "work": run.counters,
+        "certificate": "none: V_c needs the energy of every controller" if run.controllers
+        else scene.certificate_in_words(run.sampled),
     }
     if run.at_rest is not None:
         found["at_rest_s"] = run.at_rest
@@ -63,17 +67,21 @@ def summary(run: Trajectory) -> dict[str, Any]:
 
 def _amounts(run: Trajectory) -> dict[str, Any]:
     """Energies, settling times, largest forces and losses, as far as the scene has them."""
-    level, distance, settles = run.energy.V_c, settled_distance(run.scene), may_settle(run)
-    found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level[[0, -1]].tolist()}
+    scene, distance, settles = run.scene, settled_distance(run.scene), may_settle(run)
     row = as_row(run, *PEAKS, "energy", *(["settling_times"] if settles else []))
     dense = None if row is not None and settles else _dense(run)
     known = run if dense is None else dense
+    ends, at = known.state[[0, -1]], known.t[[0, -1]].tolist()
+    if row is not None:
+        ends, at = np.stack([scene.initial_state, [row[name] for name in GROUPS["last_state"]]]), [0.0, scene.duration]
+    level = energy(scene.system, ends, feedback=not run.controllers).V_c
+    found: dict[str, Any] = {"energy_of": run.energy_of, "V_c_J": level.tolist(), "V_c_at_s": at}
     if not METHODS[run.method].energy_check:
         V_c = known.energy.V_c
         found["V_c_rise_J"] = float((V_c - np.minimum.accumulate(V_c)).max())
     if settles and not np.isnan(settled := settled_of(known, row)).any():
         found["settled_s"] = _by_body(run, settled)
-        found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * run.scene.duration
+        found["settled_within_s"] = float(run.t[-1]) if row is None else HORIZONS * scene.duration
     if may_rise(run) and distance > 0.0 and dense is not None:
         found["last_outside_s"] = _by_body(run, last_outside(dense.t, dense.state[:, 0::2], distance))
     if row is None:
@@ -82,10 +90,12 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     else:
         found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))
-    told = row is not None or (dense is not None and len(dense.t) > 1)
-    if told and not run.scene.system.external:
+    row = row if told_by_row(run) else None
+    if row is not None or (dense is not None and len(dense.t) > 1):
         found["lost_J"] = {cause: float(value) for cause, value in losses_of(known, row)._asdict().items()}
         found["lost_by"] = TICKS if row is None else MOTION
+        if scene.system.external:
+            found["work_external_J"] = external_work(known, row)
     return found
 
 

@@ -18,7 +18,7 @@ from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy, pairs_of
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
-from grasp_ros.physics.given import instance, number, text, times
+from grasp_ros.physics.given import instance, number, times
 from grasp_ros.physics.layout import LEFT, RIGHT, Body, Entry, Transition
 from grasp_ros.physics.lyapunov import Parts, largest_deformation, parts
 from grasp_ros.physics.model import Array, Contact, impact_force
@@ -26,7 +26,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.files import opened
 from grasp_ros.scene.npz import signed
-from grasp_ros.simulation.contacts import contact_table
+from grasp_ros.simulation.contacts import contact_table, side_of
 from grasp_ros.simulation.repeat import breaks_of, states_at
 from grasp_ros.simulation.sections import Function, Section, as_function, crossings
 from grasp_ros.simulation.tables import Tabular
@@ -153,7 +153,10 @@ class Trajectory(Tabular, Frozen):
 
     @property
     def epsilon(self) -> Array:
-        """Epsilon of (35), (36): the largest deformation of each pair up to an output time, (n, 2) in m."""
+        """Epsilon of (35), (36) as the output times show it: the largest deformation of each pair so far, (n, 2) in m.
+
+        Between output times it may be larger: `contacts` has the `deepest` u of each contact.
+        """
         return largest_deformation(self.scene.system, self.state)
 
     @property
@@ -200,11 +203,9 @@ class Trajectory(Tabular, Frozen):
         Raises
         ------
         Refused
-            If there is no such side, or the run cannot be repeated, see `at`.
+            If there is no such side, the method does not look for contacts, or the run cannot be repeated, see `at`.
         """
-        if text("side", side) not in SIDES:
-            raise Refused(f"side {side!r} is not allowed; allowed: {' or '.join(SIDES)}")
-        return contact_table(self.scene.system, self.event_table, SIDES[side], breaks_of(self), self.at)
+        return contact_table(self, side_of(side))
 
     def section(self, function: Function | ArrayLike, level: float = 0.0, direction: int = 0) -> Section:
         """Where a function of the motion crosses a level: times, states and directions.

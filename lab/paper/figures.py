@@ -12,9 +12,9 @@ from matplotlib.figure import Figure as Drawing
 
 from grasp_ros.observe.observer import watch
 from grasp_ros.observe.record import Seen, Wanted
-from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation import Trajectory, canvas, plots, simulate
 from grasp_ros.simulation.chunk import SETTLED
 from grasp_ros.simulation.losses import Losses, losses
@@ -50,7 +50,7 @@ def pictured(figure: Figure, cases: Mapping[int, Scene]) -> Pictured:
 def _fine(scene: Scene) -> Trajectory:
     """A motion at the scene's output times and at many in every contact."""
     run = simulate(scene)
-    spans = np.concatenate([contact_intervals(run, side) for side in (LEFT, RIGHT)]).tolist()
+    spans = np.concatenate([contact_intervals(run, side) for side in SIDES]).tolist()
     inside = [np.linspace(begin, end, IN_CONTACT) for begin, end in spans]
     return simulate(scene, grid=np.unique(np.concatenate([run.t, *inside])))
 
@@ -209,7 +209,7 @@ def _hardest(run: Trajectory) -> tuple[float, float] | None:
     if not len(table):
         return None
     time, side = table[int(np.argmax(table[:, 4])), :2]
-    spans = contact_intervals(run, int(side))
+    spans = contact_intervals(run, [*SIDES][int(side)])
     begin, end = spans[int(np.argmin(np.abs(spans[:, 0] - time)))].tolist()
     return begin, end
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import penetration
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.losses import losses
 from grasp_ros.simulation.quantities import contact_intervals, settled_distance, settling_times
@@ -46,7 +46,7 @@ def quantities(cases: Cases) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 def _column(scene: Scene) -> list[str]:
     run = simulate(scene)
     level, lost = run.energy.V_c, losses(run)
-    spans = [contact_intervals(run, side) for side in (LEFT, RIGHT)]
+    spans = [contact_intervals(run, side) for side in SIDES]
     ended = [span[span[:, 1] < run.t[-1]] for span in spans]
     lengths = np.concatenate([span[:, 1] - span[:, 0] for span in ended]) * 1e3
     u_l, _, u_r, _ = penetration(run.state[-1])

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.quantities import contact_intervals
 from lab.paper.cases import Figure, value_of
@@ -38,7 +38,7 @@ class Packed(NamedTuple):
 def frame_times(scene: Scene) -> Array:
     """Times of the frames in s, whole microseconds."""
     run = simulate(scene, grid=np.array([0.0, scene.duration]))
-    spans = np.concatenate([contact_intervals(run, side) for side in (LEFT, RIGHT)])
+    spans = np.concatenate([contact_intervals(run, side) for side in SIDES])
     inside = [np.linspace(a, b, IN_CONTACT + 2) for a, b in spans.tolist() if b - a < LONGEST]
     even = np.linspace(0.0, scene.duration, round(scene.duration * RATE) + 1)
     return np.asarray(np.unique(np.round(np.concatenate([even, *inside]) * TICKS)) / TICKS)
@@ -69,7 +69,7 @@ def replay(figure: Figure, scene: Scene) -> dict[str, Any]:
     packed = [pack(name, values) for name, values in zip(COLUMNS, table.T, strict=True)]
     numbers = np.concatenate([column.numbers for column in packed]).astype("<i2")
     run = simulate(scene, grid=np.array([0.0, scene.duration]))
-    spans = [contact_intervals(run, side).round(4).tolist() for side in (LEFT, RIGHT)]
+    spans = [contact_intervals(run, side).round(4).tolist() for side in SIDES]
     return {
         "title": figure.title,
         "columns": list(COLUMNS),

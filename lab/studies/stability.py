@@ -48,7 +48,7 @@ def simulated_growth(arm: Arm, period: float, delay: int, ticks: int = TICKS) ->
     system = System(delay=delay, laws={LEFT: ControlLaw(arm.position_gain, arm.velocity_gain)})
     system.bodies[LEFT, :Of.FORCE] = arm.mass, arm.stiffness, arm.damping
     system.state[X.L] = 1e-150  # room to grow
-    plant = SampledPlant(system, period * NANOSECONDS)
+    plant = SampledPlant(system, round(period * NANOSECONDS))
     sizes = []
     for tick in range(ticks):
         state = plant.state

@@ -34,6 +34,15 @@ def test_the_truth_knows_its_own_error() -> None:
     assert wild.uncertainty > 10.0 * truth.uncertainty  # it amplifies what it is given 1e4 times as much
 
 
+def test_a_truth_that_begins_at_0_is_known_to_roundings_of_its_way() -> None:
+    """Beside it was 5e-324 m, outside the domain."""
+    thrown = ["left_arm.position_m=0", "left_arm.velocity_m_per_s=1", "time.duration_s=1"]
+    moving = finest(scenes.load("hammer", thrown))
+    assert 1e-17 < moving.uncertainty < 1e-13
+    still = finest(scenes.load("case_01", ["left_arm.position_m=0", "right_arm.position_m=0", "time.duration_s=1"]))
+    assert still.uncertainty == 0.0
+
+
 def test_error_and_touches_are_measured_not_believed() -> None:
     scene = case_of()
     truth, (contenders, others) = finest(scene), own_contenders(scene)

@@ -101,6 +101,7 @@ def test_json_of_a_simulation_has_the_numbers_of_the_table(command: Any) -> None
     run = simulation.simulate(scene.load("case_01", SHORT[1:]))
     assert found["touches"]["left"] == len(run.contacts("left"))
     assert found["V_c_J"] == run.energy.V_c[[0, -1]].tolist()
+    assert found["certificate"] == run.scene.certificate_in_words(sampled=False)
     assert min(found["settled_s"].values()) > 10.0  # V_c decides it behind the end of the run
     wild = json.loads(command("simulate", "case_02", *SHORT, "--json").stdout)
     assert wild.get("settled_s", {"left": None})["left"] is None  # JSON has no infinity

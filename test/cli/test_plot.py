@@ -81,4 +81,6 @@ def test_simulate_prints_settling_forces_and_losses(command: Any) -> None:
     parts = [float(part.split()[-1]) for part in lines["energy lost, J"].split(",")]
     assert sum(parts) == pytest.approx(0.5 * (5.1 - 0.00129), abs=1e-3)
     assert "watch for" in lines
+    lines = dict(line.split("  ", 1) for line in command("simulate", "pulse").stdout.splitlines())
+    assert (lines["external work, J"].strip(), "dampers" in lines["energy lost, J"]) == ("0.2935", True)
     assert "; trapezoidal rule at the control periods" in command("simulate", "case_01", "--method", "rk4").stdout

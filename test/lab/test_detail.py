@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,9 +27,9 @@ from lab.oracles.segments import FIRST, INNER, LAST, WHOLE, Detail, pieces_of, r
 SHORT = ["time.duration_s=2", "time.control_period_s=0.5"]
 
 
-def run(name: str, *settings: str) -> Trajectory:
+def run(name: str, *settings: str, time: Sequence[str] = SHORT) -> Trajectory:
     """A scene of the package, two seconds of it."""
-    scene = scenes.load(name, [*SHORT, *settings])
+    scene = scenes.load(name, [*time, *settings])
     return Product().run(scene, None if scene.sampled else [0.0, scene.duration])
 
 
@@ -177,7 +178,7 @@ def with_friction(detail: Detail, coulomb: float) -> Detail:
 
 
 def test_friction_beyond_its_bound_is_noticed() -> None:
-    detail = close(run("friction", "time.duration_s=20"))
+    detail = close(run("friction", time=["time.duration_s=20", *SHORT[1:]]))
     limit = detail.run.scene.system.coulomb
     assert Transition.STICK in {event.kind for event in detail.run.events}
     assert "stuck, push beyond F" in broken(with_friction(detail, 0.01 * limit))

@@ -183,6 +183,28 @@ def test_an_arm_alone_settles_where_its_envelope_says() -> None:
     assert (np.exp(-sigma * later) * np.abs(np.cos(omega * later) + sigma / omega * np.sin(omega * later)) < 0.1).all()
 
 
+BALANCED = 0.008672840992886245  # m, of the arms of `preload`
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+@pytest.mark.parametrize(("name", "starts", "known"), [
+    ("case_01", {"left_arm": 0.0, "right_arm": 0.0}, {"peak_input_left": 0.0, "x_left_min": 0.0, "v_object_max": 0.0}),
+    ("arm_alone", {"left_arm": 0.1}, {"peak_input_left": 1.0, "x_left_min": 0.1, "x_left_max": 0.1}),
+    ("friction_slide", {}, {"peak_input_left": 0.0, "x_object_min": 0.0, "x_left_min": math.nan}),
+    ("preload", {"left_arm": BALANCED, "right_arm": -BALANCED},
+     {"peak_impact_left": 1e4 * BALANCED**1.5, "peak_penetration_right": BALANCED, "x_right_max": -BALANCED}),
+])
+def test_a_run_that_rests_from_the_start_has_extremes(
+    name: str, starts: dict[str, float], known: dict[str, float], sampled: bool
+) -> None:
+    """Nobody had seen a segment, and the largest input was infinite."""
+    still = {"object.velocity_m_per_s": 0.0} if name == "friction_slide" else {}
+    scene = scenes.load(name).changed({f"{arm}.position_m": x for arm, x in starts.items()} | still)
+    assert simulate(scene).at_rest == 0.0
+    found = outcomes_of(scene, sampled=sampled)
+    np.testing.assert_allclose([found[key] for key in known], [*known.values()], rtol=1e-14)
+
+
 def test_a_run_that_never_settles_says_so() -> None:
     assert outcomes_of(scenes.load("case_02"))["settling_time"] == np.inf
 

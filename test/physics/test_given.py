@@ -25,7 +25,7 @@ from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.identification.fit import fit
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.run import run as run_map
-from grasp_ros.physics.energy import energy
+from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import compose
 from grasp_ros.sensitivity.spectrum import spectrum
@@ -153,7 +153,7 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     (lambda progress: design(CASE, {GAIN: (1, 2)}, "touches", progress=progress), [], "progress: []"),
     (lambda bounds: design(CASE, {GAIN: (1, 2)}, "touches", bounds), 0, "subject_to: 0"),
     (lambda side: simulate(CASE).contacts(side), ["left"], "side: list"),
-    (lambda side: contact_intervals(simulate(CASE), side), "left", "side 'left'"),
+    (lambda side: contact_intervals(simulate(CASE), side), 0, "side: int"),
     (lambda weights: simulate(CASE).section(weights), {}, "function: shape ()"),
     (scenes.load, None, "reference: NoneType"), (load, 1, "path: int"), (read_bag, [], "path: list"),
     (lambda path: simulate(CASE).save(path), None, "path: NoneType"),
@@ -167,7 +167,12 @@ NO_ARGUMENTS: list[tuple[Callable[[Any], object], Any, str]] = [
     *((door, None, "recording: NoneType") for door in (verify, laws_of, bag_summary)),
     (lambda system: energy(system, CASE.initial_state), None, "system: NoneType"),
     (lambda state: energy(CASE.system, state), [1.0], "state: float64, shape (1,),"),
-    (lambda system: SampledPlant(system, 1e6), None, "system: NoneType"),
+    (lambda system: SampledPlant(system, 10**6), None, "system: NoneType"),
+    *((lambda period: SampledPlant(CASE.system, period), period, f"period_ns: {period}") for period in (0, -5, 1.5)),
+    (lambda after: energy_balance(CASE.system, np.zeros((2, 6)), after, np.zeros((2, 3))), np.zeros((3, 6)),
+     "shape of before (2, 6), after (3, 6), forces (2, 3)"),
+    (lambda forces: energy(CASE.system, np.zeros((2, 6)), forces), np.zeros((3, 3)),
+     "shape of state (2, 6), external (3, 3)"),
 ]
 
 
@@ -196,7 +201,9 @@ def test_a_plan_of_numpy_numbers_goes_to_its_file(tmp_path: Path) -> None:
     axes = (Axis(GAIN, np.int64(1), np.float32(2.0), np.int64(2)),)  # type: ignore[arg-type]
     plan = Plan(CASE, Setup(("touches",), np.float32(1e-9), max_work=np.int64(10**6)), axes, seed=np.int32(1))  # type: ignore[arg-type]
     run_map(plan, str(tmp_path / "map.zarr"))
-    assert run_map(plan, str(tmp_path / "map.zarr")).spans == []
+    told: list[int] = []
+    run_map(plan, str(tmp_path / "map.zarr"), progress=told.append)
+    assert told == [plan.rows]
 
 
 def test_what_says_that_it_is_frozen_is() -> None:

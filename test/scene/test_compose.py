@@ -72,7 +72,7 @@ def test_a_change_is_told_by_the_title_and_is_validated() -> None:
     assert heavy.title == f"{scene.title} [object.mass_kg=9, left_arm_table.force_N=...]"
     assert (heavy.readings, heavy.watch, bool(scene.watch)) == (scene.readings, "", True)
     assert heavy.changed({"object.mass_kg": 8}).title == f"{scene.title} [other numbers]"
-    assert load("table", ["object.mass_kg=2", "object.mass_kg=9.0"]).title == f"{scene.title} [object.mass_kg=9]"
+    assert load("table", ["object.mass_kg=9.0"]).title == f"{scene.title} [object.mass_kg=9]"
     assert scene.changed({"left_arm_table.force_N": list(scene.values["left_arm_table"]["force_N"])}) == scene
     longer = load("table", ["time.duration_s=5"])
     assert (longer.title, longer.watch) == (scene.title, scene.watch)
@@ -150,7 +150,17 @@ def test_friction_without_numbers_is_none() -> None:
 def test_naming_a_section_takes_no_number_from_it(order: int) -> None:
     settings = ["loop={}", "loop.delay_ticks=2"][::order]
     assert load("case_01", settings).values["loop"] == {"delay_ticks": 2}
-    assert load("delay", ["loop={}"]) == load("delay")
+    held = load("case_01", ["loop={}"]).to_yaml()
+    assert parse(held, "held", "held", ["loop={}"]).to_yaml() == held
+    with pytest.raises(SceneError, match=r"^--set loop={}: loop has numbers, which stay; allowed: loop.key=value$"):
+        load("delay", ["loop={}"])
+
+
+@pytest.mark.parametrize("twice", [["object.mass_kg=5", "object.mass_kg=6"], ["loop={}", "loop={}"]])
+def test_a_setting_that_is_given_twice_is_refused(twice: list[str]) -> None:
+    """The last one won silently; twice in a file is refused as well."""
+    with pytest.raises(SceneError, match="given 2 times; allowed: once"):
+        load("case_01", twice)
 
 
 @pytest.mark.parametrize(

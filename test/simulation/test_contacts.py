@@ -15,16 +15,21 @@ from grasp_ros.simulation import ensemble, simulate
 from grasp_ros.simulation.contacts import UNITS
 from grasp_ros.simulation.losses import losses
 
-RUNS: dict[str, tuple[str, dict[str, Any]]] = {
-    "case 1": ("case_01", {}), "sampled": ("case_01", {"sampled": True}), "clamped": ("v_jump_one_sided", {}),
-    "held for long": ("preload", {}), "by another method": ("case_01", {"method": "rk4_events"}),
+RUNS: dict[str, tuple[str, list[str], dict[str, Any]]] = {
+    "case 1": ("case_01", [], {}), "sampled": ("case_01", [], {"sampled": True}),
+    "clamped": ("v_jump_one_sided", [], {}), "held for long": ("preload", [], {}),
+    "from begin to end": ("hammer", ["left_arm.position_m=0.02", "time.duration_s=0.01"], {}),
+    "from begin to end, clamped": (
+        "hammer", ["left_arm.position_m=0.02", "left_contact.dissipation_s_per_m=100", "time.duration_s=0.2"], {}),
+    "pressed in": ("case_01", ["left_arm.position_m=0.02", "right_arm.position_m=-0.015", "time.duration_s=0.2"], {}),
+    "by another method": ("case_01", [], {"method": "rk4_events"}),
 }
 
 
 @pytest.mark.parametrize("kind", RUNS)
 def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: str) -> None:
-    name, how = RUNS[kind]
-    run = simulate(scene.load(name), **how)
+    name, settings, how = RUNS[kind]
+    run = simulate(scene.load(name, settings), **how)
     left, right = run.contacts("left"), run.contacts("right")
     mass = run.scene.values["object"]["mass_kg"]
     change = mass * (run.state[-1, 3] - run.state[0, 3])
@@ -34,6 +39,18 @@ def test_impulses_are_the_change_of_momentum_and_losses_those_of_the_run(kind: s
     if not run.sampled and "method" not in how:  # otherwise `losses` are no more exact than the output times
         assert lost == pytest.approx(float(losses(run).impacts), rel=1e-10)
     assert left.dtype.names == tuple(UNITS)
+
+
+def test_a_contact_from_begin_to_end_is_there_and_its_peak_may_be_at_its_begin() -> None:
+    name, settings, _ = RUNS["from begin to end"]
+    [only] = simulate(scene.load(name, settings)).contacts("left")
+    assert (only["begin"], only["end"]) == (0.0, 0.01)
+    assert np.isnan([only["speed_in"], only["speed_out"]]).all()
+    assert only["peak_force"] == pytest.approx(1e4 * 0.02**1.5, rel=1e-12)
+    name, settings, _ = RUNS["pressed in"]
+    [right] = simulate(scene.load(name, settings)).contacts("right")
+    assert right["peak_force"] == pytest.approx(1e4 * 0.015**1.5, rel=1e-12)
+    assert right["deepest"] == pytest.approx(0.015, rel=1e-12)
 
 
 def test_peaks_are_those_that_an_ensemble_sees() -> None:
@@ -75,3 +92,5 @@ def test_no_contact_is_an_empty_table_and_no_side_is_refused() -> None:
     assert len(simulate(scene.load("no_contact")).contacts("left")) == 0
     with pytest.raises(Refused, match="side 'up' is not allowed; allowed: left or right"):
         simulate(case_of()).contacts("up")
+    with pytest.raises(Refused, match="rk4 does not look for contacts; allowed: a run by exact, "):
+        simulate(case_of(), method="rk4").contacts("left")

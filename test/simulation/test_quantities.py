@@ -9,7 +9,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT
+from grasp_ros.physics.layout import LEFT, RIGHT, Transition
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import Setup
@@ -107,6 +107,27 @@ def test_what_held_commands_take_is_their_work(settings: tuple[str, ...]) -> Non
     assert [*summary(run)["lost_J"].values()] == pytest.approx([*map(float, lost)], rel=1e-13)
 
 
+PUSHED = tuple(f"left_arm_pulse.{key}" for key in ("force_N=3", "start_s=1", "length_s=0.5"))
+
+
+@pytest.mark.parametrize(("name", "settings", "options", "tight"), [
+    ("pulse", (), {}, 1e-12), ("pulse", (), {"grid": [1.0, 2.0]}, 1e-12), ("case_01", PUSHED, {}, 1e-12),
+    ("pulse", (), {"sampled": True, "grid": [1.0, 6.0]}, 1e-4), ("everything", (), {}, 1e-4),
+    ("case_01", PUSHED, {"sampled": True}, 1e-4), ("case_01", (), {"grid": [1.0, 2.0], "method": "rk4"}, 1e-4),
+])
+def test_a_summary_has_all_that_V_c_falls_by(
+    name: str, settings: tuple[str, ...], options: dict[str, Any], tight: float
+) -> None:
+    """Losses were left out beside external forces, and V_c was of other times than they."""
+    run = simulate(scenes.load(name, settings), **options)
+    found = summary(run)
+    begin, end = found["V_c_J"]
+    fallen = sum(found["lost_J"].values()) - found.get("work_external_J", 0.0)
+    assert fallen == pytest.approx(0.5 * (begin - end), abs=tight)
+    assert [*found["lost_J"].values()] == pytest.approx([*map(float, losses(run))], abs=1e-12)
+    assert ("work_external_J" in found) == bool(run.scene.system.external)
+
+
 @pytest.mark.parametrize("name", ["case_01", "case_03", "case_05", "case_07", "noise", "saturation"])
 def test_they_are_those_of_an_observed_run(name: str) -> None:
     scene = scenes.load(name)
@@ -125,12 +146,15 @@ def test_they_are_those_of_an_observed_run(name: str) -> None:
 
 def test_contacts_of_case_1() -> None:
     run = simulate(scenes.load("case_01"), grid=np.linspace(0.0, 20.0, 20001))
-    for side in (LEFT, RIGHT):
-        spans = contact_intervals(run, side)
+    for side, name in ((LEFT, "left"), (RIGHT, "right")):
+        spans = contact_intervals(run, name)
         inside = ((run.t[:, None] > spans[:, 0]) & (run.t[:, None] < spans[:, 1])).any(axis=1)
         assert np.array_equal(run.impacts[:, side] > 0.0, inside)
+    begin_of_first = run.times(Transition.TOUCH, LEFT)[0]
     begun = simulate(scenes.load("case_01", ["left_arm.position_m=0.01"]))
-    assert contact_intervals(begun, LEFT)[0, 0] == 0.0
+    assert contact_intervals(begun, "left")[0, 0] == 0.0
+    [cut] = contact_intervals(simulate(scenes.load("case_01", ["time.duration_s=0.45"]), grid=[0.0, 0.1]), "left")
+    assert cut.tolist() == [begin_of_first, 0.45]
 
 
 def test_a_settling_time_is_that_of_the_scene_whatever_its_horizon() -> None:

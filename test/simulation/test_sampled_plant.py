@@ -26,7 +26,7 @@ def free_arm(delay: int) -> System:
 @pytest.mark.parametrize("delay", [0, 1, 2, 5])
 def test_a_command_waits_is_held_and_acts(delay: int) -> None:
     """x'' = f / m in every period, written out."""
-    plant = SampledPlant(free_arm(delay), PERIOD * 1e9)
+    plant = SampledPlant(free_arm(delay), round(PERIOD * 1e9))
     commands = [1.0, -2.0, 4.0, -8.0]
     assert (plant.tick, plant.time, plant.effort.tolist(), plant.inputs.tolist()) == (0, 0.0, [0.0] * 3, [0.0] * 3)
     x = v = 0.0

@@ -19,7 +19,7 @@ from grasp_ros.exact.compilation.jit import COMPILED, address_of_code, code_of_c
 from grasp_ros.exact.records import Integers, Segment
 
 ADDRESS, CONTEXT = 0, 1  # places of an observer
-FINISH = -1  # in place of a kind of segment, after a run
+FINISH, REST = -1, -3  # in place of a kind of segment: after a run, and where nothing moves in an interval
 SIGNATURE = int64(int64, int64, float64, float64, int64)
 _FUNCTIONS: dict[int, Any] = {}  # where nothing is compiled
 _RECORDS: dict[int, Any] = {}  # likewise
@@ -69,6 +69,13 @@ def reader(kind: Any) -> Any:
         return _RECORDS[int(address)]
 
     return read
+
+
+@inlined
+def notify_rest(observer: Integers) -> None:
+    """Call the observer where nothing moves."""
+    if observer[ADDRESS] != 0:
+        call(observer[ADDRESS], observer[CONTEXT], REST, 0.0, 0.0, 0)
 
 
 @inlined
