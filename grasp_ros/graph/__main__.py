@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
+from itertools import chain, pairwise
 from typing import Any
 
 from grasp_ros.graph.host import check_reach, this_host
@@ -55,7 +56,7 @@ def main(name: str, child: bool = False) -> int:
         for module in ("coverage", "scipy"):
             sys.modules.setdefault(module, None)  # type: ignore[arg-type]
     names = sys.argv[1 : sys.argv.index("--ros-args")] if name == "together" else [name]
-    makes = {each: _maker(each) for each in names}
+    makes = {each: partial(_maker(each), cli_args=_arguments_of(each)) for each in names}
     status: int = import_module("grasp_ros.graph.ros.executor").run(makes, received)
     return status
 
@@ -66,6 +67,13 @@ def _maker(name: str) -> Callable[..., Any]:
     module = import_module(f"grasp_ros.graph.{'tools' if name in TOOLS else 'nodes'}.{kind}")
     make: Callable[..., Any] = getattr(module, kind.capitalize())
     return partial(make, name) if kind == "controller" else make
+
+
+def _arguments_of(name: str) -> list[str]:
+    """What `-p name:...` says, for that node alone: ROS's own rule of that form knows no node in a namespace."""
+    words = [word.removeprefix(f"{name}:") for flag, word in pairwise(sys.argv)
+             if flag == "-p" and word.startswith(f"{name}:")]
+    return ["--ros-args", *chain(*(("-p", word) for word in words))]
 
 
 def _own_words() -> list[str]:

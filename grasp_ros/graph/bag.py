@@ -34,6 +34,7 @@ from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV
 
 __all__ = ["BagError", "Recorder", "Recording", "read"]
 MOST_NS = 2**63 - 1
+NOT_NEXT, PUSHED = "its stamp is not the next one of the scene", "an effort of the object; allowed: 0"
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
@@ -46,7 +47,7 @@ def read(path: str | os.PathLike[str]) -> Recording:
     """
     opened = Opened(path)
     with decoding_bag(opened.path):
-        scene, changes, timing = opened.scene, _Changes(), list[Any]()
+        scene, changes, timing = opened.scene, Changes(), list[Any]()
         columns = columns_of(opened)
         takers: dict[Topic, Callable[[Stored], object]] = {
             **{topic: column.add for topic, column in columns.items()},
@@ -74,6 +75,14 @@ def columns_of(opened: Opened) -> dict[Topic, Columns]:
             if topic not in opened.held}
 
 
+def follows(step: Any, passed: Any, period_ns: int) -> Any:
+    """Whether a stamp is that much later than the one before, after so much time in the bag, in ns.
+
+    Or the plant was reset, perhaps in a gap.
+    """
+    return (step == passed) | (step <= 0) | (passed > period_ns)
+
+
 def stamp_of(columns: Mapping[Topic, Columns], tick: Mapping[Topic, bytes]) -> int:
     """Stamp in ns of the messages of one tick.
 
@@ -85,6 +94,8 @@ def stamp_of(columns: Mapping[Topic, Columns], tick: Mapping[Topic, bytes]) -> i
     rows = {topic: columns[topic].numbers(cdr) for topic, cdr in tick.items() if topic in columns}
     if not all(map(math.isfinite, chain(*(row for topic, row in rows.items() if topic != LYAPUNOV)))):
         raise BagError("a number is not finite")
+    if columns[JOINT_STATES].efforts_of_object(np.array([rows[JOINT_STATES]])).any():
+        raise BagError(PUSHED)
     stamps = {tuple(row[:2]) for row in rows.values()}
     if len(stamps) > 1:
         raise BagError("its messages have different stamps")
@@ -103,7 +114,7 @@ def _check_metadata(path: Path, storage: Storage) -> None:
 
 
 def _recording(
-    opened: Opened, columns: Mapping[Topic, Columns], changes: _Changes, counts: dict[str, int], timing: Sequence[Any]
+    opened: Opened, columns: Mapping[Topic, Columns], changes: Changes, counts: dict[str, int], timing: Sequence[Any]
 ) -> Recording:
     """All of it, as arrays."""
     scene, states = opened.scene, columns[JOINT_STATES]
@@ -121,7 +132,6 @@ def _recording(
         return result
 
     aligned(CLOCK)
-    states.refuse(ticks, inputs[:, OBJECT] != 0.0, "an effort of the object; allowed: 0")
     command = np.zeros((len(ticks), 2))
     for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
         command[:, side] = aligned(topic)[:, 0] if topic in columns else acted_from(ticks, effort[:, side])
@@ -171,7 +181,11 @@ class Columns:
             raise BagError(f"{self._name}: {len(numbers)} numbers; allowed: {self._template.count}")
         return [message.header.stamp.sec, message.header.stamp.nanosec, *numbers]
 
-    def refuse(self, ticks: np.ndarray, wrong: np.ndarray, why: str) -> None:
+    def efforts_of_object(self, rows: Array) -> Array:
+        """Efforts (n, 1) of the object in rows (n, 2 + k) of states; (n, 0) without one."""
+        return rows[:, -len(self.names) :][:, [name == NAMES[OBJECT] for name in self.names]]
+
+    def refuse(self, ticks: np.ndarray, wrong: Any, why: str) -> None:
         """Refuse the first tick (n,) that is wrong."""
         if wrong.any():
             raise BagError(f"{self._name}: tick {ticks[np.argmax(wrong)]}: {why}")
@@ -186,15 +200,15 @@ class Columns:
             raise BagError(f"{self._name}: {time_ns} ns; allowed: ticks of the scene in their order")
         if self._topic == JOINT_STATES:
             step, passed = np.diff(stamps, prepend=0.0), np.diff(ticks, prepend=0) * self._period_ns
-            # Or the plant was reset, perhaps in a gap.
-            follows = (step == passed) | (step <= 0.0) | (passed > self._period_ns)
-            self.refuse(ticks, (stamps > self._end_ns) | ~follows, "its stamp is not the next one of the scene")
+            known = (stamps >= 0.0) & (stamps <= self._end_ns) & (stamps % self._period_ns == 0.0)
+            self.refuse(ticks, ~(known & follows(step, passed, self._period_ns)), NOT_NEXT)
+            self.refuse(ticks, self.efforts_of_object(rows).any(axis=1), PUSHED)
         if self._topic != LYAPUNOV:
             self.refuse(ticks, ~np.isfinite(rows).all(axis=1), "a number is not finite")
         return ticks, rows[:, 2:], stamps
 
 
-class _Changes(dict[int, dict[str, float]]):
+class Changes(dict[int, dict[str, float]]):
     """Numbers that differ from those in force before, by the tick of the bag from which they act."""
 
     def __init__(self) -> None:

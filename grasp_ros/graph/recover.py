@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from grasp_ros.graph.bag import MOST_NS, columns_of, stamp_of
-from grasp_ros.graph.opening import Opened, decoding_bag
+from rosbags.serde import SerdeError
+
+from grasp_ros.graph.bag import MOST_NS, NOT_NEXT, Changes, columns_of, follows, stamp_of
+from grasp_ros.graph.opening import Opened
 from grasp_ros.graph.recorder import Recorder
 from grasp_ros.graph.rosbag2 import BagError
+from grasp_ros.scene.files import DAMAGE
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
+
+MOST_REASONS = 20  # that are told apart
+UNREADABLE: tuple[type[Exception], ...] = (*DAMAGE, SerdeError, AttributeError)
 
 
 class Recovery(NamedTuple):
@@ -31,7 +38,7 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
         If nothing can be saved, or if the new bag cannot be written.
     """
     opened = Opened(path, salvage=True)
-    path, refused = opened.path, list[str]()
+    path, refused = opened.path, dict[str, list[int]]()
     ticks = _ticks(opened, refused)
     begin = next(ticks, None)
     if begin is None:
@@ -46,40 +53,53 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
             written += 1
     finally:
         left_out = [f"{size} bytes from byte {offset} on: {why}" for offset, size, why in opened.storage.left_out]
-        left_out += refused
+        left_out += [f"something of {len(at)} ticks, the first {at[0]}: {why}" for why, at in refused.items()]
         recorder.close({"recovered from": str(path), "what was left out": "; ".join(left_out) or "none"})
     return Recovery(written, left_out)
 
 
+@contextmanager
+def _noting(refused: dict[str, list[int]], tick: int) -> Iterator[None]:
+    """Note a tick by the reason for which something of it is refused."""
+    try:
+        yield
+    except UNREADABLE as error:
+        why = " ".join(str(error).split())
+        refused.setdefault(why if len(refused) < MOST_REASONS else "other reasons", []).append(tick)
+
+
 def _ticks(
-    opened: Opened, refused: list[str]
+    opened: Opened, refused: dict[str, list[int]]
 ) -> Iterator[tuple[int, int, dict[Topic, bytes], list[tuple[Topic, bytes]]]]:
     """Time and stamp in ns, messages by topic, and what lies beside them, of every complete tick, in ascending order.
 
-    Those that no reader would take are left out, and named.
+    Those that no reader would take are left out, and noted.
     """
     known = {(name, topic.type): topic for topic, name in opened.names.items()}
-    columns, scene = columns_of(opened), opened.scene
-    wanted = columns.keys() - {CLOCK}
-    before = -1
+    columns, scene, changes = columns_of(opened), opened.scene, Changes()
+    period_ns, wanted = scene.period_ns, columns.keys() - {CLOCK}
+    before, at = -1, (0, 0)  # time of the last tick; the same and its stamp, from which the first one counts
     for time_ns, group in groupby(opened.messages, lambda stored: stored.time_ns):
         tick: dict[Topic, bytes] = {}
-        beside = []
+        beside, number, stamp_ns = [], time_ns // period_ns, -1
         for stored in group:
             topic = known.get(stored[:2], SCENE)
-            if topic in wanted or topic in CHANGES.values():
+            if topic in wanted:
                 tick[topic] = stored.cdr
+            elif topic in CHANGES.values():
+                with _noting(refused, number):
+                    changes.add(topic, scene, stored)
+                    tick[topic] = stored.cdr
             elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
                 beside.append((topic, stored.cdr))
-        if time_ns % scene.period_ns or not before < time_ns <= MOST_NS or not tick.keys() >= wanted:
+        if time_ns % period_ns or not before < time_ns <= MOST_NS or not tick.keys() >= wanted:
             continue
-        try:
-            with decoding_bag(opened.path):
-                stamp_ns = stamp_of(columns, tick)
-                if stamp_ns % scene.period_ns or stamp_ns > min(time_ns, scene.ticks * scene.period_ns):
-                    raise BagError(f"a stamp of {stamp_ns} ns")
-        except BagError as error:
-            refused.append(f"tick {time_ns // scene.period_ns}: {error}")
-            continue
-        before = time_ns
-        yield time_ns, stamp_ns, tick, beside
+        with _noting(refused, number):
+            found = stamp_of(columns, tick)
+            none = found % period_ns or not 0 <= found <= scene.ticks * period_ns
+            if none or not follows(found - at[1], time_ns - at[0], period_ns):
+                raise BagError(NOT_NEXT)
+            stamp_ns = found
+        if stamp_ns >= 0:
+            before, at = time_ns, (time_ns, stamp_ns)
+            yield time_ns, stamp_ns, tick, beside

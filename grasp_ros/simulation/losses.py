@@ -60,7 +60,7 @@ def losses(run: Trajectory) -> Losses:
     Refused
         If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
-    row = as_row(check_run(run), "energy") if told_by_row(run) else None
+    row = as_row(run, "energy") if told_by_row(check_run(run)) else None
     return losses_of(at_every_tick(run) if row is None else run, row)
 
 
@@ -83,7 +83,7 @@ def _moves(run: Trajectory) -> Array:
 
 def _external(run: Trajectory) -> Array:
     """The external forces meanwhile, (n - 1, 3) in N."""
-    return run.scene.system.external_over(tick_of(run.scene, run.t[:-1]))
+    return run.scene.system.external_over(tick_of(run.scene, run.t[:-1])) if len(run.t) > 1 else np.zeros((0, 3))
 
 
 def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
@@ -98,8 +98,7 @@ def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
         found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
     if not run.sampled:
         return found
-    held = (run.inputs[:-1] - _external(run)) * _moves(run)
-    work = float(held.sum()) if row is None else row["work_inputs"]
+    work = float(((run.inputs[:-1] - _external(run)) * _moves(run)).sum()) if row is None else row["work_inputs"]
     own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
     _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
     ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, arms]

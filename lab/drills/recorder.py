@@ -37,7 +37,8 @@ def ticks_of(run: Trajectory) -> Iterator[Tick]:
     balance = energy_balance(scene.system, run.state[:-1], run.state[1:], run.inputs[:-1])
     residual, alarm, work = (np.append(0.0, part) for part in (balance.residual, balance.alarm, balance.work))
     bodies = [body for body in (LEFT, OBJECT, RIGHT) if body not in scene.system.absent]
-    effort = np.vstack([np.zeros(3), run.inputs[:-1]])
+    held = run.inputs - scene.system.external_over(np.arange(len(run.t)))
+    effort = np.vstack([np.zeros(3), held[:-1]])
     for tick, state in enumerate(run.state):
         time_ns = tick * scene.period_ns
         forces = {topic: run.command[tick, side] for side, topic in zip(

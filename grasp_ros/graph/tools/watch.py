@@ -94,7 +94,7 @@ class Watch(GraspNode):
         self._asked = -math.inf  # since when an answer is waited for
         self.wall_timer(STATUS_SECONDS, self._ask_status)
         self.wall_timer(FRAME_SECONDS, self._look)
-        self._keys = Keys()
+        self._keys, self._pressed = Keys(), list[Key]()
         self._keys.start()
 
     def _on_scene(self, message: Any) -> None:
@@ -111,13 +111,15 @@ class Watch(GraspNode):
 
     def _look(self) -> None:
         """Do what keys ask for, and draw."""
-        for key in self._keys.pressed():
-            if key is Key.QUIT:
-                self.finished = True
-            elif key is Key.PAUSE:  # refused by a plant that is paused
-                self._ask("pause", lambda answer: None if answer.success else self._ask("resume"))
-            elif key is Key.FORWARD:
-                self._ask("pause", lambda _: self._ask("steps", lambda _: self._ask("step")))
+        self._pressed += self._keys.pressed()
+        self.finished |= Key.QUIT in self._pressed
+        if self._view is None or all(client.service_is_ready() for client in self._asks.values()):  # else they wait
+            for key in self._pressed:
+                if key is Key.PAUSE:  # refused by a plant that is paused
+                    self._ask("pause", lambda answer: None if answer.success else self._ask("resume"))
+                elif key is Key.FORWARD:
+                    self._ask("pause", lambda _: self._ask("steps", lambda _: self._ask("step")))
+            self._pressed.clear()
         self._draw()
 
     def _ask(self, name: str, then: Callable[[Any], None] = lambda _: None) -> None:
