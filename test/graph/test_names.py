@@ -35,7 +35,8 @@ def test_two_graphs_in_one_domain_do_not_see_each_other(launch: Any, tmp_path: P
     runs = [
         launch(
             sys.executable, "-m", "grasp_ros.cli", "run", name, "--set", "time.duration_s=0.5", "-o", namespace[1:],
-            "--namespace", namespace, "--no-figure", *processes[namespace], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            "--namespace", namespace, "--no-figure", *processes[namespace], cwd=tmp_path, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
         )
         for namespace, name in names.items()
     ]
