@@ -25,6 +25,7 @@ from lab.oracles.rounding_bounds import (
     UNDERFLOW,
     Impacts,
     accelerations,
+    at_rest,
     impact_speed,
     impacts,
     largest,
@@ -76,6 +77,8 @@ def splitting(detail: Detail, part: float, product: Product) -> Iterator[tuple[s
     moving[:, ::2] = np.maximum(moving[:, ::2], np.where(touched, fastest, 0.0))
     unit = grown + EPS * (reached + size) + _late(times, whole, moving) + TINY
     unit += _noise(detail, pairs, pieces, times - start)
+    rest = (np.broadcast_to(change[pieces], detail.x[pieces].shape) for change in at_rest(detail))
+    unit += _rows(*rest)  # whoever restarts knows less of the scene's scale, and comes to rest later
     slowing = np.where(touched, _slowing(detail.bodies[first]), 0.0)  # on the way to a touch that roundings of x shift
     unit[:, 1::2] += EPS * reached[:, ::2] * (rates(detail.bodies[first]) + slowing)[:, [LEFT, OBJECT, RIGHT]]
     error = (np.abs(again - whole) / unit)[:, there].max(axis=1) / walk(detail.run, 1)

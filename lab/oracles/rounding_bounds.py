@@ -98,11 +98,11 @@ def sizes(detail: Detail) -> Sizes:
     way = _with_way(detail, v + np.minimum(swing, gained))
     beside = np.where(touching[:, None, None], NEGLECT, EPS)
     v = way + beside * largest_in_segment(detail, v.max(axis=2, keepdims=True))
-    x_rest, v_rest = _at_rest(detail)
+    x_rest, v_rest = at_rest(detail)
     return Sizes(own + x_rest / EPS, v + v_rest / EPS)
 
 
-def _at_rest(detail: Detail) -> tuple[Array, Array]:
+def at_rest(detail: Detail) -> tuple[Array, Array]:
     """Changes of position and velocity, (k, 1, 3), with which a piece may come to rest, see `exact.driver.rest`.
 
     As there, a spring counts k x (x + x_o): an arm that touches the object takes its place, with its roundings.
