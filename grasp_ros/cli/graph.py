@@ -125,7 +125,7 @@ def _run(options: argparse.Namespace) -> int:
     )
     try:
         stopped = _live(graph, spent)
-        begun = not stopped or _was_closed(graph.bag)
+        begun = not stopped or _has_begun(graph.bag)
     except GraphError as error:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
@@ -135,14 +135,15 @@ def _run(options: argparse.Namespace) -> int:
     return _report(graph, stopped, spent, options)
 
 
-def _was_closed(path: Path) -> bool:
-    """Whether there is a bag with a state; with one that comes from elsewhere a run waits with a bag that has none."""
+def _has_begun(path: Path) -> bool:
+    """Whether there is a bag with a state, that was closed."""
     if path.exists() and not (path / "metadata.yaml").exists():  # the monitor has said why, or was killed
         raise GraphError(f"{path}: was not closed")
     return _has_ticks(path)
 
 
 def _has_ticks(path: Path) -> bool:
+    """Whether there is a bag with a state: a run that waits for a controller from elsewhere has one without."""
     from grasp_ros.graph.opening import Opened
 
     messages = Opened(path).messages if path.exists() else ()

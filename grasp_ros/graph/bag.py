@@ -34,7 +34,8 @@ from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV
 
 __all__ = ["BagError", "Recorder", "Recording", "read"]
 MOST_NS = 2**63 - 1
-NOT_NEXT, PUSHED = "its stamp is not the next one of the scene", "an effort of the object; allowed: 0"
+NOT_FINITE, PUSHED = "a number is not finite", "an effort of the object; allowed: 0"
+NOT_NEXT = "its stamp is not the next one of the scene"
 
 
 def read(path: str | os.PathLike[str]) -> Recording:
@@ -93,7 +94,7 @@ def stamp_of(columns: Mapping[Topic, Columns], tick: Mapping[Topic, bytes]) -> i
     """
     rows = {topic: columns[topic].numbers(cdr) for topic, cdr in tick.items() if topic in columns}
     if not all(map(math.isfinite, chain(*(row for topic, row in rows.items() if topic != LYAPUNOV)))):
-        raise BagError("a number is not finite")
+        raise BagError(NOT_FINITE)
     if columns[JOINT_STATES].efforts_of_object(np.array([rows[JOINT_STATES]])).any():
         raise BagError(PUSHED)
     stamps = {tuple(row[:2]) for row in rows.values()}
@@ -204,7 +205,7 @@ class Columns:
             self.refuse(ticks, ~(known & follows(step, passed, self._period_ns)), NOT_NEXT)
             self.refuse(ticks, self.efforts_of_object(rows).any(axis=1), PUSHED)
         if self._topic != LYAPUNOV:
-            self.refuse(ticks, ~np.isfinite(rows).all(axis=1), "a number is not finite")
+            self.refuse(ticks, ~np.isfinite(rows).all(axis=1), NOT_FINITE)
         return ticks, rows[:, 2:], stamps
 
 

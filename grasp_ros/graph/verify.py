@@ -72,7 +72,8 @@ _Column = tuple[str, str, Array, Array]  # topic, name, what was recorded, and w
 def verify(recording: Recording) -> Verification:
     """Simulate the scene of a bag with its recorded inputs, and compare every number that follows from them."""
     ticks, first = 0, None
-    problem, lost = _gap(check_recording(recording)), _lost(recording)
+    lost = _lost(check_recording(recording))
+    problem = _gap(recording, lost)
     for rows in _episodes(recording):
         states, stop = _simulate(recording, rows)
         ticks += len(states)
@@ -146,15 +147,15 @@ def laws_of(recording: Recording) -> dict[str, str]:
     return {side: str(answers) for side, answers in answers_of(recording).items()}
 
 
-def _gap(recording: Recording) -> str:
+def _gap(recording: Recording, lost: Mapping[str, np.ndarray]) -> str:
     """What cannot be verified because the bag does not hold it."""
     if not len(recording.starts) or recording.starts[0] != recording.tick[0]:
         return f"the bag begins at tick {recording.tick[0]}, not at the beginning of the scene"
     missing = np.flatnonzero(np.diff(recording.tick) != 1)
     if len(missing):
         return f"tick {recording.tick[missing[0]] + 1} is missing: what acted then is not known"
-    words = [f"{name} of {np.count_nonzero(lost)} ticks, the first {recording.tick[np.argmax(lost)]}"
-             for name, lost in _lost(recording).items() if lost.any()]
+    words = [f"{name} of {np.count_nonzero(rows)} ticks, the first {recording.tick[np.argmax(rows)]}"
+             for name, rows in lost.items() if rows.any()]
     return f"the bag lacks {' and '.join(words)}" if words else ""
 
 
