@@ -96,10 +96,10 @@ def sizes(detail: Detail) -> Sizes:
     gained = acting / np.where(mass > 0.0, mass, 1.0) * elapsed(detail)
     v = _before_decay(detail, np.abs(detail.v).max(axis=1), np.where(touching[:, None], taken, 0.0))[:, None]
     way = _with_way(detail, v + np.minimum(swing, gained))
-    beside = np.where(touching[:, None, None], NEGLECT, EPS)
-    v = way + beside * largest_in_segment(detail, v.max(axis=2, keepdims=True))
+    beside = np.where(touching[:, None, None], NEGLECT, EPS) * largest_in_segment(detail, v.max(axis=2, keepdims=True))
+    own = own + np.where(touching[:, None, None], beside, 0.0) * elapsed(detail)  # positions with their velocities
     x_rest, v_rest = at_rest(detail)
-    return Sizes(own + x_rest / EPS, v + v_rest / EPS)
+    return Sizes(own + x_rest / EPS, way + beside + v_rest / EPS)
 
 
 def at_rest(detail: Detail) -> tuple[Array, Array]:
