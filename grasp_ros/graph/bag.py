@@ -13,7 +13,6 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import chain
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -25,12 +24,12 @@ from grasp_ros.graph.recording import Recording, acted_from
 from grasp_ros.graph.rosbag2 import BagError, decode
 from grasp_ros.graph.serialization import clock_template, force_template, lyapunov_template, state_template
 from grasp_ros.graph.storage import Storage, Stored
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
+from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import NAMES
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.files import read_text
-from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic, state_of
+from grasp_ros.scene.topics import CHANGES, CLOCK, FORCE, JOINT_STATES, LYAPUNOV, TIMING, Numbers, Topic
 
 __all__ = ["BagError", "Recorder", "Recording", "read"]
 MOST_NS = 2**63 - 1
@@ -120,9 +119,11 @@ def _recording(
     """All of it, as arrays."""
     scene, states = opened.scene, columns[JOINT_STATES]
     ticks, rows, stamps = states.of()
-    lists = dict(zip(("position", "velocity", "effort"), np.split(rows.T, 3), strict=True))
-    state, inputs = (values.T for values in state_of(SimpleNamespace(name=states.names, **lists), ticks.shape))
-    effort = np.ascontiguousarray(inputs[:, [LEFT, RIGHT]])
+    state, effort = np.full((len(ticks), 6), np.nan), np.zeros((len(ticks), 2))
+    for body, numbers in zip(scene.system.present, rows.reshape(len(rows), 3, -1).T, strict=True):
+        state[:, COLUMN[body]], state[:, COLUMN[body] + 1] = numbers[:2]
+        if body != OBJECT:
+            effort[:, body] = numbers[2]
 
     def aligned(topic: Topic) -> Array:
         found, values, stamped = columns[topic].of()
@@ -137,7 +138,7 @@ def _recording(
     for side, topic in zip(scene.system.laws, scene.controllers.values(), strict=True):
         command[:, side] = aligned(topic)[:, 0] if topic in columns else acted_from(ticks, effort[:, side])
     return Recording(
-        opened.path, scene, opened.versions, counts, ticks, np.ascontiguousarray(state), effort, command,
+        opened.path, scene, opened.versions, counts, ticks, state, effort, command,
         {output.topic.name: aligned(output.topic)[:, 0] for output in scene.outputs}, aligned(LYAPUNOV),
         dict(changes), opened.running, ticks[stamps == 0], _lost(opened.storage), _table(timing),
         dict(+changes.unheard),

@@ -144,7 +144,7 @@ def ascending(name: str, values: Any, end: float, strictly: bool = False) -> NDA
 def forces(name: str, values: Any) -> NDArray[np.float64]:
     """Three finite forces (3,) in N, by body; always a new array."""
     array = column(name, values)
-    if array.shape != (3,) or not np.isfinite(array).all():
+    if array.shape != (3,) or not all(map(math.isfinite, array.tolist())):  # faster than numpy, in a graph's every step
         raise Refused(f"{name}: {values!r} is not allowed; allowed: three finite numbers, N by body")
     return array
 

@@ -4,11 +4,6 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from grasp_ros.physics.model import Array
-from grasp_ros.physics.system import COLUMN, NAMES
-
 FRAME = "line"  # in which the forces are given: x along the line on which all moves
 DEPTH = 1000  # samples that a publisher keeps for a reader that is behind
 WINDOW = 500  # ticks that the plant may be ahead of a monitor it waits for; below DEPTH, so that nothing is lost
@@ -95,17 +90,3 @@ class Numbers:
         number = int(word) if word.isascii() and word.isdecimal() and len(word) < MOST_DIGITS else 0
         before, self._last = self._last, number
         return max(number - before - 1, 0) if before and number else 0
-
-
-def state_of(message: Any, many: tuple[int, ...] = ()) -> tuple[Array, Array]:
-    """State (6,) and input forces (3,) of a `joint_states` message; NaN and 0 for a body that it does not name.
-
-    Where the numbers of the message are columns (n,), with `many` = (n,), they are (6, n) and (3, n).
-    """
-    state, inputs = np.full((6, *many), np.nan), np.zeros((3, *many))
-    for body, name in NAMES.items():
-        if name in message.name:
-            row = message.name.index(name)
-            state[COLUMN[body] : COLUMN[body] + 2] = message.position[row], message.velocity[row]
-            inputs[body] = message.effort[row]
-    return state, inputs

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,9 @@ from grasp_ros.graph import bag
 from grasp_ros.graph.recover import recover
 from grasp_ros.graph.serialization import list_message
 from grasp_ros.graph.verify import verify
-from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic, state_of
+from grasp_ros.physics.layout import OBJECT
+from grasp_ros.physics.system import COLUMN, NAMES
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
 
@@ -74,8 +77,12 @@ def test_a_recording_has_the_numbers_that_another_reader_decodes(tmp_path: Path,
             found.setdefault(connection.topic, []).append((time_ns, STORE.deserialize_cdr(raw, connection.msgtype)))
     times, states = zip(*found["/joint_states"], strict=True)
     assert [tick * scene.period_ns for tick in recording.tick.tolist()] == list(times)
-    assert recording.state.tobytes() == np.array([state_of(one)[0] for one in states]).tobytes()
-    assert recording.effort.tobytes() == np.array([state_of(one)[1][:2] for one in states]).tobytes()
+    named = [{word: row for word, *row in zip(one.name, one.position, one.velocity, one.effort, strict=True)}
+             for one in states]
+    for body, word in NAMES.items():
+        rows = np.array([one.get(word, (math.nan, math.nan, 0.0)) for one in named])
+        assert recording.state[:, COLUMN[body] :][:, :2].tobytes() == rows[:, :2].tobytes()
+        assert body == OBJECT or recording.effort[:, body].tobytes() == rows[:, 2].tobytes()
     assert recording.lyapunov.tobytes() == np.array([one.position for _, one in found["/lyapunov"]]).tobytes()
     for topic, column in recording.outputs.items():
         assert column.tobytes() == np.array([one.wrench.force.x for _, one in found[f"/{topic}"]]).tobytes()

@@ -23,7 +23,7 @@ from std_msgs.msg import String
 
 from grasp_ros import scene
 from grasp_ros.graph.ros import messages
-from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE, state_of
+from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, RIGHT_COMMAND, SCENE
 from grasp_ros.simulation import simulate
 from lab.drills.nodes import plain_messages
 from lab.reference.grasp import commands
@@ -168,7 +168,7 @@ def test_plant_drops_what_is_stale_repeated_or_not_finite(
     scenes: list[str] = []
 
     def answer(message: JointState) -> None:
-        states.append(state_of(message)[0])
+        states.append(np.column_stack([message.position, message.velocity]).ravel())
         now = messages.to_ns(message.header.stamp)
         forces = commands(expected.scene.system, now // 1_000_000, states[-1])
         for publisher in publishers:

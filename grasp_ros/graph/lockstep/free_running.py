@@ -102,7 +102,7 @@ class FreeRunning:
             plant.refuse("refused commands", topic)
         elif tick < held.answers:
             plant.count("stale commands")
-        elif self._limits.admit(topic, command):
+        elif self._limits.admit(topic, cdr):
             held.force, held.answers = force, tick
             self.advance()
 

@@ -11,13 +11,14 @@ from typing import NamedTuple
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.messages import State, StateReader
 from grasp_ros.graph.serialization import MOST_BYTES, force_message, raw_force, raw_stamp_ns
+from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.scene.topics import COMMANDS, FORCE, JOINT_STATES, WINDOW, Topic
 
 PATIENCE_TICKS = WINDOW + 100  # later states after which a message is given up; who waits is never so far ahead
 UNCERTAIN_SECONDS = 1.0  # without a new tick, after which a command is made from what a later state says
 GIVE_UP_SECONDS = 4.0  # the same for a message that nothing stands for; DDS repeats what it lost after 3 s at most
 MOST_UNCERTAIN = 8  # different commands for one state
-SIDES = {topic: side for side, topic in COMMANDS.items()}
+ARMS = {topic: SIDES[side] for side, topic in COMMANDS.items()}
 
 
 class Arrival(Enum):
@@ -127,7 +128,7 @@ class Synchronizer:
         for topic, queue in self._others.items():
             known = queue.get(time_ns, NOTHING)
             other = known.found[0] if known.sure else None
-            if other is None and topic in SIDES:
+            if other is None and topic in ARMS:
                 other, made = self._decide(topic, known.found, time_ns, given_up or waited > UNCERTAIN_SECONDS)
                 restored += made
             if other is not None:
@@ -141,7 +142,7 @@ class Synchronizer:
 
     def _decide(self, topic: Topic, there: Sequence[bytes], time_ns: int, late: bool) -> tuple[bytes | None, bool]:
         """The command that acted, and whether it was made from the effort, as nobody sent it here."""
-        force = self._acted(SIDES[topic], time_ns)
+        force = self._acted(ARMS[topic], time_ns)
         if force is None:  # it is still to come, or it was reset before, or no plant may be so far ahead
             to_come = len(self._states) <= self._wait < WINDOW
             return (there[-1] if there and late and not to_come else None), False
@@ -150,13 +151,13 @@ class Synchronizer:
                 return cdr, False
         return (force_message(time_ns, force), True) if late else (None, False)
 
-    def _acted(self, side: str, time_ns: int) -> float | None:
+    def _acted(self, arm: int, time_ns: int) -> float | None:
         """The force in N of the command that answers the first state, as a later one has it."""
         if len(self._states) <= self._wait:
             return None
         _, later, _ = self._states[self._wait]
-        known = later.time_ns == time_ns + self._wait * self._period_ns and side in later.name
-        return float(later.effort[later.name.index(side)]) if known else None
+        known = later.time_ns == time_ns + self._wait * self._period_ns
+        return later.inputs[arm] if known else None
 
     def _forget(self, topic: Topic, time_ns: int) -> int:
         """Let go of what belongs to a tick; returns how many messages came before it and belong to none."""

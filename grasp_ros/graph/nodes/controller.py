@@ -24,7 +24,7 @@ from grasp_ros.physics.system import COLUMN, NAMES, System
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
 from grasp_ros.scene.own_law import begin, find_law
-from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE, state_of
+from grasp_ros.scene.topics import CHANGES, COMMANDS, JOINT_STATES, LYAPUNOV, RUN, SCENE
 from grasp_ros.scene.validation import SceneError
 
 ANNOUNCE_SECONDS = 1.0
@@ -182,13 +182,12 @@ class Controller(PeerNode):
         if self._staged or time_ns <= self._answered or self._answered < 0:
             self._begin(time_ns)
         self._answered = time_ns
-        tick, row, system = time_ns // self._scene.period_ns, state.name.index(self._side), self._scene.system
+        tick, side, system = time_ns // self._scene.period_ns, SIDES[self._side], self._scene.system
         try:
             if self._own:
-                numbers = state_of(state)[0].tolist()
-                force = self._own.command(system, SIDES[self._side], tick, self._scene.time_of(tick), numbers)
+                force = self._own.command(system, side, tick, self._scene.time_of(tick), state.numbers)
             else:
-                force = system.laws[SIDES[self._side]].command(tick, state.position[row], state.velocity[row])
+                force = system.laws[side].command(tick, *state.numbers[COLUMN[side] :][:2])
         except Refused as error:
             self.fail(str(error))
             return

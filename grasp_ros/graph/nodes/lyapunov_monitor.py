@@ -16,7 +16,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import COMMANDS, WINDOW, state_of
+from grasp_ros.scene.topics import COMMANDS, WINDOW
 
 MOST_WAITING = WINDOW + 100  # announcements of a controller: it makes at most one for a command
 EXPLAINED = 1e-9  # of the sizes of its terms: two ways of rounding one law
@@ -93,13 +93,13 @@ class LyapunovMonitor:
         The laws are the same for all of them. Many at once cost little more than one.
         """
         system, period = self._scene.system, self._scene.period_ns
-        external = np.array([system.external_at(tick.time_ns // period) for tick in ticks])
-        states, inputs = map(np.array, zip(*(state_of(tick.state) for tick in ticks), strict=True))
-        work, residual, alarm = self._balance(np.array([tick.time_ns for tick in ticks]), states, inputs, external)
+        times = np.array([tick.time_ns for tick in ticks])
+        external = system.external_over(times // period)
+        states, inputs = (np.array(rows) for rows in zip(*(tick.state[1:] for tick in ticks), strict=True))
+        work, residual, alarm = self._balance(times, states, inputs, external)
         alone = energy(system, states, external, feedback=False)
         known = not self.unknown
-        plain = states.tolist()  # plain floats take a third of the time, with the same bits
-        closed = np.array([known and self._explains(tick, state) for tick, state in zip(ticks, plain, strict=True)])
+        closed = np.array([known and self._explains(tick) for tick in ticks])
         V = np.full((3, len(ticks)), np.nan)
         if closed.any():
             V[:, closed] = [part[closed] for part in energy(system, states, external)[:3]]
@@ -123,14 +123,14 @@ class LyapunovMonitor:
         return (np.where(follows, balance.work, 0.0), np.where(follows, balance.residual, 0.0),
                 np.where(follows, balance.alarm, 0.0))
 
-    def _explains(self, tick: Tick, state: Sequence[float]) -> bool:
+    def _explains(self, tick: Tick) -> bool:
         """Whether the commands that answer a state are those of the laws that were announced, but for rounding."""
         for side, topic in COMMANDS.items():
             if topic not in tick.found:
                 continue
             body, force = SIDES[side], raw_force(tick.found[topic])
             law = self._scene.system.laws[body]
-            x, v = state[COLUMN[body]], state[COLUMN[body] + 1]
+            x, v = tick.state.numbers[COLUMN[body] :][:2]
             expected = law.command(tick.time_ns // self._scene.period_ns, x, v)
             if force != expected:
                 size = abs(law.position_gain) * (abs(x) + abs(law.set_point)) + abs(law.velocity_gain * v)

@@ -29,7 +29,7 @@ from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
 from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
-from grasp_ros.graph.serialization import lyapunov_template, raw_command
+from grasp_ros.graph.serialization import lyapunov_template
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.system import NAMES
 from grasp_ros.scene import Scene
@@ -48,11 +48,10 @@ from grasp_ros.scene.topics import (
     TIMING,
     Numbers,
     Topic,
-    state_of,
 )
 from grasp_ros.scene.versions import versions
 
-MOST_TICKS, MOST_SECONDS = 128, 0.03  # that are evaluated at once, and of wall time that a tick waits for others
+MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
 DIAGNOSTICS_LEFT_OUT = "diagnostics not recorded"  # which anybody on the host may send
@@ -194,7 +193,7 @@ class Monitor(PeerNode):
 
     def _on_message(self, topic: Topic, cdr: bytes) -> None:
         sources = self._sources.get(topic)  # of commands: is this one nobody else's?
-        sure = sources is None or (sources.alone() and self._limits.allow(topic, raw_command(cdr)))
+        sure = sources is None or (sources.alone() and self._limits.allow(topic, cdr))
         arrival = self._synchronizer.put(topic, cdr, sure)
         if arrival is Arrival.TAKEN:
             self._drain()
@@ -268,7 +267,7 @@ class Monitor(PeerNode):
             self.fail(
                 f"V_c rose by {values['unexplained']!r} J more than the work of the held forces,"
                 f" t = {tick.time_ns / NANOSECONDS} s, mode {int(values['mode'])},"
-                f" state {state_of(tick.state)[0].tolist()}"
+                f" state {tick.state.numbers}"
             )
 
     def _take_what_came(self) -> None:

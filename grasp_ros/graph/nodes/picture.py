@@ -17,7 +17,7 @@ from grasp_ros.physics.layout import OBJECT, Of
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
-from grasp_ros.scene.topics import CONTACTS, FRAME, MARKERS, ROBOT_DESCRIPTION, state_of
+from grasp_ros.scene.topics import CONTACTS, FRAME, MARKERS, ROBOT_DESCRIPTION
 
 FRAME_SECONDS = 1 / 30  # wall time between two pictures
 SIZE, ROD = 0.06, 0.008  # m: edge of a mass, width of a spring and of an arrow
@@ -103,4 +103,4 @@ class Picture:
         if now >= self._next:
             self._next = now + FRAME_SECONDS
             if self._markers.get_subscription_count():
-                self._markers.publish(markers(self._scene, state.time_ns, state_of(state)[0]))
+                self._markers.publish(markers(self._scene, state.time_ns, np.array(state.numbers)))

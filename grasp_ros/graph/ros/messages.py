@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable
 from itertools import chain
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
@@ -25,6 +25,7 @@ from visualization_msgs.msg import MarkerArray
 
 from grasp_ros.graph.serialization import Template, state_template
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.system import BODIES, NAMES
 from grasp_ros.scene.effects.base import NANOSECONDS
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import SCENE, Topic
@@ -40,6 +41,7 @@ TYPES = {
 READER_DEPTH = 10  # of texts, which may be large
 FOREVER = Infinite.nanoseconds
 AUTOMATIC = LivelinessPolicy.SYSTEM_DEFAULT, LivelinessPolicy.AUTOMATIC
+ABSENT = [0.0, math.nan]  # force on a body that a state does not name, and its place and velocity
 UNREADABLE = (RuntimeError, ValueError, struct.error)  # raised for bytes that are no message of a type
 
 
@@ -112,13 +114,11 @@ def descriptor(parameter: Parameter) -> ParameterDescriptor:
 
 
 class State(NamedTuple):
-    """A state of the plant, with the names of the fields of its message."""
+    """A state of the plant."""
 
     time_ns: int
-    name: Sequence[str]
-    position: Sequence[float]  # m
-    velocity: Sequence[float]  # m/s
-    effort: Sequence[float]  # N
+    numbers: list[float]  # (6,) m and m/s, in the order of `system.COLUMN`; NaN for a body that it does not name
+    inputs: list[float]  # (3,) forces of the controllers that acted until then, N by body; 0 for such a body
 
 
 class StateReader:
@@ -128,6 +128,7 @@ class StateReader:
         self._needed = names  # of bodies that every state has
         self._name: tuple[str, ...] = ()
         self._template: Template | None = None
+        self._places: list[int] = []  # of the six numbers and three inputs in a message
 
     def read(self, cdr: bytes) -> State:
         """A state.
@@ -137,22 +138,26 @@ class StateReader:
         RuntimeError, Refused or struct.error, which is `UNREADABLE`
             If a message is none: not to be decoded, lists that differ in length, names missing or there twice, NaN.
         """
-        if self._template is not None and (found := self._template.read(cdr)) is not None:
-            n, numbers = len(self._name), found[2:]
-            state = State(found[0] * NANOSECONDS + found[1], self._name, numbers[:n], numbers[n : 2 * n],
-                          numbers[2 * n :])
-        else:
-            message = deserialize_message(cdr, JointState)
-            lists = tuple(message.position), tuple(message.velocity), tuple(message.effort)
-            name, numbers = tuple(message.name), (*chain(*lists),)
-            if any(len(values) != len(name) for values in lists) or not {*self._needed} <= {*name} or (
-                len({*name}) < len(name)
-            ):
-                raise Refused(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
-            if name != self._name:
-                self._name, self._template = name, state_template(name)
-            state = State(to_ns(message.header.stamp), name, *lists)
+        found = self._template.read(cdr) if self._template is not None else None
+        seconds, nanoseconds, *numbers = found or self._decoded(cdr)
         # A finite sum says that all are, at once; one that overflows says nothing.
         if not math.isfinite(sum(numbers)) and not all(map(math.isfinite, numbers)):
             raise Refused("a number of a state is not finite")
-        return state
+        numbers += ABSENT
+        picked = [numbers[place] for place in self._places]
+        return State(seconds * NANOSECONDS + nanoseconds, picked[:6], picked[6:])
+
+    def _decoded(self, cdr: bytes) -> Iterable[Any]:
+        """Time and numbers of a message of any make; those of the same names are read by template from now on."""
+        message = deserialize_message(cdr, JointState)
+        name, lists = tuple(message.name), (message.position, message.velocity, message.effort)
+        if any(len(values) != len(name) for values in lists) or not {*self._needed} <= {*name} or (
+            len({*name}) < len(name)
+        ):
+            raise Refused(f"no state of {', '.join(self._needed)}: {', '.join(name)}")
+        if name != self._name or self._template is None:
+            self._name, self._template, n = name, state_template(name), len(name)
+            at = {body: name.index(word) if word in name else None for body, word in NAMES.items()}
+            kinds = [(body, kind) for body in BODIES for kind in (0, 1)] + [(body, 2) for body in sorted(BODIES)]
+            self._places = [-1 - (kind == 2) if (i := at[body]) is None else kind * n + i for body, kind in kinds]
+        return chain((message.header.stamp.sec, message.header.stamp.nanosec), *lists)

@@ -11,11 +11,13 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+import numpy as np
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from rich.live import Live
 from rich.text import Text
+from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
 from grasp_ros import scene as scenes
@@ -23,12 +25,13 @@ from grasp_ros.graph import running as runnings
 from grasp_ros.graph.host import place
 from grasp_ros.graph.lockstep.steering import PAUSED
 from grasp_ros.graph.ros import messages
+from grasp_ros.graph.ros.messages import StateReader
 from grasp_ros.graph.ros.node import GraspNode, Phase
 from grasp_ros.graph.serialization import MOST_BYTES, SHORTEST, raw_force, raw_stamp_ns
 from grasp_ros.graph.terminal import Key, Keys, Moment, View, named
 from grasp_ros.physics.errors import printable
 from grasp_ros.scene.effects.base import NANOSECONDS, SIDES
-from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic, state_of
+from grasp_ros.scene.topics import COMMANDS, CONTACTS, JOINT_STATES, LYAPUNOV, RUN, SCENE, WINDOW, Topic
 
 FRAME_SECONDS = 0.1
 HINT = "Space pause   → step   q quit"
@@ -72,7 +75,7 @@ class Watch(GraspNode):
     def __init__(self, **options: Any) -> None:
         super().__init__("watch", **options)
         self._view: View | None = None
-        self._newest, self._lockstep = Newest(), True
+        self._newest, self._reader, self._lockstep = Newest(), StateReader(()), True
         self._needed: set[Topic] = set()
         self._there, self._before, self._rate = time.monotonic(), (time.monotonic(), 0), 0.0  # a plant, at the latest
         where = place(os.environ, self.get_namespace())
@@ -174,7 +177,7 @@ class Watch(GraspNode):
         if now - before > 1.0:
             self._rate = max(stamp - earlier, 0) / self._view.scene.period_ns / (now - before)
             self._before = now, stamp
-        state, inputs = state_of(_read(JOINT_STATES, found))
+        _, numbers, inputs = self._reader.read(found[JOINT_STATES])
         commands, impacts = (
             {side: raw_force(found[topic]) for side, topic in topics.items() if topic in found}
             for topics in (COMMANDS, CONTACTS)
@@ -182,17 +185,13 @@ class Watch(GraspNode):
         if not self._lockstep:
             laws = self._view.scene.system.laws
             commands = {side: inputs[body] for side, body in SIDES.items() if body in laws}
-        level = named(_read(LYAPUNOV, found).position) if LYAPUNOV in found else {}
+        level = named(deserialize_message(found[LYAPUNOV], JointState).position) if LYAPUNOV in found else {}
         phase = self._reported[0] if self._reported else Phase.RUNNING.value
         pace = f"{self._rate:.0f} ticks/s" if phase == Phase.RUNNING.value else phase
         words = "the plant has ended" if alone else pace
-        return Moment(stamp / NANOSECONDS, state, commands, impacts, level, words, self._lockstep)
+        return Moment(stamp / NANOSECONDS, np.array(numbers), commands, impacts, level, words, self._lockstep)
 
     def close(self) -> None:
         """Leave the last picture on the terminal, and give that back."""
         self._keys.close()
         self._live.stop()
-
-
-def _read(topic: Topic, found: dict[Topic, bytes]) -> Any:
-    return deserialize_message(found[topic], messages.TYPES[topic.type])
