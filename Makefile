@@ -17,8 +17,10 @@ fuzz_options := --draws 5000 --jobs 2
 demo: install
 	$(BIN)/grasp run case_01
 
-# The tests of every commit.
-test: lint
+# The tests of every commit. While one core checks types, the other compiles what both halves of the tests would.
+test: install
+	$(BIN)/ruff check .
+	$(BIN)/mypy & PYTHONPATH=. $(BIN)/python -m grasp_ros.cli simulate case_01 --sensitivity left_arm.mass_kg >/dev/null && wait $$!
 	$(BIN)/pytest -n 2 --dist loadfile -m "not thorough" --durations 20
 
 # All tests, before a release and after a change of what only these look at.
