@@ -60,19 +60,22 @@ def losses(run: Trajectory) -> Losses:
     Refused
         If output times that count leave control periods out, and the run cannot be repeated, see `Trajectory.at`.
     """
-    row = as_row(run, "energy") if told_by_row(check_run(run)) else None
-    return losses_of(at_every_tick(run) if row is None else run, row)
+    row = as_row(check_run(run), "energy")
+    return losses_of(at_every_tick(run) if row is None or needs_ticks(run) else run, row)
 
 
-def told_by_row(run: Trajectory) -> bool:
-    """Whether a row tells the losses: it has one work for held commands and external forces together."""
-    return not (run.sampled and run.scene.system.external)
+def needs_ticks(run: Trajectory) -> bool:
+    """Whether the states at all ticks have to tell the work of held commands from that of external forces.
+
+    A row has one sum of both. Each is constant between ticks, so that its work follows from the states there.
+    """
+    return bool(run.sampled and run.scene.system.external)
 
 
 def external_work(run: Trajectory, row: Mapping[str, float] | None) -> float:
     """Work of the external forces in J, over what `losses_of` is of."""
-    if row is not None:
-        return 0.0 if run.sampled else row["work_inputs"]
+    if row is not None and not run.sampled:
+        return row["work_inputs"]
     return float((_external(run) * _moves(run)).sum())
 
 
@@ -87,7 +90,7 @@ def _external(run: Trajectory) -> Array:
 
 
 def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
-    """The losses from the row of an exact run that has its energies, see `quantities.as_row`.
+    """The losses from the row of an exact run that has its energies, see `quantities.as_row`, and `needs_ticks`.
 
     Without a row by the trapezoidal rule, of a run whose output times hold every control period.
     """
@@ -98,7 +101,8 @@ def losses_of(run: Trajectory, row: Mapping[str, float] | None) -> Losses:
         found = Losses(*(np.asarray(row[f"lost_{cause}"]) for cause in Losses._fields))
     if not run.sampled:
         return found
-    work = float(((run.inputs[:-1] - _external(run)) * _moves(run)).sum()) if row is None else row["work_inputs"]
+    work = float((run.inputs[:-1] * _moves(run)).sum()) if row is None else row["work_inputs"]
+    work -= external_work(run, row)
     own = 0.0 if run.controllers else 1.0  # nobody knows what a controller of one's own stores
     _, stiffness, _, force = own * (system.closed_loop - system.bodies)[:OBJECT].T  # of the feedback
     ends = np.stack([run.scene.initial_state, np.nan_to_num(run.state[-1])])[:, arms]

@@ -16,7 +16,7 @@ from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS
-from grasp_ros.simulation.losses import external_work, losses_of, told_by_row
+from grasp_ros.simulation.losses import external_work, losses_of, needs_ticks
 from grasp_ros.simulation.outcomes import GROUPS
 from grasp_ros.simulation.quantities import (
     as_row,
@@ -90,8 +90,7 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     else:
         found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))
-    row = row if told_by_row(run) else None
-    if row is not None or (dense is not None and len(dense.t) > 1):
+    if dense is not None and len(dense.t) > 1 or (row is not None and not needs_ticks(run)):
         found["lost_J"] = {cause: float(value) for cause, value in losses_of(known, row)._asdict().items()}
         found["lost_by"] = TICKS if row is None else MOTION
         if scene.system.external:
