@@ -66,39 +66,37 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
     if samples < len(numbers) + FEWEST:
         raise Refused(f"{found.name}: {samples} measured numbers; allowed for {len(numbers)} free ones: at least"
                       f" {len(numbers) + FEWEST}")
-    problem, y = fitted(Problem(found, found.scene, numbers, first_noise(found)))
-    return _result(problem, y, against)
+    return _result(fitted(Problem(found, found.scene, numbers, first_noise(found))), against)
 
 
-def _result(problem: Problem, y: Array, against: Mapping[str, float]) -> Fit:
-    """What the minimum says."""
-    data, rows = problem.data, len(problem.data.t)
+def _result(problem: Problem, against: Mapping[str, float]) -> Fit:
+    """What the minimum, at y = 0, says."""
+    data, rows, y = problem.data, len(problem.data.t), np.zeros(len(problem.numbers))
     values, slopes = problem.residuals(y, rows)
     states, _, touches = problem.predict(y, rows)
     states[:, [place for place in range(6) if place not in data.channels]] = np.nan
     covariance, reach, unseen = identifiability_of(slopes, values, len(y))
     estimates = problem.values(y)
     found = np.array([*estimates.values()])
-    scale = np.array([number.slope(value) for number, value in zip(problem.numbers, found.tolist(), strict=True)])
-    least = [0.0 if number.positive else -np.inf for number in problem.numbers]
+    scale, least = np.array([(number.width, number.least) for number in problem.numbers]).T
     return Fit(
         problem.scene_at(y), data.name, data.acting, tuple(estimates), found,
         np.maximum(found - scale * reach, least), found + scale * reach, covariance * np.outer(scale, scale),
         tuple(tuple(problem.numbers[place].key for place in places) for places in unseen),
         data.t, data.state, states, np.where(np.isin(range(6), data.channels), problem.noise, np.nan),
         residual_table(values.reshape(rows, -1), data.t, touches),
-        {key: _test(problem, y, key, value, values) for key, value in against.items()},
+        {key: _test(problem, key, value, values) for key, value in against.items()},
     )
 
 
-def _test(problem: Problem, y: Array, key: str, value: float, best: Array) -> Against:
+def _test(problem: Problem, key: str, value: float, best: Array) -> Against:
     """F test of a value of one number: by how much the sum of squares grows where it is fixed."""
     from scipy import stats
 
-    numbers = tuple(number._replace(start=value, positive=False, width=0.0) if number.key == key else number
+    numbers = tuple(number._replace(start=value, width=0.0, least=-np.inf) if number.key == key else number
                     for number in problem.numbers)
-    fixed, rows, free = problem._replace(numbers=numbers), len(problem.data.t), len(best) - len(y)
-    least = min(mean_square(fixed, found) for found in (refine(fixed, y, rows), search(fixed)))
+    fixed, rows, free = problem._replace(numbers=numbers), len(problem.data.t), len(best) - len(numbers)
+    least = min(mean_square(fixed, found) for found in (refine(fixed, np.zeros(len(numbers)), rows), search(fixed)))
     variance = max(float(best @ best) / free, 1.0)
     growth = max((least * len(best) - float(best @ best)) / variance, 0.0)
     return Against(value, growth, float(stats.f.sf(growth, 1, free)))

@@ -31,6 +31,16 @@ class Number(NamedTuple):
     start: float
     positive: bool
     width: float = 1.0  # of y = 1, where it is not positive; 0: it is fixed
+    least: float = -math.inf
+
+    def linear_from(self, value: float) -> Number:
+        """The same number as a linear function that begins at a value: near 0 a logarithm has no end.
+
+        That of a positive one has the width of a factor of ten, there or at its start, whichever is larger.
+        """
+        if not self.positive:
+            return self._replace(start=value)
+        return self._replace(start=value, positive=False, width=DECADE * max(value, self.start), least=0.0)
 
     def at(self, y: float | Array) -> float | Array:
         """Its value."""

@@ -4,7 +4,8 @@ A motion through many contacts has a sum of squares with many minima: contacts t
 alike. Over a short horizon it has one, and what is found there starts the next horizon (a form of multiple shooting,
 H. G. Bock, Recent advances in parameter identification techniques for O.D.E., 1983, without states of its own).
 Beside the measurement each number is expected near its start, with a standard deviation of y = 1, a factor of ten: what
-the data do not see stays there. What they see to some percent is moved by a small part of its own uncertainty.
+the data do not see stays there. At last each is expected where it was found, and sought from there as it is, not by its
+logarithm: so that what the data see is where they see it, 0 included.
 """
 
 from __future__ import annotations
@@ -41,6 +42,11 @@ class Problem(NamedTuple):
     def values(self, y: Array) -> dict[str, float]:
         """The free numbers by key."""
         return {number.key: float(number.at(own)) for number, own in zip(self.numbers, y.tolist(), strict=True)}
+
+    def linear_from(self, y: Array) -> Problem:
+        """The problem that begins at y, see `Number.linear_from`."""
+        values = self.values(y).values()
+        return self._replace(numbers=tuple(map(Number.linear_from, self.numbers, values)))
 
     def scene_at(self, y: Array) -> Scene:
         """The scene with the free numbers; outside its domain it is refused."""
@@ -128,8 +134,10 @@ def refine(problem: Problem, begin: Array, rows: int, enough: float = FINE) -> A
     nowhere = np.zeros(n)  # from 0 scipy tries steps up to 1 at first, from elsewhere up to as far as that is from 0
     if not np.isfinite(both(nowhere)[0]).all():
         return begin
-    with np.errstate(all="ignore"):  # of motions far off
-        found = least_squares(lambda step: both(step)[0], nowhere, lambda step: both(step)[1], method="trf",
+    with np.errstate(all="ignore"):  # of motions far off, and of numbers that are fixed
+        away, width = np.array([(number.least - number.start, number.width) for number in problem.numbers]).T
+        least = away / width - begin
+        found = least_squares(lambda step: both(step)[0], nowhere, lambda step: both(step)[1], (least, np.inf), "trf",
                               ftol=enough, xtol=SHORTEST, gtol=None, max_nfev=MOST)
     return np.asarray(begin + found.x)
 
@@ -149,12 +157,12 @@ def _at_least(noise: Array, data: Measured) -> Array:
     return np.asarray(np.maximum(noise, FLOOR * np.where(spread == 0.0, others, spread)))
 
 
-def fitted(problem: Problem) -> tuple[Problem, Array]:
-    """The free numbers as y (n,), of a problem whose noise is that of the residuals; refused as in `search`."""
-    y = search(problem)
-    rows = len(problem.data.t)
+def fitted(problem: Problem) -> Problem:
+    """The problem with its free numbers, at y = 0, and the noise of their residuals; refused as in `search`."""
+    problem = problem.linear_from(search(problem))
+    rows, nothing = len(problem.data.t), np.zeros(len(problem.numbers))
     for _ in range(2):  # the weights of the channels, and the minimum that belongs to them
-        y = refine(problem, y, rows)
-        residuals = problem.predict(y, rows)[0] - problem.data.state
+        problem = problem.linear_from(refine(problem, nothing, rows))
+        residuals = problem.predict(nothing, rows)[0] - problem.data.state
         problem = problem._replace(noise=_at_least(np.sqrt(np.mean(residuals**2, axis=0)), problem.data))
-    return problem, refine(problem, y, rows)
+    return problem.linear_from(refine(problem, nothing, rows))
