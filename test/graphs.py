@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 from conftest import SECOND_DOMAIN
+from mcap.reader import make_reader
+from mcap.writer import Writer
 from processes import DEADLINE
 from std_srvs.srv import Trigger
 
@@ -51,3 +53,24 @@ def recordings_of(first: Graph, second: Graph, monkeypatch: pytest.MonkeyPatch) 
         first.stop()
         second.stop()
     return [bag.read(graph.bag) for graph in (first, second)]
+
+
+def rewritten(old: Path, new: Path, beside: str = "", late_ns: int = 0, **options: Any) -> None:
+    """A copy of a file by the library's own writer with its options, a topic beside, and all of it so much later."""
+    with old.open("rb") as file, new.open("wb") as copy:
+        reader, writer, channels = make_reader(file), Writer(copy, **options), dict[int, int]()
+        writer.start("ros2", "another program")
+        for record in reader.iter_metadata():
+            writer.add_metadata(record.name, record.metadata)
+        writer.add_attachment(0, 0, "notes.txt", "text/plain", b"of somebody")
+        for schema, channel, message in reader.iter_messages(log_time_order=False):
+            if channel.id not in channels:
+                of = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(channel.topic, channel.message_encoding, of)
+                if beside:
+                    writer.register_channel(beside, channel.message_encoding, of)
+            time_ns = message.log_time + late_ns
+            writer.add_message(channels[channel.id], time_ns, message.data, time_ns)
+            if beside:
+                writer.add_message(channels[channel.id] + 1, time_ns, message.data, time_ns)
+        writer.finish()

@@ -147,7 +147,7 @@ def _has_ticks(path: Path) -> bool:
     from grasp_ros.graph.opening import Opened
 
     messages = Opened(path).messages if path.exists() else ()
-    return any(stored.topic.endswith(f"/{JOINT_STATES.name}") for stored in messages)
+    return any(topic == JOINT_STATES for topic, _ in messages)
 
 
 def _what_is_there(bag: Path) -> str:

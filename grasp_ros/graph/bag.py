@@ -55,14 +55,10 @@ def read(path: str | os.PathLike[str]) -> Recording:
             TIMING: lambda stored: timing.append(decode(TIMING, stored.cdr)),
         }
         counts = dict.fromkeys(opened.names, 0)
-        known = {(name, topic.type): (topic, takers.get(topic)) for topic, name in opened.names.items()}
-        for stored in opened.messages:
-            topic, take = known.get((stored.topic, stored.type), (None, None))
-            if topic is None:
-                raise BagError(f"{opened.path}: {stored.topic}: {stored.type} is not a topic of its scene")
+        for topic, stored in opened.messages:
             counts[topic] += 1
-            if take is not None:
-                take(stored)
+            if topic in takers:
+                takers[topic](stored)
         if not columns[JOINT_STATES].times:
             raise BagError(f"{opened.path}: holds no tick")
         _check_metadata(opened.path, opened.storage)

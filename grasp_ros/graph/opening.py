@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from itertools import chain, islice
 from pathlib import Path
@@ -14,7 +14,7 @@ from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
 from grasp_ros.graph.recorder import OWN_RECORD, VERSION
 from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
-from grasp_ros.graph.storage import Storage, Stored
+from grasp_ros.graph.storage import CONVERT, Storage, Stored
 from grasp_ros.physics import given
 from grasp_ros.scene.files import decoding
 from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
@@ -22,7 +22,6 @@ from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
 KIND = "a bag of this package"
 MOST_AHEAD = 16  # messages, of which two say what the bag holds
 ZSTD = b"\x28\xb5\x2f\xfd"
-CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 
 
 def decoding_bag(path: Path) -> AbstractContextManager[None]:
@@ -66,18 +65,25 @@ class Opened:
                 records[OWN_RECORD] = _said(first, path)
             if OWN_RECORD not in records:
                 raise BagError(f"{path}: holds no tick")
-            own, self.messages = records[OWN_RECORD], _decoded(path, chain(first, messages))
+            own = records[OWN_RECORD]
             self.scene = scenes.parse(own["scene"], path.name, str(path))
             self.running = runnings.parse(own["run"])
             self.versions = {key.removeprefix(VERSION): word for key, word in own.items() if key.startswith(VERSION)}
             self.names = names_of(self.scene, own)
+            known = {(name, topic.type): topic for topic, name in self.names.items()}
+            # Each with its topic; what is foreign is left out where a bag is salvaged.
+            self.messages = self._known(known, chain(first, messages), salvage)
             # Topics whose messages are as they came, not one for each tick: those of commands in a free run.
             self.held: Collection[Topic] = () if self.running.lockstep else self.scene.controllers.values()
 
-
-def _decoded(path: Path, messages: Iterable[Stored]) -> Iterator[Stored]:
-    with decoding_bag(path):
-        yield from messages
+    def _known(self, known: Mapping[tuple[str, str], Topic], messages: Iterable[Stored], salvage: bool
+               ) -> Iterator[tuple[Topic, Stored]]:
+        with decoding_bag(self.path):
+            for stored in messages:
+                if topic := known.get((stored.topic, stored.type)):
+                    yield topic, stored
+                elif not salvage:
+                    raise BagError(f"{self.path}: {stored.topic}: {stored.type} is not a topic of its scene")
 
 
 def _said(first: Collection[Stored], path: Path) -> dict[str, str]:

@@ -42,7 +42,8 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     ticks = _ticks(opened, refused)
     begin = next(ticks, None)
     if begin is None:
-        raise BagError(f"{path}: nothing can be recovered: it holds no complete tick")
+        why = opened.storage.left_out[0][2] if opened.storage.left_out else "it holds no complete tick"
+        raise BagError(f"{path}: nothing can be recovered: {why}")
     recorder, written = Recorder(Path(new), opened.scene, opened.versions, opened.names, opened.running), 0
     try:
         for time_ns, stamp_ns, tick, beside in chain([begin], ticks):
@@ -75,15 +76,13 @@ def _ticks(
 
     Those that no reader would take are left out, and noted.
     """
-    known = {(name, topic.type): topic for topic, name in opened.names.items()}
     columns, scene, changes = columns_of(opened), opened.scene, Changes()
     period_ns, wanted = scene.period_ns, columns.keys() - {CLOCK}
     before, at = -1, (0, 0)  # time of the last tick; the same and its stamp, from which the first one counts
-    for time_ns, group in groupby(opened.messages, lambda stored: stored.time_ns):
+    for time_ns, group in groupby(opened.messages, lambda message: message[1].time_ns):
         tick: dict[Topic, bytes] = {}
         beside, number, stamp_ns = [], time_ns // period_ns, -1
-        for stored in group:
-            topic = known.get(stored[:2], SCENE)
+        for topic, stored in group:
             if topic in wanted:
                 tick[topic] = stored.cdr
             elif topic in CHANGES.values():

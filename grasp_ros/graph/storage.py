@@ -34,7 +34,12 @@ FOOTER_BYTES = HEAD.size + 20 + len(MAGIC)
 CHUNK_MARK, CHUNK_MARK_AT = b"\x04\x00\x00\x00zstd", HEAD.size + 28  # how a chunk of the recorder is found again
 RECORD_BYTES = 2**23  # no record of a bag is larger, packed or unpacked
 RATIO = 200  # nor does any chunk of a bag pack better; only a bomb does
+CONVERT = "as `rosbags-convert --src BAG --dst NEW --dst-storage mcap` writes it"
 DAMAGE = (McapError, zstandard.ZstdError, struct.error, UnicodeDecodeError, EOFError, OverflowError)
+
+
+class AnotherMakeError(McapError):
+    """What is not damaged, but was written in another way."""
 
 
 class Stored(NamedTuple):
@@ -85,6 +90,8 @@ class Storage:
                 yield from self._read(opcode, body)
                 offset = end
             except DAMAGE as error:
+                if isinstance(error, AnotherMakeError) and not self._salvage:
+                    raise BagError(f"{self.path}: {error}, {CONVERT}") from None
                 offset = self._behind_damage(offset, " ".join(str(error).split()) or type(error).__name__)
         if self.closed and not self._salvage:
             self._refuse("its data have no end")
@@ -122,7 +129,9 @@ class Storage:
             stream.read2()
             if len(body) != 6 + stream.read4():
                 raise McapError("an index that is not as long as it claims")
-        elif opcode != Opcode.HEADER:
+        elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
+            raise AnotherMakeError("its messages are not in chunks; allowed: chunks")
+        elif opcode not in (Opcode.HEADER, Opcode.ATTACHMENT):
             raise McapError(f"record {opcode} is not one of a bag")
 
     def _messages(self, data: bytes) -> Iterator[Stored]:
@@ -179,7 +188,7 @@ class Storage:
         """Refuse a closed file of which a byte is wrong."""
         data = memoryview(self._data)
         footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size - FOOTER_BYTES : -len(MAGIC)])))
-        end = footer.summary_start
+        end = footer.summary_start or len(data) - FOOTER_BYTES  # without an index
         if not DATA_END_BYTES <= end <= len(data):
             self._refuse("its end does not say where its index is")
         parts = ((data[end : -len(MAGIC) - SUM.size], footer.summary_crc),
@@ -202,7 +211,7 @@ def unpack(body: bytes) -> bytes:
     elif chunk.compression == "":
         data = chunk.data
     else:
-        raise McapError(f"compression {chunk.compression!r}; allowed: zstd")
+        raise AnotherMakeError(f"its chunks have the compression {chunk.compression!r}; allowed: zstd, or none")
     if len(data) != chunk.uncompressed_size:
         raise McapError("a chunk is not as long as it claims")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:

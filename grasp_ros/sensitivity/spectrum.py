@@ -20,7 +20,9 @@ from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import no_directions
 from grasp_ros.sensitivity.run import Carrier
 
-PIECE_S = 0.5
+PIECE_S, MOST_PIECES = 0.5, 2**20  # of time: the longest, and how many
+FALL = 1e-10  # of a tangent within a piece, to what is left of it at right angles to others: below, it has few digits
+LOST = 1e-14  # the same where an object that sticks has lost it
 
 
 def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
@@ -31,27 +33,53 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     Raises
     ------
     Refused
-        If commands are held or external forces act, or the run does not reach its end.
+        If commands are held or external forces act, the run does not reach its end, or tangents fall too fast.
     """
     check_scene(scene)
     if scene.sampled or scene.system.external:
         raise Refused(f"{scene.name}: Lyapunov exponents: allowed: continuous feedback, no external force")
     places = [place for body in scene.system.present for place in (COLUMN[body], COLUMN[body] + 1)]
-    n = len(places)
-    start = np.zeros((6, n))
+    pieces = max(math.ceil(scene.duration / PIECE_S), 1)
+    while (grown := _growth(scene, places, accuracy, pieces)) is None:
+        pieces *= 2
+        if pieces > MOST_PIECES:
+            raise Refused(f"{scene.name}: Lyapunov exponents: tangents fall below {FALL:g} of their length within"
+                          f" {2.0 * scene.duration / pieces:.3g} s; allowed: slower ones, or a shorter time.duration_s")
+    lost = np.full(len(places) - len(grown), -np.inf)
+    return np.concatenate([np.sort(grown)[::-1] / scene.duration, lost])
+
+
+def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Array | None:
+    """Logarithms of by how much the tangents grow that are not lost; None if one falls too far within a piece."""
+    n, piece_s = len(places), scene.duration / pieces
+    start, grown = np.zeros((6, n)), np.zeros(n)
     start[places, range(n)] = 1.0
     integrator = Integrator(scene.system, continuous=True, accuracy=accuracy)
     integrator.observer = carrier = Carrier(integrator, no_directions(n)._replace(state=start), np.zeros(0))
-    pieces = max(math.ceil(scene.duration / PIECE_S), 1)
-    grown: Array = np.zeros(n)
     for piece in range(pieces):
         begin = scene.duration * piece / pieces
-        integrator.advance(scene.duration / pieces, start=begin)
+        integrator.advance(piece_s, start=begin)
         if integrator.status is not Status.DONE:
             raise Refused(f"{scene.name}: no Lyapunov exponents of a run that {integrator.stop}")
-        carrier.finish(begin + scene.duration / pieces)
-        square, lengths = np.linalg.qr(carrier.x[places])
-        carrier.x[places] = square
-        with np.errstate(divide="ignore"):
-            grown += np.log(np.abs(np.diag(lengths)))
-    return np.sort(grown)[::-1] / scene.duration
+        carrier.finish(begin + piece_s)
+        found = _at_right_angles(carrier.x[places][:, : len(grown)], scene.system.coulomb > 0.0)
+        if found is None:
+            return None
+        kept, square, lengths = found
+        grown = grown[kept] + np.log(lengths)
+        carrier.x[:] = 0.0
+        carrier.x[np.ix_(places, range(len(kept)))] = square
+    return grown
+
+
+def _at_right_angles(moved: Array, sticks: bool) -> tuple[np.ndarray, Array, Array] | None:
+    """Which tangents (n, k) are kept, the same at right angles, and how long each was beside those before it."""
+    kept: np.ndarray = np.arange(moved.shape[1])
+    while True:
+        square, triangle = np.linalg.qr(moved[:, kept])
+        lengths = np.abs(np.diag(triangle))
+        own = np.linalg.norm(moved[:, kept], axis=0)
+        lost = np.flatnonzero(lengths <= LOST * own)
+        if not (sticks and len(lost)):
+            return None if (lengths < FALL * own).any() or not own.all() else (kept, square, lengths)
+        kept = np.delete(kept, lost[0])  # what follows it was laid at right angles to nothing

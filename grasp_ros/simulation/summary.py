@@ -90,7 +90,7 @@ def _amounts(run: Trajectory) -> dict[str, Any]:
     else:
         found["largest_of"], largest = MOTION, [row[name] for name in PEAKS]
     found["largest_N"] = dict(zip(FORCES, largest, strict=True))
-    if dense is not None and len(dense.t) > 1 or (row is not None and not needs_ticks(run)):
+    if (dense is not None and len(dense.t) > 1) or (row is not None and not needs_ticks(run)):
         found["lost_J"] = {cause: float(value) for cause, value in losses_of(known, row)._asdict().items()}
         found["lost_by"] = TICKS if row is None else MOTION
         if scene.system.external:

@@ -13,7 +13,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from graphs import rewritten
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType
 from processes import DEADLINE, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -113,6 +115,26 @@ def test_a_bag_that_another_program_has_written_anew_is_read_or_refused_for_its_
         assert "written anew by another program, which does not say what was lost" in shown
         assert command("recover", "new").returncode == 0
         assert "3001 states follow" in command("verify", "new_recovered").stdout
+
+
+ANEW = [
+    ({"use_chunking": False}, "its messages are not in chunks; allowed: chunks, as `rosbags-convert"),
+    ({"compression": CompressionType.LZ4}, "its chunks have the compression 'lz4'; allowed: zstd, or none, as"),
+    ({"compression": CompressionType.NONE, "index_types": IndexType.NONE, "repeat_channels": False,
+      "repeat_schemas": False, "use_statistics": False, "use_summary_offsets": False}, "3001 states follow"),
+]
+
+
+@pytest.mark.parametrize(("options", "words"), ANEW, ids=["no chunks", "lz4", "no index"])
+def test_a_bag_of_another_make_is_read_or_refused_and_not_called_damaged(
+    two_runs: tuple[Path, Path], tmp_path: Path, command: Any, options: dict[str, Any], words: str
+) -> None:
+    rewritten(two_runs[0] / "bag" / "bag.mcap", tmp_path / "new.mcap", **options)
+    found = command("verify", "new.mcap")
+    assert words in found.stdout + found.stderr
+    assert found.returncode == (2 if "allowed" in words else 0)
+    if found.returncode:
+        assert words.partition(";")[0] in command("recover", "new.mcap").stderr
 
 
 def test_the_directory_of_a_run_is_no_bag_and_says_where_it_is(two_runs: tuple[Path, Path], command: Any) -> None:

@@ -72,6 +72,16 @@ def test_a_silent_controller_has_the_declared_reaction(launch: Any, reaction: st
     assert ("finished 20000 ticks" in errors) is (reaction == "zero")
 
 
+def test_periods_of_more_than_half_a_second_are_not_late(launch: Any) -> None:
+    """Half a second of them was given up at every look at the clock, without end."""
+    numbers = {**FREE, "real_time_factor": 0.0016, "time.duration_s": 0.004}
+    plant = launch(*node_command("plant", **numbers), stderr=subprocess.PIPE)
+    begin = time.monotonic()
+    errors = plant.communicate(timeout=DEADLINE)[1]
+    assert (plant.returncode, "finished 4 ticks" in errors) == (0, True), errors
+    assert time.monotonic() - begin > 2.5
+
+
 THREE_SECONDS = ("arm_alone", "--set", "time.duration_s=3", "--no-figure")
 SLOW = """
 import time

@@ -229,7 +229,8 @@ def test_a_law_that_goes_away_is_followed_and_one_that_stands_in_one_process_has
     run = grasp_run("case_01", "--one-process", "--controller", "left=mine:law")
     _, err = run.communicate(timeout=DEADLINE)  # the time for the first answer is longer than this
     assert run.returncode == 1
-    assert re.search(r"^grasp: plant: stands for \d+\.\d s: in .*mine.py, line 11; run/bag has what", err, re.M), err
+    words = r"^grasp: left_controller: stands for \d+\.\d s: in .*mine.py, line 11; run/bag has what"
+    assert re.search(words, err, re.M), err
     assert bag.read(tmp_path / "run" / "bag").tick[-1] > 100
 
 

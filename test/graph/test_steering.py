@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from graphs import rewritten
 from processes import DEADLINE, GRASP, START, ran, wait_for
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.experimental import EventsExecutor
@@ -103,6 +104,19 @@ def test_a_bag_is_published_again_with_its_clock(
         assert len(rows) > 100, name
         assert 2_000_000_000 < rows[-1] <= 3_000_000_000
         assert {stamp % 1_000_000 for stamp in rows} == {0}
+
+
+def test_a_bag_of_another_program_is_published_from_its_first_message_on_or_refused(
+    recorded: Path, tmp_path: Path
+) -> None:
+    """A foreign topic ended in a traceback, times of a wall clock in a wait without end."""
+    [file] = recorded.glob("*.mcap")
+    for name, options in (("beside", {"beside": "/theirs"}), ("wall", {"late_ns": 1_800_000_000 * 10**9})):
+        rewritten(file, tmp_path / f"{name}.mcap", **options)
+    refused = ran(*GRASP, "replay", str(tmp_path / "beside.mcap"))
+    assert refused.returncode == 2
+    assert "/theirs: std_msgs/msg/String is not a topic of its scene" in refused.stderr
+    assert ran(*GRASP, "replay", str(tmp_path / "wall.mcap"), "--rate", "20").returncode == 0
 
 
 def test_a_bag_is_not_published_beside_another_one(recorded: Path, launch: Any, command: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
-from grasp_ros.physics.layout import LEFT, RIGHT, Transition
+from grasp_ros.physics.layout import LEFT, RIGHT, Of, Transition
 from grasp_ros.scene import Scene, compose
 from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import simulate
@@ -255,6 +256,19 @@ def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
     elastic = spectrum(short("case_02", 10.0))
     assert elastic.sum() == pytest.approx(0.0, abs=1e-9)
     assert elastic[0] > 0.3
+    stiff = arm.changed({"left_arm.damping_Ns_per_m": 300.0})  # which nothing is left of after half a second
+    rates = np.linalg.eigvals([[0.0, 1.0], -stiff.system.closed_loop[LEFT, [Of.STIFFNESS, Of.DAMPING]]])
+    assert spectrum(stiff) == pytest.approx(np.sort(rates)[::-1], abs=bound)
+
+
+@pytest.mark.parametrize("duration", [1.0, 4.0])
+def test_spectrum_of_an_object_that_sticks_is_that_of_the_directions_that_are_left(duration: float) -> None:
+    """One in their midst that was lost once took a part of those behind it along."""
+    scene = short("friction", duration)
+    keys = ("left_arm.position_m", "left_arm.velocity_m_per_s", "object.position_m", "right_arm.position_m",
+            "right_arm.velocity_m_per_s")
+    grown = np.abs(np.diag(np.linalg.qr(derivatives(scene, *keys).state_rates[-1])[1]))
+    assert spectrum(scene) == pytest.approx([*np.sort(np.log(grown) / duration)[::-1], -math.inf], abs=1e-6)
 
 
 def test_times_of_sides_in_a_mirror() -> None:

@@ -9,6 +9,9 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from types import FrameType
+
+from rclpy.node import Node
 
 from grasp_ros.graph.health.heartbeat import HEARTBEAT_SECONDS
 from grasp_ros.graph.stopping import tell_parent
@@ -59,10 +62,20 @@ class Watchdog:
             return
         frame = sys._current_frames()[threading.main_thread().ident or 0]  # in which the nodes are
         why = f"{frozen} was stopped" if frozen else f"in {frame.f_code.co_filename}, line {frame.f_lineno}"
+        name = self._name if frozen else _node_of(frame) or self._name
         if self._beaten - self._said > EVERY_SECONDS:
             self._said = self._beaten
             with suppress(OSError):
-                print(f"[FATAL] [{self._name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
+                print(f"[FATAL] [{name}]: stands for {seconds:.1f} s: {why}", file=sys.stderr, flush=True)
         if self._ends:
-            tell_parent(self._name, f"stands for {seconds:.1f} s: {why}")
+            tell_parent(name, f"stands for {seconds:.1f} s: {why}")
             os._exit(1)
+
+
+def _node_of(frame: FrameType | None) -> str:
+    """Name of the node in whose method a thread is: of several in one process, the one that keeps all waiting."""
+    while frame is not None:
+        if isinstance(owner := frame.f_locals.get("self"), Node):
+            return str(owner.get_name())
+        frame = frame.f_back
+    return ""

@@ -126,9 +126,10 @@ class FreeRunning:
 
     def _catch_up(self) -> None:
         plant, begin = self._plant, time.monotonic()
-        if begin - self._anchor - plant.tick * self._period > PATIENCE_SECONDS:
-            self._timing.lost += begin - self._anchor - plant.tick * self._period
-            self._set_anchor()
+        late = begin - self._anchor - (plant.tick + 1) * self._period
+        if late > PATIENCE_SECONDS:
+            self._timing.lost += late
+            self._anchor += late
         while not plant.finished and (now := time.monotonic()) < begin + BURST_SECONDS:
             due = self._anchor + (plant.tick + 1) * self._period
             if now < due or plant.outrun() or (now - due > self._period and self._waits(now)):

@@ -28,10 +28,10 @@ class Player(GraspNode):
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
         self._rows = bag.messages
-        self._next = next(self._rows, None)
-        self._outputs: dict[str, Any] = {}
-        for topic, name in bag.names.items():
-            self._outputs[name] = self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
+        self._next = next(self._rows)  # a bag has one
+        self._first_ns = self._next[1].time_ns
+        self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
+                         for topic, name in bag.names.items()}
         self.counters["messages"] = 0
         self._created, self._begin = time.monotonic(), math.nan
         self.when(self._ready, self._start)
@@ -50,12 +50,12 @@ class Player(GraspNode):
 
     def _play(self) -> None:
         now = (time.monotonic() - self._begin) * self._rate
-        while self._next is not None and self._next.time_ns / NANOSECONDS <= now:
-            self._outputs[self._next.topic].publish(self._next.cdr)
+        while not self.finished and (self._next[1].time_ns - self._first_ns) / NANOSECONDS <= now:
+            topic, stored = self._next
+            self._outputs[topic].publish(stored.cdr)
             self.count("messages")
-            self._next = next(self._rows, None)
-        if self._next is None:
-            self.finished = True
+            following = next(self._rows, None)
+            self._next, self.finished = following or self._next, following is None
 
     def close(self) -> None:
         """Let every reader have the end."""
