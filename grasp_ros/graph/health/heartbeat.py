@@ -171,6 +171,10 @@ class Heartbeats:
         others = (beat for beat in self._beats.values() if beat.identity != identity)
         return next((beat.node for beat in others if beat.texts and not beat.ended and beat.heard >= limit), "")
 
+    def has_ended(self, identity: str) -> bool:
+        """Whether a process has said its last words, or is not known."""
+        return identity not in self._beats or bool(self._beats[identity].ended)
+
     def speakers(self) -> bool:
         """Whether anybody is there who says texts."""
         return any(beat.texts and not beat.ended for beat in self._beats.values())

@@ -86,6 +86,7 @@ class Monitor(PeerNode):
         self._plant = ""  # identity of the one that is recorded
         self._advanced = 0.0  # wall time of the last tick
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
+        self._at_end = False  # whether the last tick of the scene is recorded
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "lost announcements": 0,
@@ -113,8 +114,12 @@ class Monitor(PeerNode):
             self._drain(time.monotonic() - max(self._advanced, self._excused))
 
     def heard(self) -> None:
-        """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end."""
+        """Somebody has given a sign of life; if it is another plant in the place of the one that is recorded, end.
+
+        After the last tick the plant may still be put back: it is over when the plant says so.
+        """
         super().heard()
+        self.finished = self.finished or self._is_over()
         if self._plant and not self.finished and (other := self.heartbeats.successor(self._plant)):
             self.fail(f"{JOINT_STATES.name}: another {other} has taken the place of the one that is recorded")
 
@@ -250,9 +255,13 @@ class Monitor(PeerNode):
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
             self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
-            self.finished = bool(self.exit_code) or tick.time_ns == self._synchronizer.end_ns
+            self._at_end = tick.time_ns == self._synchronizer.end_ns
+            self.finished = bool(self.exit_code) or self._is_over()
             if self.finished:
                 return
+
+    def _is_over(self) -> bool:
+        return self._at_end and self.heartbeats.has_ended(self._plant)
 
     def _heed(self, tick: Tick, values: Mapping[str, float]) -> None:
         """Say why V is not there; end where energy comes from nowhere."""

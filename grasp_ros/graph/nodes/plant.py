@@ -227,6 +227,7 @@ class Plant(PeerNode):
         self.finished = True
         speed = self.scene.ticks / (time.monotonic() - self._begin)
         self.get_logger().info(f"finished {self.scene.ticks} ticks at {speed:.1f} ticks/s")
+        self.heartbeats.end("")  # for the monitor, which may be in this thread
 
     def _show(self) -> None:
         with suppress(OSError):  # a terminal that is gone ends no run
