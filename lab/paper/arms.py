@@ -13,7 +13,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.losses import losses
 from lab.paper.cases import STANDARD, Cases, Start, started, with_values
 from lab.paper.measures import over
-from lab.paper.motion import contacts_found, first_contact_error, without_object
+from lab.paper.motion import first_contact_error, none_missed, without_object
 from lab.paper.scatter import Median, median
 
 STIFFNESSES = (5.0, 10.0, 20.0, 40.0, 100.0, 200.0, 400.0, 700.0, 1000.0, 1500.0)  # N/m
@@ -115,6 +115,6 @@ def _stepped(number: int, scene: Scene, step: float) -> Stepped:
         step,
         error,
         float((level[-1] - own[-1]) / own[0]),
-        contacts_found(step, scene),
+        none_missed(step, scene).value,
         first_contact_error(step, scene).value,
     )

@@ -42,6 +42,7 @@ class Variant(NamedTuple):
 
 
 FIRST = Variant(STANDARD)
+HIGHER, LOWER = True, False
 
 
 class Comparison(NamedTuple):

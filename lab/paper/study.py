@@ -34,7 +34,6 @@ from lab.paper.compare import Comparison, Variant
 from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
-from lab.paper.judgement import statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import SHORT
 from lab.paper.page import Picture, Report, agreement, summary
@@ -42,6 +41,7 @@ from lab.paper.prints import compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import replay
 from lab.paper.results import Beyond, results
+from lab.paper.statements import STATEMENTS
 
 DPI = 220
 COLORS = 256  # of a PNG file
@@ -51,13 +51,13 @@ Job = tuple[str, Callable[..., Any], tuple[Any, ...]]  # what comes out, how, an
 def report(starts: int) -> Report:
     """Compute everything, with so many random starts."""
     cases, drawn = load_cases(), random_starts(starts)
-    known, jobs = statements(), _jobs(cases, drawn)
+    jobs = _jobs(cases, drawn)
     claims: list[Claim] = []
     done: dict[str, list[Any]] = {}
     context = multiprocessing.get_context("spawn")
-    with context.Pool(os.cpu_count() or 1) as pool, tqdm(total=len(known) + len(jobs), file=sys.stderr) as bar:
+    with context.Pool(os.cpu_count() or 1) as pool, tqdm(total=len(STATEMENTS) + len(jobs), file=sys.stderr) as bar:
         drawing = pool.imap_unordered(_called, jobs)
-        for each in known.values():  # here: what one measures the next one remembers
+        for each in STATEMENTS.values():  # here: what one measures the next one remembers
             bar.set_description(f"random starts and sweeps of {each.key}")
             claims.append(each.judge(cases, drawn))
             bar.update()
@@ -154,10 +154,9 @@ def _same_V(run: Any) -> bool:
 def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]:
     found: list[beyond_figures.Curve] = []
     seen: set[tuple[str, str, Variant]] = set()
-    known_as = statements()
     for claim in claims:
         key = claim.key
-        for part, judged_part in zip(known_as[key].parts, claim.parts, strict=True):
+        for part, judged_part in zip(STATEMENTS[key].parts, claim.parts, strict=True):
             known = isinstance(part, Comparison) and (part.letter, part.measure, part.other) in seen
             if isinstance(part, Comparison) and part.values and key.startswith("O") and not known:
                 seen.add((part.letter, part.measure, part.other))

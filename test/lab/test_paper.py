@@ -17,7 +17,6 @@ from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, start
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations, rows_of
-from lab.paper.judgement import judge, statements
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
 from lab.paper.prints import CAPTIONS, compared
@@ -25,6 +24,7 @@ from lab.paper.quantities import quantities
 from lab.paper.replay import COLUMNS, TICKS, frames, pack
 from lab.paper.sample import Sample
 from lab.paper.scatter import median
+from lab.paper.statements import STATEMENTS
 from lab.paper.symmetry import asymmetry, where_false
 
 CASES = load_cases()
@@ -34,7 +34,7 @@ HOLDS, LIMITED, FAILS = Verdict.HOLDS, Verdict.LIMITED, Verdict.FAILS
 
 @cache
 def claim_of(key: str) -> Claim:
-    return judge(CASES, STARTS, [key])[key]
+    return STATEMENTS[key].judge(CASES, STARTS)
 
 
 def test_all_equations_are_there_and_agree() -> None:
@@ -117,7 +117,7 @@ def test_medians_stand_within_the_scatter_of_all_starts() -> None:
     """The first 15 of 200 starts once printed 0.373, 1.12 and 0.963 for what all give as 0.66, 1.57 and 0.75."""
     starts = random_starts(200)
     for key, part, value, expected in (("O2", 0, 5.0, 0.660), ("O6", 1, 1000.0, 1.57), ("O10", 1, 100.0, 0.752)):
-        swept: Any = statements()[key].parts[part]
+        swept: Any = STATEMENTS[key].parts[part]
         (_, found), = swept._replace(values=(value,)).curve(CASES, starts)
         assert found.low <= expected <= found.high
         assert found.high - found.low < 0.25 * found.middle
@@ -253,7 +253,7 @@ def claim_that_holds(key: str) -> Claim:
 
 def test_a_figure_is_read_and_judged() -> None:
     """Fig. 10 ends at 10 N, where ours needs 25 N; each caption is what our scene changes, and no other scene's."""
-    claims = [claim_that_holds(key) for key in statements()]
+    claims = [claim_that_holds(key) for key in STATEMENTS]
     found = {figure.number: compared(figure, CASES, claims) for figure in FIGURES}
     assert [number for number, each in found.items() if not each.agrees] == [10]
     assert "input axis" in found[10].verdict
@@ -267,6 +267,6 @@ def test_a_figure_is_read_and_judged() -> None:
 def test_settling_is_counted_in_swings_too() -> None:
     """O6 and O10 come out the other way, if times are counted in swings of the arm."""
     for key in ("O6", "O10"):
-        swept: Any = statements()[key].parts[1]
+        swept: Any = STATEMENTS[key].parts[1]
         judged = swept._replace(values=(), words=("swings",)).judge(CASES, STARTS)
         assert any("in swings" in check.text for check in judged.turned)
