@@ -20,9 +20,9 @@ from grasp_ros.simulation import canvas, simulate
 from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, V_COLOR, shade_contacts
 from lab.paper.arms import STEPS, Damped, Stiffer
 from lab.paper.beyond import Chaos, Gap, Tail
+from lab.paper.compare import wholly
 from lab.paper.figures import PAGE, style
 from lab.paper.knife_edge import MOVED, SMALLEST, Edge
-from lab.paper.measures import MARGIN
 from lab.paper.scatter import Median
 
 WIDE = (PAGE, 3.0)
@@ -246,9 +246,7 @@ def sweeps(curves: Sequence[Curve]) -> Drawing:
 
 def _side(point: Median, higher: bool) -> str:
     """On which side of 1 a whole interval lies, by the margin of the verdicts."""
-    above, below = point.low > MARGIN, point.high < 1.0 / MARGIN
-    as_stated, against = (above, below) if higher else (below, above)
-    return STATED if as_stated else OTHER if against else NEITHER
+    return STATED if wholly(point, higher) else OTHER if wholly(point, not higher) else NEITHER
 
 
 def _sweep(axes: Axes, each: Curve) -> None:
