@@ -10,7 +10,7 @@ import numpy as np
 from grasp_ros.scene import Scene
 from lab.paper.cases import ALIKE, STANDARD, Cases, Start, read_starts, start_of, started, value_of, with_values
 from lab.paper.claims import HALF, Check, Kind, Part, almost_all
-from lab.paper.measures import MARGIN, NAMES, UNITS, near, over, ratio, seconds
+from lab.paper.measures import MARGIN, MEASURES, near, over, ratio, seconds
 from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
 
@@ -60,7 +60,7 @@ class Comparison(NamedTuple):
     def threshold(self) -> str:
         """In words."""
         side = f"above {MARGIN:g}" if self.higher else f"below {1.0 / MARGIN:.3g}"
-        return f"{NAMES[self.measure]}, {', '.join(f'{a} over {b}' for a, b in self.decisive)}: {side}"
+        return f"{MEASURES[self.measure].name}, {', '.join(f'{a} over {b}' for a, b in self.decisive)}: {side}"
 
     def true_of(self, found: float, margin: float = MARGIN) -> bool:
         """Whether a ratio is what the statement says."""
@@ -99,7 +99,7 @@ class Comparison(NamedTuple):
         if np.isnan(found).all():  # equal arms from a symmetric start, say: true, or not, whatever the other scene is
             return Check(Kind.TRIVIAL, text, f"{several[0][0]:.4g} against 0: no ratio", 0.0, False)
         share = sum(map(self.true_of, found)) / len(found)
-        unit = UNITS.get(self.measure, "")
+        unit = MEASURES[self.measure].unit
         a, b = (seconds(own) if self.measure.startswith("settling") else f"{own[0]:.4g}{unit}" for own in several)
         return Check(kind, text, f"{a} against {b}: {_range(found)}", share, share == 1.0)
 
@@ -112,7 +112,7 @@ class Comparison(NamedTuple):
         value = f"{_percent(share)} of {len(found)}; ratio {middle:.3g}, from {low:.3g} to {high:.3g}"
         if kind is Kind.RANDOM:
             value += where_false(starts, true)
-        return Check(kind, f"{NAMES[word]}, {_words(pair)}", value, share, almost_all(share), len(found))
+        return Check(kind, f"{MEASURES[word].name}, {_words(pair)}", value, share, almost_all(share), len(found))
 
     def _sweep(self, cases: Cases, starts: Sequence[Start], curve: Sequence[tuple[float, Median]]) -> list[Check]:
         """The parameter alone, changed from the other case, at several values: the median over the random starts.

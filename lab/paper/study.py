@@ -33,7 +33,7 @@ from lab.paper.compare import Comparison
 from lab.paper.doubts import doubts
 from lab.paper.equations import equations
 from lab.paper.knife_edge import knife_edge
-from lab.paper.measures import SHORT
+from lab.paper.measures import MEASURES
 from lab.paper.page import Picture, Report
 from lab.paper.prints import compared
 from lab.paper.quantities import quantities
@@ -117,7 +117,7 @@ def _replays(cases: Cases) -> list[dict[str, Any]]:
 def image(drawing: Any) -> bytes:
     """A figure as a PNG file with a palette, which is a third as large."""
     large, small = io.BytesIO(), io.BytesIO()
-    with canvas.style(figures.style()):
+    with canvas.style(figures.STYLE):
         drawing.savefig(large, format="png", dpi=DPI)
     with PIL.Image.open(large) as picture:
         few = picture.convert("RGB").quantize(COLORS, PIL.Image.Quantize.FASTOCTREE, dither=PIL.Image.Dither.NONE)
@@ -151,6 +151,6 @@ def _curves(cases: Cases, claims: Sequence[Claim]) -> list[beyond_figures.Curve]
             if claim.key.startswith("O") and isinstance(part, Comparison) and part.values:
                 unit = UNIT_OF[part.letter[:2].rstrip("_")]
                 found.setdefault((part.letter, part.measure, part.others[0]), beyond_figures.Curve(
-                    f"{claim.key} {part.changed}", f"{part.letter}, {unit}", SHORT[part.measure],
+                    f"{claim.key} {part.changed}", f"{part.letter}, {unit}", f"{MEASURES[part.measure].short}, ratio",
                     value_of(part.changed.scene(cases), part.letter), part.higher, judged.curve))
     return list(found.values())

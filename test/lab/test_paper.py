@@ -12,17 +12,16 @@ import pytest
 from grasp_ros.physics.layout import LEFT, Transition
 from grasp_ros.simulation import simulate
 from lab.oracles.closed_forms import elastic_period
-from lab.paper import arms, beyond, by_hand
+from lab.paper import arms, beyond
 from lab.paper.cases import FIGURES, SYMMETRIC, load_cases, random_starts, started, with_values
 from lab.paper.claims import Check, Claim, Kind, Part, Verdict
 from lab.paper.doubts import doubts
-from lab.paper.equations import equations, rows_of
+from lab.paper.equations import equations
 from lab.paper.knife_edge import knife_edge
 from lab.paper.measures import measure, seconds, settlings
-from lab.paper.prints import CAPTIONS, compared
+from lab.paper.prints import compared
 from lab.paper.quantities import quantities
 from lab.paper.replay import COLUMNS, TICKS, frames, pack
-from lab.paper.sample import Sample
 from lab.paper.scatter import median
 from lab.paper.statements import STATEMENTS
 from lab.paper.symmetry import asymmetry, where_false
@@ -138,17 +137,6 @@ def test_a_border_in_asymmetry_is_named_where_there_is_one() -> None:
     assert where_false(starts, [place % 3 > 0 for place in range(60)]) == ""
 
 
-def test_an_equation_written_wrong_is_seen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each against values written out by hand: V, its rate, its parts, and the entries of P."""
-    sample = Sample(CASES[4])
-    right = {row.number for row in rows_of([sample]) if row.agrees}
-    for name in ("matrix", "level", "rate", "parts"):
-        own = getattr(by_hand, name)
-        monkeypatch.setattr(by_hand, name, lambda scene, y, own=own: 1.001 * own(scene, y))
-    left = {row.number for row in rows_of([sample]) if row.agrees}
-    assert right - left >= {"(11)", "(12)", "(16)", "(18)", "(21)", "(23)", "(28)", "(29)"}
-
-
 def test_gap_and_repair() -> None:
     found = beyond.gap(CASES)
     assert len(found.jumps) >= 3
@@ -257,7 +245,6 @@ def test_a_figure_is_read_and_judged() -> None:
     found = {figure.number: compared(figure, CASES, claims) for figure in FIGURES}
     assert [number for number, each in found.items() if not each.agrees] == [10]
     assert "input axis" in found[10].verdict
-    assert set(found) == set(CAPTIONS)
     for figure in FIGURES[1:]:
         other = {**CASES, figure.case: with_values(CASES[figure.case], {"m_o": 7.0})}
         assert "caption" in compared(figure, other, claims).verdict
