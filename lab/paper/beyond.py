@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array
@@ -16,8 +15,9 @@ from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import tail_rate
 from lab.paper.cases import Cases
 from lab.paper.motion import distance_of_states, nearest_return, state_weights
-from lab.reference.grasp import grasp_of, system_of
+from lab.reference.grasp import grasp_of
 from lab.studies.certificate import SCENES, Jump, jumps, safe_p
+from lab.studies.predictability import states_from
 
 TAIL_SECONDS = 1e5
 TAIL_POINTS = 400
@@ -120,7 +120,7 @@ def stretching(scene: Scene, seconds: float, push: Array) -> Array:
     state, offset = scene.initial_state, _offset(scene, push)
     found = np.empty(round(seconds / EVERY))
     for row in range(len(found)):
-        state, other = (_advance(scene, start, np.array([EVERY]))[-1] for start in (state, state + offset))
+        state, other = (states_from(scene, start, np.array([EVERY]))[-1] for start in (state, state + offset))
         grown = float(np.linalg.norm((other - state) * weights)) / (SMALL * level)
         found[row] = np.log(grown)
         offset = (other - state) / grown
@@ -135,11 +135,6 @@ def _level(scene: Scene) -> float:
 def _offset(scene: Scene, push: Array) -> Array:
     """A difference of states of the size SMALL."""
     return push / state_weights(scene.system) * (SMALL * _level(scene) / float(np.linalg.norm(push)))
-
-
-def _advance(scene: Scene, start: Array, grid: Array) -> Array:
-    """States (n, 6) of a motion from another state, at times in s."""
-    return Integrator(system_of(grasp_of(scene), start), continuous=True).advance(float(grid[-1]), grid)
 
 
 def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Chaos:
@@ -162,4 +157,4 @@ def _apart(scene: Scene, push: Array) -> tuple[Array, Array]:
     """Distance of two motions that begin SMALL apart, over 60 s."""
     grid = np.linspace(0.0, 60.0, 6001)
     starts = scene.initial_state, scene.initial_state + _offset(scene, push)
-    return grid, distance_of_states(scene, *(_advance(scene, start, grid) for start in starts)) / _level(scene)
+    return grid, distance_of_states(scene, *(states_from(scene, start, grid) for start in starts)) / _level(scene)

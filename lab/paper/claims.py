@@ -173,6 +173,13 @@ def numbered(letter: str, where: str, several: Mapping[str, Sequence[Judged]]) -
                  for number, (words, parts) in enumerate(several.items(), 1))
 
 
+def tally(claims: Sequence[Claim]) -> list[str]:
+    """How many hold, hold within limits and do not hold, in words."""
+    found = [(sum(claim.verdict is verdict for claim in claims), verdict.value) for verdict in reversed(Verdict)]
+    return [f"{count} {words if count == 1 else words.replace('holds', 'hold').replace('does', 'do')}"
+            for count, words in found]
+
+
 def _first(texts: Sequence[str], whole: int) -> str:
     """The first of so many."""
     return texts[0] + (f", and {whole - 1} more" if whole > 1 else "")

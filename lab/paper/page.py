@@ -16,7 +16,7 @@ from markupsafe import Markup
 from grasp_ros.scene.files import writing
 from grasp_ros.scene.versions import versions
 from lab.paper.answer import FIGURE, answer
-from lab.paper.claims import Claim, Verdict
+from lab.paper.claims import Claim, Verdict, tally
 from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.equation_table import ALGEBRA, Equation
 from lab.paper.equations import CROSSING
@@ -108,12 +108,10 @@ def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> s
 
 def summary(claims: Sequence[Claim]) -> str:
     """How many statements hold."""
-    holds, limited, fails = (
-        sum(claim.verdict is verdict for claim in claims) for verdict in (Verdict.HOLDS, Verdict.LIMITED, Verdict.FAILS)
-    )
+    holds, limited, fails = tally(claims)
     return (
-        f"Of {len(claims)} statements {holds} hold, {limited} hold within stated limits, and {fails} do not hold. A"
-        " statement holds as far as its weakest part does; the parts and their checks stand below."
+        f"Of {len(claims)} statements {holds}, {limited}, and {fails}. A statement holds as far as its weakest part"
+        " does; the parts and their checks stand below."
     )
 
 
