@@ -68,13 +68,8 @@ def tail(found: Tail) -> Drawing:
     figure, (left, right) = canvas.subplots(1, 2, figsize=WIDE, layout="constrained")
     left.loglog(found.t, found.V_c, color="black", label="$V_c$ of No. 1")
     later = found.law < found.V_c[0]
-    left.loglog(
-        found.t[later],
-        found.law[later],
-        color=RIGHT_COLOR,
-        linestyle="--",
-        label=r"$\frac{4}{5} H (\kappa t)^{-5/2}$",
-    )
+    left.loglog(found.t[later], found.law[later], color=RIGHT_COLOR, linestyle="--",
+                label=r"$\frac{4}{5} H (\kappa t)^{-5/2}$")
     left.set_ylabel("twice the energy, J")
     right.loglog(found.t, np.maximum(found.contacts, 1.0), color="black", label="touches so far")
     end = found.t > found.t[-1] / 100.0
