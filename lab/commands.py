@@ -68,7 +68,7 @@ def _paper(options: Options) -> int:
     prepare()
     found = study.report(QUICK_STARTS if options.quick else RANDOM_STARTS)
     page.write_html(found, options.output)
-    print(found.summary)
+    print(page.summary(found.claims))
     for claim in found.claims:
         print(f"  {claim.key:4} {claim.verdict.value:27} {claim.statement}")
     print(f"written to {options.output}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from lab.paper.claims import Check, Claim, Kind, Verdict
+from lab.paper.claims import Claim, Kind, Verdict, tally
 from lab.paper.results import Beyond
 
 FIGURE = (  # that stands beside it, and its caption
@@ -16,15 +16,14 @@ NUMBERED = ("O", "C")  # keys of the claims that the paper numbers
 def answer(claims: Sequence[Claim], found: Beyond) -> list[str]:
     """Ten lines."""
     numbered = [claim for claim in claims if claim.key.startswith(NUMBERED)]
-    numbers = {verdict: sum(claim.verdict is verdict for claim in numbered) for verdict in Verdict}
-    counts = ", ".join(f"{count} {_plural(verdict, count)}" for verdict, count in reversed(numbers.items()))
     missed = [claim for claim in numbered if claim.verdict is Verdict.FAILS]
     failing = "; ".join(f"{claim.key}: {claim.statement.rstrip('.')}" for claim in missed)
     lossless, standard = found.damped[0], next(row for row in found.damped if row.C == 0.7)
     grown = [row for row in found.edge if row.visible < float("inf")]
     coarse = max(row.error for row in found.stepped if row.step == max(row.step for row in found.stepped))
     return [
-        f"The paper numbers {len(numbered)} claims, twelve observations and three conclusions: {counts}.",
+        f"The paper numbers {len(numbered)} claims, twelve observations and three conclusions:"
+        f" {', '.join(tally(numbered))}.",
         f"Not so: {failing}." if failing else "None of them fails.",
         "The proof has a gap: V as printed jumps up where a pair separates faster than 1/p"
         f" ({len(found.gap.jumps)} times in two scenes of ours). {_jumps(claims)} V_c, which keeps the term, never"
@@ -45,16 +44,8 @@ def answer(claims: Sequence[Claim], found: Beyond) -> list[str]:
     ]
 
 
-def _plural(verdict: Verdict, count: int) -> str:
-    """A verdict on so many claims."""
-    if count == 1:
-        return verdict.value
-    return verdict.value.replace("holds", "hold").replace("does not", "do not")
-
-
 def _jumps(claims: Sequence[Claim]) -> str:
     """Whether V jumps in the paper's own cases."""
     first = next(claim for claim in claims if claim.key == "C1").parts[0]
-    own: list[Check] = [check for check in first.checks if check.kind is Kind.PRINTED]
-    never = all(check.holds for check in own)
+    never = all(check.holds for check in first.checks if check.kind is Kind.PRINTED)
     return f"It {'never does' if never else 'also does'} in the paper's own cases."

@@ -13,7 +13,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.losses import losses
 from lab.paper.cases import STANDARD, Cases, Start, started, with_values
 from lab.paper.measures import over
-from lab.paper.motion import contacts_found, first_contact_error, without_object
+from lab.paper.motion import first_contact_error, none_missed, without_object
 from lab.paper.scatter import Median, median
 
 STIFFNESSES = (5.0, 10.0, 20.0, 40.0, 100.0, 200.0, 400.0, 700.0, 1000.0, 1500.0)  # N/m
@@ -34,18 +34,11 @@ class Stiffer(NamedTuple):
     starts: int
 
 
-def _of_stiffness(cases: Cases) -> dict[float, Scene]:
-    return {k: with_values(cases[STANDARD], {"k": k}) for k in STIFFNESSES}
-
-
-def _of_damping(cases: Cases) -> dict[float, Scene]:
-    return {C: with_values(cases[STANDARD], {"c": min(C, 0.2), "Kv": C - min(C, 0.2)}) for C in DAMPINGS}
-
-
 def stiffer(cases: Cases, starts: Sequence[Start]) -> list[Stiffer]:
     """Settling time and what makes it, over the stiffness of the arms."""
     found = []
-    for k, scene in _of_stiffness(cases).items():
+    for k in STIFFNESSES:
+        scene = with_values(cases[STANDARD], {"k": k})
         times = over(scene, starts, "settling")
         few = zip(starts[:MANY], times, strict=False)
         rate, speed, share = np.median([_causes(started(scene, start), time) for start, time in few], axis=0).tolist()
@@ -82,7 +75,8 @@ class Damped(NamedTuple):
 def damped(cases: Cases, starts: Sequence[Start]) -> list[Damped]:
     """Settling time with and without the object, over the damping of the arms."""
     found = []
-    for C, scene in _of_damping(cases).items():
+    for C in DAMPINGS:
+        scene = with_values(cases[STANDARD], {"c": min(C, 0.2), "Kv": C - min(C, 0.2)})
         together, alone = (over(each, starts, "settling") for each in (scene, without_object(scene)))
         later = float(np.mean(np.greater(together, alone)))
         found.append(Damped(C, median(together), median(alone), later, len(starts)))
@@ -106,15 +100,9 @@ def stepped(cases: Cases) -> list[Stepped]:
 
 
 def _stepped(number: int, scene: Scene, step: float) -> Stepped:
-    exact = simulate(scene)
-    theirs = simulate(scene, method="paper", setting=step)
-    level, own = theirs.energy.V_c, exact.energy.V_c
+    exact, theirs = simulate(scene), simulate(scene, method="paper", setting=step)
     error = float(np.abs(theirs.state[:, 0::2] - exact.state[:, 0::2]).max())
+    level, own = theirs.energy.V_c, exact.energy.V_c
+    drift = float((level[-1] - own[-1]) / own[0])
     return Stepped(
-        number,
-        step,
-        error,
-        float((level[-1] - own[-1]) / own[0]),
-        contacts_found(step, scene),
-        first_contact_error(step, scene).value,
-    )
+        number, step, error, drift, none_missed(step, scene).value, first_contact_error(step, scene).value)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import Transition
 from grasp_ros.physics.model import Array
@@ -16,8 +15,9 @@ from grasp_ros.simulation import Trajectory, simulate
 from lab.oracles.closed_forms import tail_rate
 from lab.paper.cases import Cases
 from lab.paper.motion import distance_of_states, nearest_return, state_weights
-from lab.reference.grasp import grasp_of, system_of
+from lab.reference.grasp import grasp_of
 from lab.studies.certificate import SCENES, Jump, jumps, safe_p
+from lab.studies.predictability import states_from
 
 TAIL_SECONDS = 1e5
 TAIL_POINTS = 400
@@ -67,9 +67,8 @@ def tail(scene: Scene, seconds: float = TAIL_SECONDS) -> Tail:
     """Follow a case with damped arms to the law of its tail; O9 of docs/oracles.md."""
     grasp = grasp_of(scene)
     arm, hertzian = grasp.left, grasp.left_contact.hertzian
-    kappa = float(
-        tail_rate(arm.damping + arm.velocity_gain, arm.stiffness + arm.position_gain, hertzian, grasp.object_mass)
-    )
+    C, K = arm.damping + arm.velocity_gain, arm.stiffness + arm.position_gain
+    kappa = float(tail_rate(C, K, hertzian, grasp.object_mass))
     t = np.geomspace(1.0, seconds, TAIL_POINTS)
     run = simulate(scene.changed({"time.duration_s": seconds}), grid=np.minimum(t, seconds))
     touches = np.sort(run.event_table[run.event_table[:, 2] == Transition.TOUCH, 0])
@@ -93,13 +92,11 @@ class Chaos(NamedTuple):
     error: float  # standard error from blocks of time
     symmetric: float  # exponent within the motion from a symmetric start, where the object rests
     apart: tuple[Array, Array]  # t, distance of two motions that begin 1e-9 apart, in sqrt(V(0))
-    near: float  # nearest return to the start, in sqrt(V(0))
-    near_time: float  # s
-    seconds: float  # how long it was looked for
-    periodic: float  # the same for a symmetric start
-    periodic_time: float  # s
+    near_time: float  # s, of the nearest return to the start within RETURN_SECONDS
+    near: float  # how near, in sqrt(V(0))
+    periodic_time: float  # the same for a symmetric start
+    periodic: float
     across: float  # 1/s, growth of an offset that breaks the symmetry of that motion
-    far: float  # distance at the end of `apart`
 
 
 def stretching(scene: Scene, seconds: float, push: Array) -> Array:
@@ -119,23 +116,25 @@ def stretching(scene: Scene, seconds: float, push: Array) -> Array:
     G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Lyapunov characteristic exponents for smooth dynamical
     systems, Meccanica 15 (1980).
     """
-    system, weights = scene.system, state_weights(scene.system)
-    size = SMALL * float(np.sqrt(energy(system, system.state).V_c))
-    state = system.state.copy()
-    offset = push / weights
-    offset *= size / float(np.linalg.norm(offset * weights))
+    weights, level = state_weights(scene.system), _level(scene)
+    state, offset = scene.initial_state, _offset(scene, push)
     found = np.empty(round(seconds / EVERY))
     for row in range(len(found)):
-        ends = []
-        for start in (state, state + offset):
-            integrator = Integrator(system_of(grasp_of(scene), start), continuous=True)
-            integrator.advance(EVERY)
-            ends.append(integrator.state)
-        state, offset = ends[0], ends[1] - ends[0]
-        grown = float(np.linalg.norm(offset * weights)) / size
+        state, other = (states_from(scene, start, np.array([EVERY]))[-1] for start in (state, state + offset))
+        grown = float(np.linalg.norm((other - state) * weights)) / (SMALL * level)
         found[row] = np.log(grown)
-        offset /= grown
+        offset = (other - state) / grown
     return found
+
+
+def _level(scene: Scene) -> float:
+    """Square root of V(0)."""
+    return float(np.sqrt(energy(scene.system, scene.initial_state).V_c))
+
+
+def _offset(scene: Scene, push: Array) -> Array:
+    """A difference of states of the size SMALL."""
+    return push / state_weights(scene.system) * (SMALL * _level(scene) / float(np.linalg.norm(push)))
 
 
 def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Chaos:
@@ -144,39 +143,18 @@ def chaos(cases: Cases, symmetric: Scene, seconds: float = CHAOS_SECONDS) -> Cha
     push = np.random.default_rng(1990).normal(size=6)
     logs = stretching(scene, seconds, push)
     blocks = logs.reshape(BLOCKS, -1).sum(axis=1) / (seconds / BLOCKS)
-    within = np.array([1.0, 1.0, 0.0, 0.0, -1.0, -1.0])  # keeps the symmetry
-    even = stretching(symmetric, seconds / 5.0, within)
-    near_time, near = nearest_return(scene, RETURN_SECONDS)
-    periodic_time, periodic = nearest_return(symmetric, 20.0)
-    breaking = np.array([1.0, 1.0, 0.5, 0.5, 1.0, 1.0])
-    apart = _apart(scene, push)
-    t: Array = EVERY * np.arange(1, len(logs) + 1, dtype=float)
+    keeping, breaking = np.array([1.0, 1.0, 0.0, 0.0, -1.0, -1.0]), np.array([1.0, 1.0, 0.5, 0.5, 1.0, 1.0])
+    even = stretching(symmetric, seconds / 5.0, keeping)
     return Chaos(
-        t,
-        np.cumsum(logs),
-        float(logs.sum() / seconds),
-        float(blocks.std(ddof=1) / np.sqrt(BLOCKS)),
-        float(even.sum() / (seconds / 5.0)),
-        apart,
-        near,
-        near_time,
-        RETURN_SECONDS,
-        periodic,
-        periodic_time,
+        EVERY * np.arange(1, len(logs) + 1, dtype=float), np.cumsum(logs), float(logs.sum() / seconds),
+        float(blocks.std(ddof=1) / np.sqrt(BLOCKS)), float(even.sum() / (seconds / 5.0)), _apart(scene, push),
+        *nearest_return(scene, RETURN_SECONDS), *nearest_return(symmetric, 20.0),
         float(stretching(symmetric, WITHIN, breaking).sum() / WITHIN),
-        float(apart[1][-1]),
     )
 
 
 def _apart(scene: Scene, push: Array) -> tuple[Array, Array]:
     """Distance of two motions that begin SMALL apart, over 60 s."""
-    seconds = 60.0
-    grid = np.linspace(0.0, seconds, 6001)
-    level = float(np.sqrt(energy(scene.system, scene.initial_state).V_c))
-    offset = push / state_weights(scene.system)
-    offset *= SMALL * level / float(np.linalg.norm(push))
-    states = [
-        Integrator(system_of(grasp_of(scene), start), continuous=True).advance(seconds, grid)
-        for start in (scene.initial_state, scene.initial_state + offset)
-    ]
-    return grid, distance_of_states(scene, *states) / level
+    grid = np.linspace(0.0, 60.0, 6001)
+    starts = scene.initial_state, scene.initial_state + _offset(scene, push)
+    return grid, distance_of_states(scene, *(states_from(scene, start, grid) for start in starts)) / _level(scene)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ class Start(NamedTuple):
     x_o: float = 0.0
 
 
+PLACES = "left_arm.position_m", "right_arm.position_m", "object.position_m"  # keys of a start
 STANDARD = 1
 NUMBERS = tuple(range(1, 12))
 PRINTED = Start(-0.3, 0.5)
@@ -59,12 +60,23 @@ UNIT_OF: Mapping[str, str] = {
 }
 
 
+TENFOLD, ABSENT, LARGER = "10 times", "no", "larger"
+
+
 class Figure(NamedTuple):
     """One of the paper's figures."""
 
     number: int
-    case: int
     change: str  # in the paper's letters; empty: none
+    caption: str  # words of the print
+    letters: tuple[str, ...] = ()  # that they name
+    how: str = ""  # these change
+    used_by: tuple[str, ...] = ()  # statements that the paper draws from it beside Fig. 2, or says of it
+
+    @property
+    def case(self) -> int:
+        """The number of its case."""
+        return self.number - 1
 
     @property
     def title(self) -> str:
@@ -72,27 +84,20 @@ class Figure(NamedTuple):
         return f"Fig. {self.number}: No. {self.case}, {self.change or 'standard parameters'}"
 
 
-FIGURES = tuple(
-    Figure(number, number - 1, change)
-    for number, change in enumerate(
-        (
-            "",
-            "c = Kv = p = 0",
-            "c = Kv = 0",
-            "p = 1 s/m",
-            "m_l = m_r = 10 kg",
-            "m_l = 10 kg",
-            "k_l = k_r = 100 N/m",
-            "c_l = c_r = 2 N s/m",
-            "Kp_l = Kp_r = 50 N/m",
-            "Kv_l = Kv_r = 5 N s/m",
-            "m_o = 50 kg",
-        ),
-        start=2,
-    )
+FIGURES = (
+    Figure(2, "", "Standard parameters"),
+    Figure(3, "c = Kv = p = 0", "Marginally stable, perfect elastic collision", ("c", "Kv", "p"), ABSENT,
+           ("O1", "T12")),
+    Figure(4, "c = Kv = 0", "Marginally stable, collision with energy loss", ("c", "Kv"), ABSENT, ("O1",)),
+    Figure(5, "p = 1 s/m", "Standard with larger energy loss in collision", ("p",), LARGER, ("O2",)),
+    Figure(6, "m_l = m_r = 10 kg", "10 times the masses, both manip.", ("m_l", "m_r"), TENFOLD, ("O5",)),
+    Figure(7, "m_l = 10 kg", "10 times the mass, left manip.", ("m_l",), TENFOLD, ("O8",)),
+    Figure(8, "k_l = k_r = 100 N/m", "10 times the stiffness, both manip.", ("k",), TENFOLD, ("O6",)),
+    Figure(9, "c_l = c_r = 2 N s/m", "10 times the damping coef., both manip.", ("c",), TENFOLD, ("O7",)),
+    Figure(10, "Kp_l = Kp_r = 50 N/m", "10 times the position feedback gains", ("Kp",), TENFOLD, ("O10",)),
+    Figure(11, "Kv_l = Kv_r = 5 N s/m", "10 times the velocity feedback gains", ("Kv",), TENFOLD, ("O11",)),
+    Figure(12, "m_o = 50 kg", "10 times the mass, object", ("m_o",), TENFOLD, ("O12",)),
 )
-
-
 _STARTED: dict[tuple[str, str, Start], Scene] = {}
 
 
@@ -105,9 +110,7 @@ def started(scene: Scene, start: Start) -> Scene:
     """A scene that begins at rest somewhere else; each is made once, because comparisons ask for the same ones."""
     key = scene.name, text_of(scene), start
     if key not in _STARTED:
-        x_l, x_r, x_o = start
-        _STARTED[key] = scene.changed(
-            {"left_arm.position_m": x_l, "object.position_m": x_o, "right_arm.position_m": x_r})
+        _STARTED[key] = scene.changed(dict(zip(PLACES, start, strict=True)))
     return _STARTED[key]
 
 
@@ -138,12 +141,6 @@ def start_of(scene: Scene) -> Start:
 def moved(scene: Scene, offset: float) -> Scene:
     """A scene whose left arm begins a little farther to the right, by an offset in m."""
     return scene.changed({"left_arm.position_m": start_of(scene).x_l + offset}) if offset else scene
-
-
-def columns_of(starts: Sequence[Start]) -> dict[str, list[float]]:
-    """Starts as rows of an ensemble."""
-    keys = ("left_arm.position_m", "right_arm.position_m", "object.position_m")
-    return {key: [start[place] for start in starts] for place, key in enumerate(keys)}
 
 
 def text_of(scene: Scene, start: bool = True) -> str:

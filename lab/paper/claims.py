@@ -15,10 +15,11 @@ restate another reading of the whole sentence, and does not enter then either.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
+from lab.paper.cases import Cases, Start
 from lab.paper.scatter import Median
 
 ALMOST_ALL, HALF = 0.95, 0.5  # of the random starts
@@ -144,6 +145,39 @@ class Claim(NamedTuple):
     def turned(self) -> list[Part]:
         """Parts that read the sentence in another way and come to another verdict."""
         return [part for part in self.parts if part.reading and part.verdict is not self.verdict]
+
+
+class Judged(Protocol):
+    """A part that can be judged."""
+
+    def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
+        """Measure and check."""
+
+
+class Statement(NamedTuple):
+    """A statement of the paper as it is to be judged: where it stands, what it says in our words, and its parts."""
+
+    key: str
+    where: str
+    statement: str
+    parts: Sequence[Judged]
+
+    def judge(self, cases: Cases, starts: Sequence[Start]) -> Claim:
+        """Judge all parts."""
+        return Claim(self.key, self.where, self.statement, [part.judge(cases, starts) for part in self.parts])
+
+
+def numbered(letter: str, where: str, several: Mapping[str, Sequence[Judged]]) -> tuple[Statement, ...]:
+    """Statements that the paper numbers, by their words."""
+    return tuple(Statement(f"{letter}{number}", f"{where} ({number})", words, parts)
+                 for number, (words, parts) in enumerate(several.items(), 1))
+
+
+def tally(claims: Sequence[Claim]) -> list[str]:
+    """How many hold, hold within limits and do not hold, in words."""
+    found = [(sum(claim.verdict is verdict for claim in claims), verdict.value) for verdict in reversed(Verdict)]
+    return [f"{count} {words if count == 1 else words.replace('holds', 'hold').replace('does', 'do')}"
+            for count, words in found]
 
 
 def _first(texts: Sequence[str], whole: int) -> str:

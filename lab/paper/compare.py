@@ -8,19 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.scene import Scene
-from lab.paper.cases import (
-    ALIKE,
-    STANDARD,
-    Cases,
-    Start,
-    read_starts,
-    start_of,
-    started,
-    value_of,
-    with_values,
-)
+from lab.paper.cases import ALIKE, STANDARD, Cases, Start, read_starts, start_of, started, value_of, with_values
 from lab.paper.claims import HALF, Check, Kind, Part, almost_all
-from lab.paper.measures import MARGIN, NAMES, UNITS, near, over, ratio, seconds
+from lab.paper.measures import MARGIN, MEASURES, near, over, ratio, seconds
 from lab.paper.scatter import Median, median
 from lab.paper.symmetry import where_false
 
@@ -41,7 +31,9 @@ class Variant(NamedTuple):
         return self.name or (f"No. {self.case} with {changes}" if changes else f"No. {self.case}")
 
 
+Pair = tuple[Variant, Variant]  # one over the other
 FIRST = Variant(STANDARD)
+HIGHER, LOWER = True, False
 
 
 class Comparison(NamedTuple):
@@ -56,100 +48,63 @@ class Comparison(NamedTuple):
     values: tuple[float, ...] = ()
     words: tuple[str, ...] = ()  # other measures that the sentence may mean
     others: tuple[Variant, ...] = (FIRST,)  # each decides
-    pairs: tuple[tuple[Variant, Variant], ...] = ()  # more comparisons that decide
+    pairs: tuple[Pair, ...] = ()  # more comparisons that decide
     reading: bool = False
 
     @property
-    def decisive(self) -> list[tuple[Variant, Variant]]:
+    def decisive(self) -> list[Pair]:
         """All that is compared."""
         return [*((self.changed, other) for other in self.others), *self.pairs]
-
-    @property
-    def other(self) -> Variant:
-        """What the sweep begins from."""
-        return self.others[0]
 
     @property
     def threshold(self) -> str:
         """In words."""
         side = f"above {MARGIN:g}" if self.higher else f"below {1.0 / MARGIN:.3g}"
-        return f"{NAMES[self.measure]}, {', '.join(f'{a} over {b}' for a, b in self.decisive)}: {side}"
+        return f"{MEASURES[self.measure].name}, {', '.join(f'{a} over {b}' for a, b in self.decisive)}: {side}"
 
-    def true_of(self, found: float) -> bool:
+    def true_of(self, found: float, margin: float = MARGIN) -> bool:
         """Whether a ratio is what the statement says."""
-        return found > MARGIN if self.higher else found < 1.0 / MARGIN
-
-    def strict(self, found: float) -> bool:
-        """Whether a ratio is so by whatever amount."""
-        return found > 1.0 if self.higher else found < 1.0
-
-    def _several(self, start: Start) -> tuple[Start, ...]:
-        """Where a scene is measured from in place of one start: of times from all that cannot be told apart."""
-        return near(start) if self.measure == "settling" else (start,)
+        return past(found, self.higher, margin)
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Measure and check."""
-        checks = []
+        checks, curve = [], self.curve(cases, starts)
         for pair in self.decisive:
-            checks += [self._printed(cases, *pair), *self._alike(cases, *pair)]
-            checks.append(self._random(cases, starts, self.measure, *pair))
-        curve = self.curve(cases, starts)
+            a, b = (each.scene(cases) for each in pair)
+            other = ", from different starts" if start_of(a) != start_of(b) else ""
+            checks.append(self._check(Kind.PRINTED, f"{_words(pair)} as they are printed{other}", a, b))
+            for start in ALIKE:
+                text = f"{_words(pair)}, both from {start.x_l:g}, {start.x_r:g} m"
+                checks.append(self._check(Kind.ALIKE, text, started(a, start), started(b, start)))
+            checks.append(self._random(cases, starts, self.measure, pair))
         checks += self._sweep(cases, starts, curve)
         for pair in self.decisive:
-            checks += [*self._readings(cases, *pair), self._at_all(cases, starts, *pair)]
-        checks += [self._random(cases, starts, word, self.changed, self.other) for word in self.words]
+            a, b = (each.scene(cases) for each in pair)
+            for text, start in read_starts(a, b).items():
+                if start not in ALIKE:
+                    text = f"{_words(pair)}, both from {text}"
+                    checks.append(self._check(Kind.READING, text, started(a, start), started(b, start)))
+            true = [self.true_of(found, 1.0) for found in _ratios(cases, starts, self.measure, pair)]
+            text = f"by whatever amount, {_words(pair)}, random starts"
+            share = sum(true) / len(true)
+            checks.append(Check(Kind.WORD, text, f"{_percent(share)} of {len(true)}", share, almost_all(share)))
+        checks += [self._random(cases, starts, word, self.decisive[0]) for word in self.words]
         return Part(self.statement, self.threshold, self.why, checks, self.reading, curve)
 
     def _check(self, kind: Kind, text: str, changed: Scene, other: Scene) -> Check:
-        several = (over(scene, self._several(start_of(scene)), self.measure) for scene in (changed, other))
-        pairs = list(zip(*several, strict=True))
-        found = [ratio(a, b) for a, b in pairs]
-        share = sum(map(self.true_of, found)) / len(found)
+        """From one start; of times from all that cannot be told apart from it."""
+        beside = near if self.measure == "settling" else lambda start: (start,)
+        several = [over(scene, beside(start_of(scene)), self.measure) for scene in (changed, other)]
+        found = [ratio(a, b) for a, b in zip(*several, strict=True)]
         if np.isnan(found).all():  # equal arms from a symmetric start, say: true, or not, whatever the other scene is
-            return Check(Kind.TRIVIAL, text, f"{pairs[0][0]:.4g} against 0: no ratio", 0.0, False)
-        unit = UNITS.get(self.measure, "")
-        a, b = (
-            seconds(several) if self.measure.startswith("settling") else f"{several[0]:.4g}{unit}"
-            for several in zip(*pairs, strict=True)
-        )
+            return Check(Kind.TRIVIAL, text, f"{several[0][0]:.4g} against 0: no ratio", 0.0, False)
+        share = sum(map(self.true_of, found)) / len(found)
+        unit = MEASURES[self.measure].unit
+        a, b = (seconds(own) if self.measure.startswith("settling") else f"{own[0]:.4g}{unit}" for own in several)
         return Check(kind, text, f"{a} against {b}: {_range(found)}", share, share == 1.0)
 
-    def _printed(self, cases: Cases, changed: Variant, other: Variant) -> Check:
-        scenes = changed.scene(cases), other.scene(cases)
-        text = f"{changed} and {other} as they are printed"
-        if start_of(scenes[0]) != start_of(scenes[1]):
-            text += ", from different starts"
-        return self._check(Kind.PRINTED, text, *scenes)
-
-    def _alike(self, cases: Cases, changed: Variant, other: Variant) -> list[Check]:
-        return [
-            self._check(
-                Kind.ALIKE,
-                f"{changed} and {other}, both from {start.x_l:g}, {start.x_r:g} m",
-                started(changed.scene(cases), start),
-                started(other.scene(cases), start),
-            )
-            for start in ALIKE
-        ]
-
-    def _readings(self, cases: Cases, changed: Variant, other: Variant) -> list[Check]:
-        a, b = changed.scene(cases), other.scene(cases)
-        return [
-            self._check(Kind.READING, f"{changed} and {other}, both from {text}", started(a, start), started(b, start))
-            for text, start in read_starts(a, b).items()
-            if start not in ALIKE
-        ]
-
-    def _ratios(
-        self, cases: Cases, starts: Sequence[Start], word: str, changed: Variant, other: Variant
-    ) -> list[float]:
-        several = (over(each.scene(cases), starts, word) for each in (changed, other))
-        return [ratio(a, b) for a, b in zip(*several, strict=True)]
-
-    def _random(
-        self, cases: Cases, starts: Sequence[Start], word: str, changed: Variant, other: Variant
-    ) -> Check:
-        found = self._ratios(cases, starts, word, changed, other)
+    def _random(self, cases: Cases, starts: Sequence[Start], word: str, pair: Pair) -> Check:
+        found = _ratios(cases, starts, word, pair)
         kind = Kind.RANDOM if word == self.measure else Kind.WORD
         true = [self.true_of(each) for each in found]
         share = sum(true) / len(true)
@@ -157,14 +112,7 @@ class Comparison(NamedTuple):
         value = f"{_percent(share)} of {len(found)}; ratio {middle:.3g}, from {low:.3g} to {high:.3g}"
         if kind is Kind.RANDOM:
             value += where_false(starts, true)
-        return Check(kind, f"{NAMES[word]}, {changed} and {other}", value, share, almost_all(share), len(found))
-
-    def _at_all(self, cases: Cases, starts: Sequence[Start], changed: Variant, other: Variant) -> Check:
-        """The same without the margin."""
-        found = self._ratios(cases, starts, self.measure, changed, other)
-        share = sum(map(self.strict, found)) / len(found)
-        text = f"by whatever amount, {changed} and {other}, random starts"
-        return Check(Kind.WORD, text, f"{_percent(share)} of {len(found)}", share, almost_all(share))
+        return Check(kind, f"{MEASURES[word].name}, {_words(pair)}", value, share, almost_all(share), len(found))
 
     def _sweep(self, cases: Cases, starts: Sequence[Start], curve: Sequence[tuple[float, Median]]) -> list[Check]:
         """The parameter alone, changed from the other case, at several values: the median over the random starts.
@@ -173,10 +121,10 @@ class Comparison(NamedTuple):
         """
         if not curve:
             return []
-        share = sum(self.true_of(found.low) and self.true_of(found.high) for _, found in curve) / len(curve)
-        standard = value_of(self.other.scene(cases), self.letter)
+        share = sum(wholly(found, self.higher) for _, found in curve) / len(curve)
+        standard = value_of(self.others[0].scene(cases), self.letter)
         text = f"{self.letter} beside {standard:g}, median ratio of {len(starts)} random starts (95 % interval)"
-        opposite = [value for value, found in curve if self._against(found.low) and self._against(found.high)]
+        opposite = [value for value, found in curve if wholly(found, not self.higher)]
         pairs = ", ".join(f"{value:g}: {found}" for value, found in curve)
         at, lowest = min(curve, key=lambda point: point[1].middle)
         if lowest.high < min(curve[0][1].low, curve[-1][1].low):
@@ -185,19 +133,32 @@ class Comparison(NamedTuple):
             pairs += f"; the other way round at {', '.join(f'{value:g}' for value in opposite)}"
         return [Check(Kind.SWEEP, text, pairs, share, share > HALF and not opposite)]
 
-    def _against(self, found: float) -> bool:
-        """Whether a ratio is the other way round."""
-        return found < 1.0 / MARGIN if self.higher else found > MARGIN
-
     def curve(self, cases: Cases, starts: Sequence[Start]) -> list[tuple[float, Median]]:
         """Value of the parameter and median ratio, over the sweep."""
-        if not self.values:
-            return []
-        other = self.other.scene(cases)
-        before = over(other, starts, self.measure)
+        other = self.others[0].scene(cases)
+        before = over(other, starts, self.measure) if self.values else []
         swept = {value: over(with_values(other, {self.letter: value}), starts, self.measure) for value in self.values}
         return [(value, median([ratio(a, b) for a, b in zip(found, before, strict=True)]))
                 for value, found in swept.items()]
+
+
+def past(found: float, higher: bool, margin: float = MARGIN) -> bool:
+    """Whether a ratio is on one side of 1, by a factor."""
+    return found > margin if higher else found < 1.0 / margin
+
+
+def wholly(found: Median, higher: bool) -> bool:
+    """Whether the whole interval of a median is."""
+    return past(found.low, higher) and past(found.high, higher)
+
+
+def _words(pair: Pair) -> str:
+    return f"{pair[0]} and {pair[1]}"
+
+
+def _ratios(cases: Cases, starts: Sequence[Start], measure: str, pair: Pair) -> list[float]:
+    changed, other = (over(each.scene(cases), starts, measure) for each in pair)
+    return [ratio(a, b) for a, b in zip(changed, other, strict=True)]
 
 
 def _range(found: Sequence[float]) -> str:

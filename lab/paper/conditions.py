@@ -8,7 +8,8 @@ from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Mode
-from lab.paper import by_hand, quadratic_form
+from grasp_ros.physics.reach import reach
+from lab.paper import by_hand
 from lab.paper.equation_table import DRAWS
 from lab.paper.sample import Sample
 
@@ -102,7 +103,7 @@ def _enclosure(samples: list[Sample]) -> dict[str, float]:
     for sample in samples:
         run = sample.run
         epsilon = run.epsilon[-1]
-        allowed = quadratic_form.deformation_bound(sample.system, float(run.energy.V_c[0]))
+        allowed = np.array(reach(sample.system.closed_loop, sample.system.pairs, float(run.energy.V_c[0]))[3:])
         bound = np.minimum(bound, allowed / epsilon)
         x_l, x_o, x_r = run.state[:, 0], run.state[:, 2], run.state[:, 4]
         margin = min(margin, float((x_o - x_l + allowed[LEFT]).min()), float((x_r + allowed[RIGHT] - x_o).min()))

@@ -6,23 +6,13 @@ import numpy as np
 
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.model import hertzian_force
-from lab.paper.cases import (
-    LITERAL,
-    NEARLY,
-    PRINTED,
-    READ_P,
-    STANDARD,
-    SYMMETRIC,
-    Cases,
-    started,
-    with_values,
-)
+from lab.paper.cases import LITERAL, NEARLY, PRINTED, READ_P, STANDARD, SYMMETRIC, Cases, started, with_values
 from lab.paper.measures import measure, seconds, settlings
 from lab.reference.grasp import grasp_of
 
 
-def doubts(cases: Cases) -> list[tuple[str, str]]:
-    """What is doubtful in the source: what, and what follows, with numbers."""
+def doubts(cases: Cases) -> dict[str, str]:
+    """What is doubtful in the source, and what follows, with numbers."""
     standard = cases[STANDARD]
     inputs = measure(cases[9], "input")
     literal = started(standard, LITERAL)
@@ -34,64 +24,36 @@ def doubts(cases: Cases) -> list[tuple[str, str]]:
         [measure(started(cases[number], start), "settling") for number in (STANDARD, 11)]
         for start in (SYMMETRIC, NEARLY, PRINTED)
     )
-    return [
-        (
-            "Number of figures",
-            (
-                'The text announces results "from Fig. 2 to Fig. 15"; the last figure is Fig. 12. Its list of cases'
-                " ends there, too, so that nothing seems to be missing but three figures that nobody describes."
-            ),
-        ),
-        (
-            "Axis of Fig. 10",
-            (
-                f"It ends at -10 N. From rest the first input of No. 9 is -Kp x_r(0) = {-inputs:g} N on the right."
-                " Either the curve leaves the figure or the start was another."
-            ),
-        ),
-        (
-            "Sign of x_l(0)",
-            (
-                f"Table 1 prints +{LITERAL.x_l:g}. The left arm would start {LITERAL.x_l:g} m inside the object,"
-                f" pressed"
-                f" with {force:.0f} N, and with V_c(0) = {levels[1]:.0f} J in place of {levels[0]:.2g} J. Read as"
-                f" {PRINTED.x_l:g}."
-            ),
-        ),
-        (
-            "p of No. 4",
+    return {
+        "Number of figures":
+            'The text announces results "from Fig. 2 to Fig. 15"; the last figure is Fig. 12. Its list of cases ends'
+            " there, too, so that nothing seems to be missing but three figures that nobody describes.",
+        "Axis of Fig. 10":
+            f"It ends at -10 N. From rest the first input of No. 9 is -Kp x_r(0) = {-inputs:g} N on the right. Either"
+            " the curve leaves the figure or the start was another.",
+        "Sign of x_l(0)":
+            f"Table 1 prints +{LITERAL.x_l:g}. The left arm would start {LITERAL.x_l:g} m inside the object, pressed"
+            f" with {force:.0f} N, and with V_c(0) = {levels[1]:.0f} J in place of {levels[0]:.2g} J. Read as"
+            f" {PRINTED.x_l:g}.",
+        "p of No. 4":
             'Only "larger" is said. Read as 1 s/m; settling times for '
             + ", ".join(f"p = {p:g}: {time}" for p, time in zip(ps, times, strict=True))
             + f" (p = 0.1: {seconds(settlings(standard))}).",
-        ),
-        (
-            "Symmetric starts",
-            (
-                f"Nos. 5 to 8 start symmetrically, without numbers; read as {SYMMETRIC.x_l:g} and {SYMMETRIC.x_r:g}"
-                f" m. Where the arms are equal,"
-                " and the start is symmetric to the last bit, the object never moves and its mass does not matter: No."
-                f" 1 and No. 11 settle after {even[0]:.2f} and {even[1]:.2f} s. It is a knife-edge (above): from"
-                f" {NEARLY.x_l:g} and {NEARLY.x_r:g} m they need {near[0]:.1f} and {near[1]:.1f} s, from the printed"
-                f" start {odd[0]:.1f} and {odd[1]:.0f} s. Comparing Fig. 2 with Figs. 6 to 9 compares starts as well."
-            ),
-        ),
-        ("x_o(0)", "Not printed. Read as 0, in the middle of the axes of Figs. 2 to 12."),
-        (
-            "Step of the integration",
+        "Symmetric starts":
+            f"Nos. 5 to 8 start symmetrically, without numbers; read as {SYMMETRIC.x_l:g} and {SYMMETRIC.x_r:g} m."
+            " Where the arms are equal, and the start is symmetric to the last bit, the object never moves and its mass"
+            f" does not matter: No. 1 and No. 11 settle after {even[0]:.2f} and {even[1]:.2f} s. It is a knife-edge"
+            f" (above): from {NEARLY.x_l:g} and {NEARLY.x_r:g} m they need {near[0]:.1f} and {near[1]:.1f} s, from the"
+            f" printed start {odd[0]:.1f} and {odd[1]:.0f} s. Comparing Fig. 2 with Figs. 6 to 9 compares starts as"
+            " well.",
+        "x_o(0)": "Not printed. Read as 0, in the middle of the axes of Figs. 2 to 12.",
+        "Step of the integration":
             "Not printed; what it does to the figures stands above, under the paper's own method.",
-        ),
-        (
-            "Lyapunov's method in noncontact (p. 245)",
-            (
-                "The text says that the method cannot decide there, since V_o of (33) does not see x_o, and goes on"
-                " part by part, (29) to (37). It can: where both pairs are apart x_l < x_o < x_r, so that V of (28)"
-                " is 0 only where x_l = x_r = 0 encloses x_o = 0 and nothing moves; and where one separates faster than"
-                " 1/p something moves, so that V > 0. (28) is positive definite as it is printed; (29) to (37) are a"
-                " detour."
-            ),
-        ),
-        (
-            '"In Fig. 1"',
+        "Lyapunov's method in noncontact (p. 245)":
+            "The text says that the method cannot decide there, since V_o of (33) does not see x_o, and goes on part by"
+            " part, (29) to (37). It can: where both pairs are apart x_l < x_o < x_r, so that V of (28) is 0 only where"
+            " x_l = x_r = 0 encloses x_o = 0 and nothing moves; and where one separates faster than 1/p something"
+            " moves, so that V > 0. (28) is positive definite as it is printed; (29) to (37) are a detour.",
+        '"In Fig. 1"':
             "The sentence on where x_l is larger than x_o (p. 246) can only mean Fig. 2: Fig. 1 is the model.",
-        ),
-    ]
+    }

@@ -37,9 +37,9 @@ _BY_HAND = "V and the sum of its parts against the printed sum by hand, relative
 _POSITIVE = f"smallest V / x'x of {DRAWS} random states in m and m/s"
 _LOSSES = "V differentiated, and V_rate, against the printed rate by hand, in the largest rate"
 _PART = "differentiated against -2 C x'^2, in the largest V'"
-_BOUND = "physics.lyapunov.largest_deformation, lab.paper.quadratic_form.deformation_bound"
+_BOUND = "physics.lyapunov.largest_deformation, physics.reach.reach"
 _LARGEST = "smallest of (5 V_c(0) / 4H)^(2/5) over the largest deformation, less 1"
-_FIT = "lab.paper.quadratic_form.A", "a fitted to the motion, its distance from 4/5"
+_FIT = _V, "a fitted to the motion, its distance from 4/5"
 AT_EVENTS = "(10) at events"  # the second row of (10)
 EQUATIONS = {row.number: row for row in (
     Equation("(1)", "motion of the left arm", "lab.reference.grasp.acceleration", _DIFFERENTIATED, 1e-8),
@@ -57,16 +57,12 @@ EQUATIONS = {row.number: row for row in (
              "places where the condition and the located events disagree", 0.0),
     Equation(AT_EVENTS, "touch and release at u = 0", "exact.automaton.modes.make_transition",
              "largest |u| at an event, m", 1e-15),
-    Equation("(11)", "V = x' P(x) x", "lab.paper.quadratic_form.quadratic_form",
-             "x' P x, with P by hand and without, against V, relative", 1e-13, ALGEBRA),
-    Equation("(12)", "P(x)", "lab.paper.quadratic_form.matrix", "its 36 entries against (12) by hand, relative", 1e-15,
-             ALGEBRA),
+    Equation("(11)", "V = x' P(x) x", _V, "V against x' P x, with P by hand, relative", 1e-13, ALGEBRA),
+    Equation("(12)", "P(x)", _PARTS, "the sum of V's parts against x' P x, with P by hand, relative", 1e-13, ALGEBRA),
     Equation("(13)", "order of the state", "physics.layout.X, V",
              "x_l, x_o, x_r differentiated against the columns behind them, relative", 1e-9),
-    Equation("(14)", "Delta k of the left contact", "lab.paper.quadratic_form.contact_stiffness", _SOFTER, 1e-12,
-             ALGEBRA),
-    Equation("(15)", "Delta k of the right contact", "lab.paper.quadratic_form.contact_stiffness", _SOFTER, 1e-12,
-             ALGEBRA),
+    Equation("(14)", "Delta k of the left contact", _PARTS, _SOFTER, 1e-12, ALGEBRA),
+    Equation("(15)", "Delta k of the right contact", _PARTS, _SOFTER, 1e-12, ALGEBRA),
     Equation("(16)", "V, both in contact", f"{_PARTS}; {_V}", _BY_HAND, 1e-14, ALGEBRA),
     Equation("(17)", "V > 0 for x != 0, both in contact", _V, _POSITIVE, 0.0, ALGEBRA, margin=True),
     Equation("(18)", "V', both in contact", _RATE, _LOSSES, 1e-7),

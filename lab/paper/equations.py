@@ -13,7 +13,7 @@ from grasp_ros.physics import lyapunov
 from grasp_ros.physics.layout import LEFT, RIGHT, Transition, X
 from grasp_ros.physics.model import impact_force, in_contact, penetration
 from grasp_ros.scene import SceneError
-from lab.paper import by_hand, quadratic_form
+from lab.paper import by_hand
 from lab.paper.cases import Cases, with_values
 from lab.paper.conditions import condition_rows
 from lab.paper.equation_table import AT_EVENTS, Equation, rows
@@ -79,23 +79,19 @@ def condition_equations(samples: list[Sample]) -> dict[str, float]:
 
 def form_equations(samples: list[Sample]) -> dict[str, float]:
     """(11) to (15)."""
-    form, order, stiffness, entries = 0.0, 0.0, np.zeros(2), 0.0
+    worst = dict.fromkeys(("(11)", "(12)", "(13)", "(14)", "(15)"), 0.0)
     for sample in samples:
-        y = sample.state
-        P = quadratic_form.matrix(sample.system, y)
-        written = np.array([by_hand.matrix(sample.scene, each) for each in y])
-        entries = max(entries, float(np.abs(P - written).max() / np.abs(written).max()))
-        squared = np.einsum("ni,nij,nj->n", y, written, y)
-        form = max(form, relative(squared, sample.level.V))
-        form = max(form, relative(quadratic_form.quadratic_form(sample.system, y), squared))
+        y, parts = sample.state, lyapunov.parts(sample.system, sample.state)
+        P = np.array([by_hand.matrix(sample.scene, each) for each in y])
+        squared = np.einsum("ni,nij,nj->n", y, P, y)
         moving = [x for x in (X.L, X.O, X.R) if y[:, x + 1].any()]  # the object of a symmetric case rests
-        order = max(order, *(relative(sample.rate[:, x], y[:, x + 1]) for x in moving))
-        for side, stored in enumerate(lyapunov.parts(sample.system, y)[3:]):
+        found = {"(11)": relative(sample.level.V, squared), "(12)": relative(np.sum(parts, axis=0), squared),
+                 "(13)": max(relative(sample.rate[:, x], y[:, x + 1]) for x in moving)}
+        for number, x, stored, side in (("(14)", X.L, parts.contact_l, LEFT), ("(15)", X.R, parts.contact_r, RIGHT)):
             if stored.max() > 0.0:
-                x = 0 if side == LEFT else 4
-                stiffness[side] = max(stiffness[side], relative(-P[:, x, 2] * sample.pair(side)[0] ** 2, stored))
-    return {"(11)": form, "(12)": entries, "(13)": order, "(14)": float(stiffness[LEFT]),
-            "(15)": float(stiffness[RIGHT])}
+                found[number] = relative(-P[:, x, X.O] * sample.pair(side)[0] ** 2, stored)
+        worst |= {number: max(worst[number], each) for number, each in found.items()}
+    return worst
 
 
 def equations(cases: Cases) -> list[Equation]:

@@ -29,6 +29,9 @@ PALE = 0.35  # of the standard case behind a changed one
 CONTACT_POINTS = 400
 IN_CONTACT = 60  # output times in each contact, so that no peak is cut
 PAGE = 170.0 / 25.4  # in, the width of a page in print
+STYLE = {  # letters and lines there
+    "font.size": 7.0, "axes.titlepad": 3.0, "axes.labelpad": 2.0, "axes.linewidth": 0.6, "lines.linewidth": 0.9,
+}
 
 
 class Pictured(NamedTuple):
@@ -55,36 +58,28 @@ def _fine(scene: Scene) -> Trajectory:
     return simulate(scene, grid=np.unique(np.concatenate([run.t, *inside])))
 
 
-def style() -> dict[str, object]:
-    """Letters and lines of a page in print."""
-    return {
-        "font.size": 7.0, "axes.titlepad": 3.0, "axes.labelpad": 2.0, "axes.linewidth": 0.6, "lines.linewidth": 0.9,
-    }
-
-
+@canvas.style(STYLE)
 def sheet(several: Sequence[Pictured]) -> Drawing:
     """All eleven in the layout of the paper: displacements above, inputs below."""
-    with canvas.style(style()):
-        figure: Drawing = canvas.figure(figsize=(PAGE, 8.9), layout="constrained")
-        cells: Any = figure.subfigures(4, 3, wspace=0.02, hspace=0.02)
-        cells = cells.ravel()
-        for cell, each in zip(cells, several, strict=False):
-            top, bottom = cell.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-            plots.displacements(top, each.run)
-            plots.inputs(bottom, each.run)
-            for axes in (top, bottom):
-                shade_contacts(axes, each.run)
-                axes.grid(alpha=0.25)
-                axes.set_xlim(0.0, each.run.scene.duration)
-            top.set_title(
-                _math(f"Fig. {each.figure.number}  {each.figure.change or 'standard'}"), fontsize="small", loc="left"
-            )
-            top.set_ylabel("displacement, m")
-            bottom.set_ylabel("input, N")
-            bottom.set_xlabel("time, s")
-        for cell in cells[len(several) :]:
-            _key(cell.subplots())
-        return figure
+    figure: Drawing = canvas.figure(figsize=(PAGE, 8.9), layout="constrained")
+    cells: Any = figure.subfigures(4, 3, wspace=0.02, hspace=0.02)
+    cells = cells.ravel()
+    for cell, each in zip(cells, several, strict=False):
+        top, bottom = cell.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        plots.displacements(top, each.run)
+        plots.inputs(bottom, each.run)
+        for axes in (top, bottom):
+            shade_contacts(axes, each.run)
+            axes.grid(alpha=0.25)
+            axes.set_xlim(0.0, each.run.scene.duration)
+        top.set_title(
+            _math(f"Fig. {each.figure.number}  {each.figure.change or 'standard'}"), fontsize="small", loc="left"
+        )
+        top.set_ylabel("displacement, m")
+        bottom.set(ylabel="input, N", xlabel="time, s")
+    for cell in cells[len(several) :]:
+        _key(cell.subplots())
+    return figure
 
 
 def _key(axes: Axes) -> None:
@@ -99,38 +94,38 @@ def _key(axes: Axes) -> None:
     axes.set_axis_off()
 
 
+@canvas.style(STYLE)
 def large(each: Pictured) -> Drawing:
     """One case: the paper's two panels, and below them what it does not draw; one contact and the losses beside."""
-    with canvas.style(style()):
-        figure: Drawing = canvas.figure(figsize=(PAGE, 6.9), layout="constrained")
-        halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
-        wide, narrow = halves
-        left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
-        for axes, (draw, label, _) in zip(left, plots.PANELS.values(), strict=False):
-            if each.beside is not None:
-                _behind(axes, draw, each.beside)
-            draw(axes, each.run)
-            axes.set_ylabel(label)
-        _losses(left[4], each.run)
-        for run in filter(None, (each.run, each.beside)):
-            settled, own = float(settling_times(run).max()), run is each.run
-            if settled <= run.scene.duration:
-                left[0].axvline(settled, color="black", linestyle="-.", alpha=1.0 if own else PALE,
-                                label=f"settled, {SETTLED:.0%}" if own else "_")
-        for axes in left:
-            shade_contacts(axes, each.run)
-            axes.grid(alpha=0.25)
-            axes.set_xlim(0.0, each.run.scene.duration)
-            legend_beside(axes)
-        left[-1].set_xlabel("time, s")
+    figure: Drawing = canvas.figure(figsize=(PAGE, 6.9), layout="constrained")
+    halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
+    wide, narrow = halves
+    left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
+    for axes, (draw, label, _) in zip(left, plots.PANELS.values(), strict=False):
         if each.beside is not None:
-            left[0].set_title("pale: No. 1 from the same start", fontsize="small", loc="right")
-        left[0].set_title(_math(each.figure.title), fontsize="medium", loc="left")
-        force, depth, bars = narrow.subplots(3, 1)
-        _one_contact((force, depth), each.run)
-        _bars(bars, each.run)
-        wide.align_ylabels(left)
-        return figure
+            _behind(axes, draw, each.beside)
+        draw(axes, each.run)
+        axes.set_ylabel(label)
+    _losses(left[4], each.run)
+    for run in filter(None, (each.run, each.beside)):
+        settled, own = float(settling_times(run).max()), run is each.run
+        if settled <= run.scene.duration:
+            left[0].axvline(settled, color="black", linestyle="-.", alpha=1.0 if own else PALE,
+                            label=f"settled, {SETTLED:.0%}" if own else "_")
+    for axes in left:
+        shade_contacts(axes, each.run)
+        axes.grid(alpha=0.25)
+        axes.set_xlim(0.0, each.run.scene.duration)
+        legend_beside(axes)
+    left[-1].set_xlabel("time, s")
+    if each.beside is not None:
+        left[0].set_title("pale: No. 1 from the same start", fontsize="small", loc="right")
+    left[0].set_title(_math(each.figure.title), fontsize="medium", loc="left")
+    force, depth, bars = narrow.subplots(3, 1)
+    _one_contact((force, depth), each.run)
+    _bars(bars, each.run)
+    wide.align_ylabels(left)
+    return figure
 
 
 def _math(text: str) -> str:
@@ -174,8 +169,7 @@ def _losses(axes: Axes, run: Trajectory) -> None:
         axes.stackplot(t, *values, labels=names, colors=colors, alpha=0.85, linewidth=0)
     else:
         axes.text(0.5, 0.5, "nothing is lost", ha="center", va="center", transform=axes.transAxes)
-    axes.set_ylim(0.0, 105.0)
-    axes.set_ylabel("lost, % of $V_c(0)$")
+    axes.set(ylim=(0.0, 105.0), ylabel="lost, % of $V_c(0)$")
 
 
 def _one_contact(panels: Sequence[Axes], run: Trajectory) -> None:
@@ -194,11 +188,9 @@ def _one_contact(panels: Sequence[Axes], run: Trajectory) -> None:
         panels[0].plot((fine.t - span[0]) * 1e3, force[:, side], color=color, linestyle=style)
         pressed = depth[:, side] > 0.0
         panels[1].plot(depth[pressed, side] * 1e3, force[pressed, side], color=color, linestyle=style)
-    panels[0].set_xlabel(f"ms after {span[0]:.3f} s")
-    panels[0].set_ylabel("impact force, N")
+    panels[0].set(xlabel=f"ms after {span[0]:.3f} s", ylabel="impact force, N")
     panels[0].set_title("one contact", fontsize="small")
-    panels[1].set_xlabel("deformation u, mm")
-    panels[1].set_ylabel("impact force, N")
+    panels[1].set(xlabel="deformation u, mm", ylabel="impact force, N")
     for axes in panels:
         axes.grid(alpha=0.25)
 

@@ -15,7 +15,7 @@ from grasp_ros.simulation import simulate
 from grasp_ros.simulation.chunk import HORIZONS, SETTLED, Setup
 from grasp_ros.simulation.ensemble import ensemble
 from grasp_ros.simulation.quantities import settled_distance
-from lab.paper.cases import OFFSETS, Start, columns_of, start_of, started, text_of, value_of
+from lab.paper.cases import OFFSETS, PLACES, Start, start_of, started, text_of, value_of
 
 STRETCH = 20.0  # s, the paper's time axis
 SAMPLE = 4e-3  # s, of means and of changes of a sign
@@ -34,28 +34,25 @@ class Motion(NamedTuple):
     lopsided: float  # largest |x_l + x_r|, in the larger initial displacement
 
 
-NAMES: Mapping[str, str] = {
-    "settling": "settling time, 2 %",
-    "settling_1": "settling time, 1 %",
-    "settling_5": "settling time, 5 %",
-    "swings": "settling time, 2 %, in swings of a free arm",
-    "rest": "V_c at 20 s in V_c(0)",
-    "size": "root mean square displacement of the arms over 20 s",
-    "frequency": "frequency of the arms over 20 s",
-    "input": "largest input force",
-    "lopsided": "largest |x_l + x_r| over 20 s",
-}
-UNITS: Mapping[str, str] = {"frequency": " Hz", "input": " N"}  # times have words of their own, the others none
-SHORT: Mapping[str, str] = {  # ratios, where there is little room
-    "settling": "settling time, ratio",
-    "rest": "$V_c$ at 20 s, ratio",
-    "size": "rms displacement, ratio",
-    "frequency": "frequency, ratio",
-    "input": "largest input, ratio",
-    "lopsided": "largest $|x_l + x_r|$, ratio",
-}
+class Measure(NamedTuple):
+    """What a number is called."""
+
+    name: str
+    short: str = ""  # where there is little room; the others are in no figure
+    unit: str = ""  # times have words of their own, the others none
 
 
+MEASURES: Mapping[str, Measure] = {
+    "settling": Measure("settling time, 2 %", "settling time"),
+    "settling_1": Measure("settling time, 1 %"),
+    "settling_5": Measure("settling time, 5 %"),
+    "swings": Measure("settling time, 2 %, in swings of a free arm"),
+    "rest": Measure("V_c at 20 s in V_c(0)", "$V_c$ at 20 s"),
+    "size": Measure("root mean square displacement of the arms over 20 s", "rms displacement"),
+    "frequency": Measure("frequency of the arms over 20 s", "frequency", " Hz"),
+    "input": Measure("largest input force", "largest input", " N"),
+    "lopsided": Measure("largest |x_l + x_r| over 20 s", "largest $|x_l + x_r|$"),
+}
 _MOTION = "motion"
 _KNOWN: dict[tuple[str, str], dict[Start, Any]] = {}  # by a scene but for its start, and what one run measures
 
@@ -88,7 +85,7 @@ def _measured(scene: Scene, starts: Sequence[Start], kind: str) -> Sequence[Any]
     if kind == _MOTION:
         return [_motion(started(scene, start)) for start in starts]
     outcome, bound = ("settling_time", BOUNDS[kind]) if kind in BOUNDS else ("peak_input", SETTLED)
-    rows = {key: values for key, values in columns_of(starts).items() if key.split(".")[0] in scene.values}
+    rows = {key: values for key, *values in zip(PLACES, *starts, strict=True) if key.split(".")[0] in scene.values}
     found = ensemble(scene, rows, (outcome,), setup=Setup(horizons=HORIZONS, settled=bound))
     if not found.done.all():
         raise RuntimeError(f"{scene.name}: {next(iter(found.stops.values()))}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from grasp_ros import scene as scenes
@@ -15,9 +13,9 @@ from grasp_ros.physics.model import Array, Contact, Mode, hertzian_force
 from grasp_ros.physics.system import COLUMN, System
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory, simulate
-from lab.paper.cases import Cases, Start, text_of
-from lab.paper.measures import MARGIN, measure, over, seconds, settlings
-from lab.paper.universal import Found
+from lab.paper.cases import text_of
+from lab.paper.measures import measure, seconds, settlings
+from lab.paper.universal import Found, threshold
 
 ROUNDING = 1e-12  # of V(0)
 BESIDE = 1e-9  # s, on both sides of an event
@@ -28,18 +26,6 @@ DRIFT = 1e-9  # of V_c or of a displacement, that counts as none
 EXACT = 1e-9  # s, an error of a time that counts as none
 ORDER = 0.1  # how much more than h^2 |u'' / u'| / 8 counts as of second order, since u'' is not constant
 SHARE = 1e-3  # of the clearance of (37) that rounding may take, in epsilon
-
-
-class Rates(NamedTuple):
-    """Extremes over one motion of 20 s."""
-
-    V_rise: float  # largest rise of the paper's V from one output time to the next, in V(0)
-    V_c_rise: float
-    rate: float  # largest V_rate by (18), in V(0) per s
-    flight: float  # largest |V_rate| with nothing in contact
-    clearance: float  # smallest margin of (37), in the larger epsilon
-    collision: float  # smallest of the collision terms of (18), W
-
 
 _RUNS: dict[str, Trajectory] = {}
 
@@ -55,77 +41,74 @@ def run_of(scene: Scene) -> Trajectory:
     return _RUNS[text]
 
 
-def rates(scene: Scene) -> Rates:
-    """The extremes of a motion."""
-    run = run_of(scene)
-    level = run.energy
-    start = float(level.V[0]) or 1.0
-    open_ = level.mode == int(Mode.NONE)
-    epsilon = largest_deformation(scene.system, run.state)[-1]
-    x_l, x_o, x_r = (run.state[:, COLUMN[body]] for body in (LEFT, OBJECT, RIGHT))
-    clearance = min(float((x_o - x_l + epsilon[LEFT]).min()), float((x_r + epsilon[RIGHT] - x_o).min()))
-    terms = [
-        2.0 * scene.system.pairs[side, Law.DISSIPATION] * hertzian_force(Contact(*scene.system.pairs[side]), u) * d * d
-        for side, u, d in pairs_of(scene.system, run.state)
-    ]
-    return Rates(
-        float(np.diff(level.V).max()) / start,
-        float(np.diff(level.V_c).max()) / start,
-        float(level.V_rate.max()) / start,
-        float(np.abs(level.V_rate[open_]).max(initial=0.0)) / start,
-        clearance / max(float(epsilon.max()), 1e-300),
-        min(float(term.min()) for term in terms),
-    )
-
-
+@threshold("rise of V between output times <= 1e-12 V(0)")
 def paper_V_falls(scene: Scene) -> Found:
     """The paper's V never rises, across events too."""
-    rise = rates(scene).V_rise
-    return Found(rise, rise <= ROUNDING)
+    return _rise(run_of(scene).energy.V)
 
 
+@threshold("rise of V_c between output times <= 1e-12 V(0)")
 def repaired_V_falls(scene: Scene) -> Found:
     """V_c never rises."""
-    rise = rates(scene).V_c_rise
+    return _rise(run_of(scene).energy.V_c)
+
+
+def _rise(level: Array) -> Found:
+    """The largest rise from one output time to the next, in the level of the begin."""
+    rise = float(np.diff(level).max() / level[0])
     return Found(rise, rise <= ROUNDING)
 
 
+@threshold("largest V' <= 1e-12 V(0) a second")
 def rate_is_never_positive(scene: Scene) -> Found:
     """V' of (18), (23), (31) to (34) is <= 0 in each condition of contact."""
-    rate = rates(scene).rate
+    level = run_of(scene).energy
+    rate = float(level.V_rate.max() / level.V[0])
     return Found(rate, rate <= ROUNDING)
 
 
+@threshold("clearance above -0.001 eps, with eps the largest deformation of the run", least=True)
 def enclosed(scene: Scene) -> Found:
     """(37): x_l - eps_l < x_o < x_r + eps_r; equality at the instant of the largest deformation."""
-    clearance = rates(scene).clearance
-    return Found(clearance, clearance >= -SHARE)
+    state = run_of(scene).state
+    epsilon = largest_deformation(scene.system, state)[-1]
+    x_l, x_o, x_r = (state[:, COLUMN[body]] for body in (LEFT, OBJECT, RIGHT))
+    clearance = min(float((x_o - x_l + epsilon[LEFT]).min()), float((x_r + epsilon[RIGHT] - x_o).min()))
+    share = clearance / max(float(epsilon.max()), 1e-300)
+    return Found(share, share >= -SHARE)
 
 
+@threshold("smallest p u' while u > 0: above -1", least=True)
 def separates_slowly(scene: Scene) -> Found:
-    """No pair separates faster than 1/p while it penetrates: the smallest p u' where u > 0."""
-    system, run = scene.system, run_of(scene)
-    slowest = [
+    """No pair separates faster than 1/p while it penetrates."""
+    system = scene.system
+    slowest = min(
         float((system.pairs[side, Law.DISSIPATION] * d)[u > 0.0].min(initial=0.0))
-        for side, u, d in pairs_of(system, run.state)
-    ]
-    return Found(min(slowest), min(slowest) > -1.0)
+        for side, u, d in pairs_of(system, run_of(scene).state)
+    )
+    return Found(slowest, slowest > -1.0)
 
 
+@threshold("smallest term >= 0 W", " W", least=True)
 def collision_term_lowers(scene: Scene) -> Found:
     """The collision terms of (18) are never negative."""
-    term = rates(scene).collision
+    pairs = scene.system.pairs
+    term = min(
+        float((2.0 * pairs[side, Law.DISSIPATION] * hertzian_force(Contact(*pairs[side]), u) * d * d).min())
+        for side, u, d in pairs_of(scene.system, run_of(scene).state)
+    )
     return Found(term, term >= 0.0)
 
 
+@threshold("V' = 0 in flight; lost more than 1 % of V(0)")
 def falls_only_in_contact(scene: Scene) -> Found:
     """V' is 0 without contact and V falls in contact."""
-    found = rates(scene)
-    level = run_of(scene).energy.V_c
-    lost = float(1.0 - level[-1] / level[0])
-    return Found(lost, found.flight == 0.0 and lost > 0.01)
+    level = run_of(scene).energy
+    lost = float(1.0 - level.V_c[-1] / level.V_c[0])
+    return Found(lost, not level.V_rate[level.mode == int(Mode.NONE)].any() and lost > 0.01)
 
 
+@threshold("all masses stay within 2 % before the limit of time")
 def converges(scene: Scene) -> Found:
     """All masses settle, within the time that is looked at."""
     time = measure(scene, "settling")
@@ -138,6 +121,7 @@ def converges_wherever(scene: Scene) -> Found:
     return Found(max(times), bool(np.isfinite(times).all()), seconds(times))
 
 
+@threshold(f"V_c changes by at most {DRIFT:g}")
 def keeps_V(scene: Scene) -> Found:
     """Neither grows nor decays: V_c stays what it is."""
     level = run_of(scene).energy.V_c
@@ -175,12 +159,14 @@ def nearest_return(scene: Scene, seconds: float) -> tuple[float, float]:
     return float(fine[int(np.argmin(close))]), float(close.min()) / level
 
 
+@threshold(f"it comes back to its start within {WHOLE:g} s, to {RETURN:g} of sqrt(V(0))", least=True)
 def returns(scene: Scene) -> Found:
     """A periodic motion comes back to its start within the paper's 20 s."""
     _, near = nearest_return(scene, WHOLE)
     return Found(near, near <= RETURN)
 
 
+@threshold(f"both impact forces above 0 N through the last {LAST:g} s", " N", least=True)
 def holds_on(scene: Scene) -> Found:
     """A grasp in the sense of a grip: both arms press the object all through the last second, N."""
     run = run_of(scene)
@@ -188,45 +174,27 @@ def holds_on(scene: Scene) -> Found:
     return Found(force, force > 0.0)
 
 
+@threshold(f"moved within 20 s: at most {DRIFT:g} of its displacement")
 def object_stays(scene: Scene) -> Found:
     """An object at rest off its origin stays where it is: how far it has moved after 20 s, in its displacement."""
-    offset = 0.5 * min(abs(scene.initial_state[0]), scene.initial_state[4])
-    run = run_of(scene.changed({"object.position_m": float(offset)}))
-    moved = float(np.abs(run.state[:, 2] - offset).max()) / float(offset)
-    return Found(moved, moved <= DRIFT)
+    _, moved = _off_origin(scene)
+    return Found(float(moved.max()), bool(moved.max() <= DRIFT))
 
 
+@threshold("moved before the first touch: 0")
 def object_rests_until_touched(scene: Scene) -> Found:
     """The same up to the first touch."""
-    offset = 0.5 * min(abs(scene.initial_state[0]), scene.initial_state[4])
-    run = run_of(scene.changed({"object.position_m": float(offset)}))
+    run, moved = _off_origin(scene)
     touches = run.event_table[run.event_table[:, 2] == Transition.TOUCH, 0]
-    before = run.t < (touches[0] if len(touches) else np.inf)
-    moved = float(np.abs(run.state[before, 2] - offset).max()) / float(offset)
-    return Found(moved, moved == 0.0)
+    before = moved[run.t < (touches[0] if len(touches) else np.inf)].max()
+    return Found(float(before), bool(before == 0.0))
 
 
-def first_contact_error(step: float, scene: Scene) -> Found:
-    """Error of the paper's interpolated time of the first contact, in s."""
-    error = abs(_first(_theirs(scene, step))[0] - _first(simulate(scene, grid=np.array([0.0])))[0])
-    return Found(error, error <= EXACT)
-
-
-def second_order(step: float, scene: Scene) -> Found:
-    """The same error over that of linear interpolation, at most |u'' / u'| h^2 / 8, with u'' before the touch."""
-    time, side, speed = _first(simulate(scene, grid=np.array([0.0])))
-    half = 0.5 * min(step, time)
-    before = simulate(scene, grid=time - half * np.array([2.0, 1.0, 0.0])).state
-    u = (before[:, 0] - before[:, 2]) if side == LEFT else (before[:, 2] - before[:, 4])
-    curved = float(u @ [1.0, -2.0, 1.0]) / half**2
-    allowed = abs(curved / speed) * step**2 / 8.0 + EXACT
-    share = abs(_first(_theirs(scene, step))[0] - time) / allowed
-    return Found(share, share <= 1.0 + ORDER)
-
-
-def _theirs(scene: Scene, step: float) -> Trajectory:
-    """The paper's method, output at both ends."""
-    return simulate(scene, grid=np.array([0.0, scene.duration]), method="paper", setting=step)
+def _off_origin(scene: Scene) -> tuple[Trajectory, Array]:
+    """A motion whose object begins off its origin, and how far it has moved, in its displacement."""
+    offset = float(0.5 * min(abs(scene.initial_state[0]), scene.initial_state[4]))
+    run = run_of(scene.changed({"object.position_m": offset}))
+    return run, np.abs(run.state[:, 2] - offset) / offset
 
 
 def _first(run: Trajectory) -> tuple[float, float, float]:
@@ -236,22 +204,45 @@ def _first(run: Trajectory) -> tuple[float, float, float]:
     return time, side, speed
 
 
+def _theirs(scene: Scene, step: float) -> Trajectory:
+    """The paper's method, output at both ends."""
+    return simulate(scene, grid=np.array([0.0, scene.duration]), method="paper", setting=step)
+
+
+@threshold(f"error of the first time of contact at most {EXACT:g} s", " s")
+def first_contact_error(step: float, scene: Scene) -> Found:
+    """Error of the paper's interpolated time of the first contact, in s."""
+    error = abs(_first(_theirs(scene, step))[0] - _first(simulate(scene, grid=np.array([0.0])))[0])
+    return Found(error, error <= EXACT)
+
+
+@threshold(f"error over h^2 |u'' / u'| / 8: at most {1.0 + ORDER:g}")
+def second_order(step: float, scene: Scene) -> Found:
+    """The same error over that of linear interpolation, at most |u'' / u'| h^2 / 8, with u'' before the touch."""
+    time, side, speed = _first(simulate(scene, grid=np.array([0.0])))
+    half = 0.5 * min(step, time)
+    before = simulate(scene, grid=time - half * np.array([2.0, 1.0, 0.0])).state
+    u = (before[:, 0] - before[:, 2]) if side == LEFT else (before[:, 2] - before[:, 4])
+    curved = float(u @ [1.0, -2.0, 1.0]) / half**2
+    allowed = abs(curved / speed) * step**2 / 8.0 + EXACT
+    share = first_contact_error(step, scene).value / allowed
+    return Found(share, share <= 1.0 + ORDER)
+
+
 def touches(run: Trajectory) -> int:
     """Touches of both sides."""
     return int(np.count_nonzero(run.event_table[:, 2] == Transition.TOUCH))
 
 
-def contacts_found(step: float, scene: Scene) -> float:
-    """Touches that the paper's method finds, over those that there are; on another path it can be more."""
-    return touches(_theirs(scene, step)) / max(touches(simulate(scene, grid=np.array([0.0, scene.duration]))), 1)
-
-
+@threshold("touches found over those that are there: at least 1", least=True)
 def none_missed(step: float, scene: Scene) -> Found:
-    """The paper's method finds no fewer touches than there are."""
-    share = contacts_found(step, scene)
+    """The paper's method finds no fewer touches than there are; on another path it can be more."""
+    there_are = touches(simulate(scene, grid=np.array([0.0, scene.duration])))
+    share = touches(_theirs(scene, step)) / max(there_are, 1)
     return Found(share, share >= 1.0)
 
 
+@threshold("it reaches the end, and has touched", " touches")
 def goes_on(step: float, scene: Scene) -> Found:
     """The paper's method reaches its end, however many touches come; their number."""
     run = _theirs(scene, step)
@@ -260,17 +251,6 @@ def goes_on(step: float, scene: Scene) -> Found:
 
 def without_object(scene: Scene) -> Scene:
     """The arms alone: nothing to collide with."""
-    kept = {
-        name: numbers
-        for name, numbers in scene.values.items()
-        if name not in ("object", "left_contact", "right_contact")
-    }
+    alone = ("object", "left_contact", "right_contact")
+    kept = {name: numbers for name, numbers in scene.values.items() if name not in alone}
     return scenes.compose(scene.name, kept)
-
-
-def collisions_help(cases: Cases, number: int, start: Start) -> Found:
-    """Settling time with the object over that of the arms alone."""
-    together, alone = (
-        over(scene, [start], "settling")[0] for scene in (cases[number], without_object(cases[number])))
-    share = together / alone if np.isfinite(alone) else (0.0 if np.isfinite(together) else 1.0)
-    return Found(share, share < 1.0 / MARGIN)

@@ -14,13 +14,15 @@ import jinja2
 from markupsafe import Markup
 
 from grasp_ros.scene.files import writing
-from lab.paper.answer import FIGURE
-from lab.paper.claims import Claim, Verdict
+from grasp_ros.scene.versions import versions
+from lab.paper.answer import FIGURE, answer
+from lab.paper.claims import Claim, Verdict, tally
+from lab.paper.definitions import PRINTS, SUBTITLE, SWEEPS, TITLE, definitions
 from lab.paper.equation_table import ALGEBRA, Equation
 from lab.paper.equations import CROSSING
 from lab.paper.printed import PRINTED
 from lab.paper.prints import Compared
-from lab.paper.results import Result
+from lab.paper.results import Beyond, results
 from lab.studies import pages
 
 Row = tuple[str, ...]
@@ -39,31 +41,17 @@ class Picture(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Everything that the page says."""
+    """Everything that was computed for the page."""
 
-    title: str
-    subtitle: str
-    answer: Sequence[str]  # ten lines
-    definitions: Sequence[tuple[str, str]]
-    summary: str
+    starts: int  # random ones
     claims: Sequence[Claim]
-    sweeps: str
     pictures: Sequence[Picture]
-    quantity_heads: Row
-    quantities: Sequence[Row]
-    prints: str  # how the figures of the paper are read
-    agreement: str
+    quantities: tuple[Row, Sequence[Row]]
     equations: Sequence[Equation]
-    results: Sequence[Result]
-    doubts: Sequence[tuple[str, str]]
+    found: Beyond
+    doubts: Mapping[str, str]
     replays: Sequence[dict[str, Any]]
-    origin: str
     images: Mapping[str, bytes]  # PNG
-
-
-def template(name: str) -> str:
-    """The text of a file of the templates."""
-    return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
 
 
 def write_html(report: Report, path: Path) -> None:
@@ -74,23 +62,12 @@ def write_html(report: Report, path: Path) -> None:
     Refused
         If it cannot be written.
     """
-    environment = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=False)
-    environment.filters["told"] = (told := _told(report.claims)).__getitem__
-    page = environment.from_string(template("page.html"))
     runs = json.dumps(list(report.replays), separators=(",", ":")).replace("<", "\\u003c")
-    text = page.render(
-        report=report,
-        css=Markup(template("page.css")),
-        js=Markup(template("replay.js")),
-        runs=Markup(runs),
-        model=_figure("svg+xml", template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
-        figure=lambda key, text: _figure("png", report.images[key], text),
-        beside=FIGURE,
-        printed=PRINTED,
-        signs=SIGNS,
-        told=told,
-    )
-    pages.put(path, text)
+    pages.put(path, _render(
+        "page.html", report, autoescape=True, css=Markup(_template("page.css")), js=Markup(_template("replay.js")),
+        runs=Markup(runs), figure=lambda key, text: _figure("png", report.images[key], text),
+        model=_figure("svg+xml", _template("model.svg").encode(), "The model, Fig. 1 of the paper, with the signs"),
+    ))
 
 
 def write_markdown(report: Report, path: Path) -> None:
@@ -101,28 +78,40 @@ def write_markdown(report: Report, path: Path) -> None:
     Refused
         If it cannot be written.
     """
-    environment = jinja2.Environment(autoescape=False, undefined=jinja2.StrictUndefined)
-    told = _told(report.claims)
-    environment.filters |= {"cell": _cell, "told": told.__getitem__}
     directory = path.parent / FIGURES
     with writing(directory):
         directory.mkdir(parents=True, exist_ok=True)
         for key, image in report.images.items():
             (directory / f"{key}.png").write_bytes(image)
-        (directory / "model.svg").write_text(template("model.svg"), encoding="utf-8")
-    text = environment.from_string(template("paper.md")).render(
-        report=report, beside=FIGURE, printed=PRINTED, signs=SIGNS, told=told)
+        (directory / "model.svg").write_text(_template("model.svg"), encoding="utf-8")
+    text = _render("paper.md", report, autoescape=False)
     pages.put(path, re.sub(r"\n{3,}", "\n\n", text).rstrip() + "\n")
+
+
+def _template(name: str) -> str:
+    return resources.files(__package__).joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _render(name: str, report: Report, *, autoescape: bool, **more: object) -> str:
+    """A template with what both pages say."""
+    environment = jinja2.Environment(autoescape=autoescape, undefined=jinja2.StrictUndefined)
+    # by the words of a part, the key of the first statement that has it: it is told there
+    told = {part.statement: claim.key for claim in reversed(report.claims) for part in claim.parts}
+    environment.filters |= {"cell": lambda text: text.replace("|", "\\|"), "told": told.__getitem__}
+    return environment.from_string(_template(name)).render(
+        report._asdict(), title=TITLE, subtitle=SUBTITLE, sweeps=SWEEPS, prints=PRINTS, printed=PRINTED, signs=SIGNS,
+        beside=FIGURE, told=told, answer=answer(report.claims, report.found), summary=summary(report.claims),
+        agreement=agreement(report.equations), results=results(report.found), definitions=definitions(report.starts),
+        origin="Computed with " + ", ".join(f"{name} {version}" for name, version in versions().items()) + ".", **more,
+    )
 
 
 def summary(claims: Sequence[Claim]) -> str:
     """How many statements hold."""
-    counted = [
-        sum(claim.verdict is verdict for claim in claims) for verdict in (Verdict.HOLDS, Verdict.LIMITED, Verdict.FAILS)
-    ]
+    holds, limited, fails = tally(claims)
     return (
-        f"Of {len(claims)} statements {counted[0]} hold, {counted[1]} hold within stated limits, and {counted[2]} do"
-        " not hold. A statement holds as far as its weakest part does; the parts and their checks stand below."
+        f"Of {len(claims)} statements {holds}, {limited}, and {fails}. A statement holds as far as its weakest part"
+        " does; the parts and their checks stand below."
     )
 
 
@@ -138,16 +127,7 @@ def agreement(rows: Sequence[Equation]) -> str:
     )
 
 
-def _told(claims: Sequence[Claim]) -> dict[str, str]:
-    """By the words of a part, the key of the first statement that has it: it is told there."""
-    return {part.statement: claim.key for claim in reversed(claims) for part in claim.parts}
-
-
 def _figure(kind: str, image: bytes, text: str) -> Markup:
     """An image within the page, and its caption."""
     form = Markup('<figure><img alt="{0}" src="data:image/{1};base64,{2}"><figcaption>{0}.</figcaption></figure>')
     return form.format(text.rstrip("."), kind, base64.b64encode(image).decode("ascii"))
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|")

@@ -6,36 +6,18 @@ curves themselves are not in it, and no value on a curve is read here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.plots import PAPER_DISPLACEMENT, PAPER_INPUT
-from lab.paper.cases import STANDARD, Cases, Figure, value_of
+from lab.paper.cases import ABSENT, LARGER, STANDARD, TENFOLD, Cases, Figure, value_of
 from lab.paper.claims import Claim, Verdict
 
 WIDTH = 0.01  # of an axis: a line that passes its end by less cannot be told from one that touches it
 LAST = 20.0  # s, at the end of the time axis of each figure
-TENFOLD, ABSENT, LARGER = "10 times", "no", "larger"
-CAPTIONS: Mapping[int, tuple[str, tuple[str, ...], str]] = {  # words of the print, letters that they name, and how much
-    2: ("Standard parameters", (), ""),
-    3: ("Marginally stable, perfect elastic collision", ("c", "Kv", "p"), ABSENT),
-    4: ("Marginally stable, collision with energy loss", ("c", "Kv"), ABSENT),
-    5: ("Standard with larger energy loss in collision", ("p",), LARGER),
-    6: ("10 times the masses, both manip.", ("m_l", "m_r"), TENFOLD),
-    7: ("10 times the mass, left manip.", ("m_l",), TENFOLD),
-    8: ("10 times the stiffness, both manip.", ("k",), TENFOLD),
-    9: ("10 times the damping coef., both manip.", ("c",), TENFOLD),
-    10: ("10 times the position feedback gains", ("Kp",), TENFOLD),
-    11: ("10 times the velocity feedback gains", ("Kv",), TENFOLD),
-    12: ("10 times the mass, object", ("m_o",), TENFOLD),
-}
-USED_BY: Mapping[int, tuple[str, ...]] = {  # statements that the paper draws from a figure beside Fig. 2, or says of it
-    2: (), 3: ("O1", "T12"), 4: ("O1",), 5: ("O2",), 6: ("O5",), 7: ("O8",), 8: ("O6",), 9: ("O7",), 10: ("O10",),
-    11: ("O11",), 12: ("O12",),
-}
 LETTERS = ("m_l", "m_r", "k", "c", "Kp", "Kv", "p", "H", "m_o")
 
 
@@ -70,19 +52,17 @@ class Compared(NamedTuple):
 
 def compared(figure: Figure, cases: Cases, claims: Sequence[Claim]) -> Compared:
     """Read a figure and judge it; `claims` are those of the whole paper."""
-    found = {claim.key: claim.verdict for claim in claims}
-    drawn = [(key, found[key]) for key in USED_BY[figure.number]]
+    drawn = [(claim.key, claim.verdict) for claim in claims if claim.key in figure.used_by]
     return Compared(list(_readings(figure, cases)), drawn)
 
 
 def _readings(figure: Figure, cases: Cases) -> Iterator[Reading]:
     scene = cases[figure.case]
-    words, letters, how = CAPTIONS[figure.number]
     changed = {letter: (value_of(cases[STANDARD], letter), value_of(scene, letter)) for letter in LETTERS}
     changed = {letter: pair for letter, pair in changed.items() if pair[0] != pair[1]}
     ours = ", ".join(f"{letter} {before:g} to {after:g}" for letter, (before, after) in changed.items()) or "Table 1"
-    right = set(changed) == set(letters) and all(_as_said(how, *pair) for pair in changed.values())
-    yield Reading("caption", words, "exact" if how != LARGER else "no number", ours, right)
+    right = set(changed) == set(figure.letters) and all(_as_said(figure.how, *pair) for pair in changed.values())
+    yield Reading("caption", figure.caption, "exact" if figure.how != LARGER else "no number", ours, right)
     yield Reading("time axis", f"0 to {LAST:g} s", "exact", f"0 to {scene.duration:g} s", scene.duration == LAST)
     run = simulate(scene)
     lowest, low = float(run.state[:, 0::2].min()), PAPER_DISPLACEMENT[0]

@@ -9,11 +9,9 @@ import numpy as np
 
 from grasp_ros.physics.system import NAMES
 from lab.paper.arms import MANY, STEPS, Damped, Stepped, Stiffer
-from lab.paper.beyond import SMALL, WITHIN, Chaos, Gap, Tail
-from lab.paper.cases import PRINTED, SYMMETRIC, Start
+from lab.paper.beyond import RETURN_SECONDS, SMALL, WITHIN, Chaos, Gap, Tail
+from lab.paper.cases import PRINTED, SYMMETRIC
 from lab.paper.knife_edge import MOVED, SMALLEST, VISIBLE, Edge
-
-Row = tuple[str, ...]
 
 
 class Result(NamedTuple):
@@ -22,8 +20,7 @@ class Result(NamedTuple):
     key: str  # of its figure
     title: str
     text: str
-    heads: Row
-    rows: Sequence[Row]
+    rows: Sequence[dict[str, str]]  # cells by their heads
 
 
 class Beyond(NamedTuple):
@@ -40,15 +37,8 @@ class Beyond(NamedTuple):
 
 def results(found: Beyond) -> list[Result]:
     """All of them."""
-    return [
-        _gap(found.gap),
-        _tail(found.tail),
-        _chaos(found.chaos),
-        _stiffer(found.stiffer),
-        _damped(found.damped),
-        _stepped(found.stepped),
-        _edge(found.edge),
-    ]
+    return [_gap(found.gap), _tail(found.tail), _chaos(found.chaos), _stiffer(found.stiffer), _damped(found.damped),
+            _stepped(found.stepped), _edge(found.edge)]
 
 
 def _gap(found: Gap) -> Result:
@@ -56,92 +46,57 @@ def _gap(found: Gap) -> Result:
     text = (
         "The proof shows that V falls within each condition of contact, and not that it does so between them. A pair"
         " that separates faster than 1/p while it penetrates is noncontact by (10): its Hertz term leaves V, and comes"
-        f" back where u' rises through -1/p. V then jumps up: {len(found.jumps)} times in the two motions of the"
-        f" table. V_c, which keeps the term"
-        f" whenever u > 0, never rises here (largest step {found.V_c_rise:.1e} V_c(0)), and docs/certificate.md proves"
-        " that it cannot. Where p is below sqrt(mu / V_c(0)) no pair can separate so fast and the printed proof is"
-        f" complete; that covers all of the paper's cases but No. {', '.join(unsafe) or 'none'}. What happens in"
-        f" those is"
-        " measured under C1."
+        f" back where u' rises through -1/p. V then jumps up: {len(found.jumps)} times in the two motions of the table."
+        f" V_c, which keeps the term whenever u > 0, never rises here (largest step {found.V_c_rise:.1e} V_c(0)), and"
+        " docs/certificate.md proves that it cannot. Where p is below sqrt(mu / V_c(0)) no pair can separate so fast"
+        " and the printed proof is complete; that covers all of the paper's cases but No."
+        f" {', '.join(unsafe) or 'none'}. What happens in those is measured under C1."
     )
-    rows = [
-        (name, f"{jump.time:.6f}", NAMES[jump.side], f"{1e3 * jump.u:.4f}", f"{jump.height:.6f}")
-        for name, jump in found.jumps
-    ]
-    return Result(
-        "gap",
-        "The gap in the proof, and its repair",
-        text,
-        ("scene", "t, s", "side", "u, mm", "V jumps up by, J"),
-        rows,
-    )
+    return Result("gap", "The gap in the proof, and its repair", text, [
+        {"scene": name, "t, s": f"{jump.time:.6f}", "side": NAMES[jump.side], "u, mm": f"{1e3 * jump.u:.4f}",
+         "V jumps up by, J": f"{jump.height:.6f}"} for name, jump in found.jumps])
 
 
 def _tail(found: Tail) -> Result:
     text = (
         "At the origin a contact has no linear stiffness, so that with C > 0 the end is algebraic and not exponential,"
         " but for a start that is symmetric to the last bit: there the object rests, V_c falls exponentially (No. 8),"
-        " and"
-        f" the contacts are those of each arm with a wall. V_c tends to (4/5) H (kappa t)^(-5/2), here with kappa ="
-        f" {found.kappa:.6g} /(m s), from the"
-        f" damping C, the stiffness K, H and m_o alone. No. 1 has V_c / law = {found.constant:.4f} after"
-        f" {found.t[-1]:g} s, falls like t^{found.slope:.3f} over the last decade, and has touched"
-        f" {found.contacts[-1]:.0f} times by then, like t^{found.touches_slope:.3f} (the law: t^0.75). The contacts"
-        " go on for ever. Where C = 0 kappa is 0, and the law says nothing of No. 3."
+        " and the contacts are those of each arm with a wall. V_c tends to (4/5) H (kappa t)^(-5/2), here with kappa ="
+        f" {found.kappa:.6g} /(m s), from the damping C, the stiffness K, H and m_o alone. No. 1 has V_c / law ="
+        f" {found.constant:.4f} after {found.t[-1]:g} s, falls like t^{found.slope:.3f} over the last decade, and has"
+        f" touched {found.contacts[-1]:.0f} times by then, like t^{found.touches_slope:.3f} (the law: t^0.75). The"
+        " contacts go on for ever. Where C = 0 kappa is 0, and the law says nothing of No. 3."
     )
-    rows = [
-        (f"{t:.3g}", f"{V:.3e}", f"{V / law:.4f}", f"{n:.0f}")
-        for t, V, law, n in zip(found.t, found.V_c, found.law, found.contacts, strict=True)
-    ]
     decades = [int(np.argmin(np.abs(found.t - 10.0**power))) for power in range(2, 6)]
-    return Result(
-        "tail",
-        "The end is algebraic",
-        text,
-        ("t, s", "V_c, J", "V_c / law", "touches"),
-        [rows[place] for place in dict.fromkeys(decades)],
-    )
+    return Result("tail", "The end is algebraic", text, [
+        {"t, s": f"{found.t[place]:.3g}", "V_c, J": f"{found.V_c[place]:.3e}",
+         "V_c / law": f"{found.V_c[place] / found.law[place]:.4f}", "touches": f"{found.contacts[place]:.0f}"}
+        for place in dict.fromkeys(decades)])
 
 
 def _chaos(found: Chaos) -> Result:
     text = (
         "Without any loss the motion neither grows nor decays, but it does not repeat either: two motions that begin"
-        f" {SMALL:g} sqrt(V(0)) apart are {found.far:.2g} sqrt(V(0)) apart after {found.apart[0][-1]:g} s. The largest"
-        f" Lyapunov exponent is {found.exponent:.3f} +- {found.error:.3f} /s over {found.t[-1]:g} s (standard error of"
-        f" ten blocks), a factor of {np.exp(20.0 * found.exponent):.1e} in the 20 s of Fig. 3. In {found.seconds:g} s"
-        f" the motion comes back to its start no nearer than some {found.near:.2g} sqrt(V(0)); after"
-        f" {-np.log(np.spacing(1.0)) / found.exponent:.0f} s or so what is computed is one of the motions that begin"
-        " within rounding of this one."
+        f" {SMALL:g} sqrt(V(0)) apart are {found.apart[1][-1]:.2g} sqrt(V(0)) apart after {found.apart[0][-1]:g} s. The"
+        f" largest Lyapunov exponent is {found.exponent:.3f} +- {found.error:.3f} /s over {found.t[-1]:g} s (standard"
+        f" error of ten blocks), a factor of {np.exp(20.0 * found.exponent):.1e} in the 20 s of Fig. 3. In"
+        f" {RETURN_SECONDS:g} s the motion comes back to its start no nearer than some {found.near:.2g} sqrt(V(0));"
+        f" after {-np.log(np.spacing(1.0)) / found.exponent:.0f} s or so what is computed is one of the motions that"
+        " begin within rounding of this one."
         " From a start that is symmetric to the last bit the object rests and the arms are periodic: the return is"
         f" within {found.periodic:.1e}, and the exponent of offsets that keep the symmetry tends to 0"
         f" ({found.symmetric:.3f} /s). Any other offset leaves that motion faster still, at {found.across:.2f} /s."
     )
-    rows = [
-        (
-            _at(PRINTED),
-            f"{found.exponent:.3f} +- {found.error:.3f}",
-            f"{found.near:.2g}",
-            f"{found.near_time:.0f}",
-        ),
-        (
-            f"{_at(SYMMETRIC)}, within symmetry",
-            f"{found.symmetric:.3f}",
-            f"{found.periodic:.1e}",
-            f"{found.periodic_time:.1f}",
-        ),
-        (f"{_at(SYMMETRIC)}, across it", f"{found.across:.3f}", "", f"over {WITHIN:g}"),
-    ]
-    return Result(
-        "chaos",
-        "No. 2 is chaos, not a periodic motion",
-        text,
-        ("start", "Lyapunov exponent, 1/s", "nearest return, sqrt(V(0))", "at, s"),
-        rows,
+    printed, symmetric = (f"x_l(0) = {start.x_l:g}, x_r(0) = {start.x_r:g} m" for start in (PRINTED, SYMMETRIC))
+    heads = "start", "Lyapunov exponent, 1/s", "nearest return, sqrt(V(0))", "at, s"
+    rows = (
+        (printed, f"{found.exponent:.3f} +- {found.error:.3f}", f"{found.near:.2g}", f"{found.near_time:.0f}"),
+        (f"{symmetric}, within symmetry", f"{found.symmetric:.3f}", f"{found.periodic:.1e}",
+         f"{found.periodic_time:.1f}"),
+        (f"{symmetric}, across it", f"{found.across:.3f}", "", f"over {WITHIN:g}"),
     )
-
-
-def _at(start: Start) -> str:
-    return f"x_l(0) = {start.x_l:g}, x_r(0) = {start.x_r:g} m"
+    cells = [dict(zip(heads, row, strict=True)) for row in rows]
+    return Result("chaos", "No. 2 is chaos, not a periodic motion", text, cells)
 
 
 def _edge(rows: Sequence[Edge]) -> Result:
@@ -160,22 +115,15 @@ def _edge(rows: Sequence[Edge]) -> Result:
         f" {named[7].settling[0]:.1f} and, from {MOVED[-1]:g} m, {named[7].settling[-1]:.1f} s. The same holds for the"
         " period of No. 2."
     )
-    table = [
-        (
-            f"No. {row.case}",
-            f"{row.rest:g}",
+    return Result("edge", "A symmetric start is a knife-edge", text, [{
+        f"case, from {SYMMETRIC.x_l:g}, {SYMMETRIC.x_r:g} m": f"No. {row.case}",
+        "asymmetry without offset, m": f"{row.rest:g}",
+        f"{1e3 * VISIBLE:g} mm after, s":
             f"{row.visible:.2f}" if np.isfinite(row.visible) else f"not in {row.t[-1]:g}",
-            f"{row.rate:.2f}" if np.isfinite(row.rate) else "",
-            *("never" if np.isinf(time) else f"{time:.2f}" for time in row.settling),
-        )
-        for row in rows
-    ]
-    heads = (
-        f"case, from {SYMMETRIC.x_l:g}, {SYMMETRIC.x_r:g} m", "asymmetry without offset, m", f"{1e3 * VISIBLE:g} mm"
-        f" after, s", "mean growth, 1/s",
-        *(f"settled, {offset:g} m beside, s" for offset in MOVED),
-    )
-    return Result("edge", "A symmetric start is a knife-edge", text, heads, table)
+        "mean growth, 1/s": f"{row.rate:.2f}" if np.isfinite(row.rate) else "",
+        **{f"settled, {offset:g} m beside, s": "never" if np.isinf(time) else f"{time:.2f}"
+           for offset, time in zip(MOVED, row.settling, strict=True)},
+    } for row in rows])
 
 
 def _stiffer(rows: Sequence[Stiffer]) -> Result:
@@ -194,17 +142,11 @@ def _stiffer(rows: Sequence[Stiffer]) -> Result:
         f" from k = {min(flat):g} to {max(flat):g} N/m cannot be told from the lowest, and at {last.k:g} N/m it is"
         f" {last.settling} s, {end}. Touches, speeds and shares are those of the first {min(MANY, last.starts)} starts."
     )
-    table = [
-        (f"{row.k:g}", str(row.settling), str(row.alone), f"{row.rate:.2f}", f"{row.speed:.2f}", f"{row.share:.0%}")
-        for row in rows
-    ]
-    return Result(
-        "stiffer",
-        "Stiffer arms settle sooner, up to a point",
-        text,
-        ("k, N/m", "settling time, s", "arms alone, s", "touches per s", "speed of approach, m/s", "lost to impacts"),
-        table,
-    )
+    return Result("stiffer", "Stiffer arms settle sooner, up to a point", text, [{
+        "k, N/m": f"{row.k:g}", "settling time, s": str(row.settling), "arms alone, s": str(row.alone),
+        "touches per s": f"{row.rate:.2f}", "speed of approach, m/s": f"{row.speed:.2f}",
+        "lost to impacts": f"{row.share:.0%}",
+    } for row in rows])
 
 
 def _damped(rows: Sequence[Damped]) -> Result:
@@ -218,21 +160,12 @@ def _damped(rows: Sequence[Damped]) -> Result:
         " object has no damper, takes energy over and gives it back. That the term of (18) is negative compares V'"
         " at one state, not two motions."
     )
-    table = [
-        (
-            f"{row.C:g}", str(row.together), str(row.alone) if np.isfinite(row.alone.middle) else "never",
-            f"{row.together.middle / row.alone.middle:.2f}" if np.isfinite(row.alone.middle) else "",
-            f"{row.later:.0%} +- {row.error:.0%}",
-        )
-        for row in rows
-    ]
-    return Result(
-        "damped",
-        "Collisions slow arms that are damped",
-        text,
-        ("C, N s/m", "with the object, s", "alone, s", "ratio", "starts with the object later"),
-        table,
-    )
+    return Result("damped", "Collisions slow arms that are damped", text, [{
+        "C, N s/m": f"{row.C:g}", "with the object, s": str(row.together),
+        "alone, s": str(row.alone) if np.isfinite(row.alone.middle) else "never",
+        "ratio": f"{row.together.middle / row.alone.middle:.2f}" if np.isfinite(row.alone.middle) else "",
+        "starts with the object later": f"{row.later:.0%} +- {row.error:.0%}",
+    } for row in rows])
 
 
 def _stepped(rows: Sequence[Stepped]) -> Result:
@@ -243,26 +176,12 @@ def _stepped(rows: Sequence[Stepped]) -> Result:
         f" state by linear interpolation) at 1 ms is off by up to {max(row.error for row in fine):.2g} m within 20 s,"
         f" at 10 ms by up to {max(row.error for row in coarse):.2g} m. In No. 2, where V_c is constant, it loses"
         f" {-elastic[STEPS[0]].drift:.1%} of it at 1 ms and {-elastic[STEPS[1]].drift:.0%} at 10 ms: a figure drawn"
-        f" that way"
-        f" shows a decay that is not there. It finds between {min(row.touches for row in rows):.0%} and"
+        f" that way shows a decay that is not there. It finds between {min(row.touches for row in rows):.0%} and"
         f" {max(row.touches for row in rows):.0%} of the touches; more than there are, where it is on another path by"
-        f" then."
+        " then."
     )
-    table = [
-        (
-            str(row.case),
-            f"{1e3 * row.step:g}",
-            f"{row.error:.2g}",
-            f"{row.drift:+.2g}",
-            f"{row.touches:.0%}",
-            f"{row.first:.1e}",
-        )
-        for row in rows
-    ]
-    return Result(
-        "stepped",
-        "What the paper's own method does to its figures",
-        text,
-        ("No.", "step, ms", "largest error, m", "V_c at 20 s off by, V_c(0)", "touches found", "first touch off by, s"),
-        table,
-    )
+    return Result("stepped", "What the paper's own method does to its figures", text, [{
+        "No.": str(row.case), "step, ms": f"{1e3 * row.step:g}", "largest error, m": f"{row.error:.2g}",
+        "V_c at 20 s off by, V_c(0)": f"{row.drift:+.2g}", "touches found": f"{row.touches:.0%}",
+        "first touch off by, s": f"{row.first:.1e}",
+    } for row in rows])

@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 from grasp_ros.scene import Scene
-from lab.paper.cases import (
-    NUMBERS,
-    PRINTED,
-    READ_P,
-    SEED,
-    STANDARD,
-    Cases,
-    Start,
-    read_starts,
-    started,
-    with_values,
-)
+from lab.paper.cases import NUMBERS, PRINTED, READ_P, SEED, STANDARD, Cases, Start, read_starts, started, with_values
 from lab.paper.claims import Check, Kind, Part, almost_all
 
 FEW = 20  # random starts of each case
@@ -33,23 +23,43 @@ class Found(NamedTuple):
     text: str = ""  # where the number alone would say more than is known
 
 
-Test = Callable[[Scene], Found]
+class Test(NamedTuple):
+    """What finds a number in a scene, or in some cases from a start; its threshold in words, and how it is printed."""
+
+    find: Callable[..., Found]
+    threshold: str
+    unit: str = ""
+    least: bool = False  # whether the smallest of several numbers is the one to print, not the largest
+
+    def __call__(self, *asked: Any) -> Found:
+        """What is found."""
+        return self.find(*asked)
+
+    def of(self, *first: Any) -> Test:
+        """The same with its first arguments."""
+        return self._replace(find=partial(self.find, *first))
+
+    def text(self, found: Found) -> str:
+        """A number to print."""
+        return found.text or f"{found.value:.3g}{self.unit}"
+
+
+def threshold(words: str, unit: str = "", *, least: bool = False) -> Callable[[Callable[..., Found]], Test]:
+    """Make a function a test."""
+    return lambda find: Test(find, words, unit, least)
 
 
 class Universal(NamedTuple):
     """A statement about each of some cases."""
 
     statement: str
-    threshold: str
-    test: Test
+    test: Test  # of a scene
     why: str
     cases: tuple[int, ...] = NUMBERS
     letter: str = ""  # of the parameter that is swept
     values: tuple[float, ...] = ()
-    least: bool = False  # whether the smallest number is the one to print, not the largest
-    extra: tuple[tuple[str, Callable[[Cases], Scene]], ...] = ()  # other scenes that the words include: text, scene
-    unit: str = ""
     base: int = STANDARD  # the case that the sweep begins from
+    extra: tuple[tuple[str, Callable[[Cases], Scene]], ...] = ()  # other scenes that the words include: text, scene
     reading: bool = False
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
@@ -71,7 +81,7 @@ class Universal(NamedTuple):
             found = [self.test(with_values(cases[LARGER], {"p": p})) for p in READ_P]
             checks.append(self._all(Kind.READING, f"p of No. {LARGER}: {', '.join(map(str, READ_P))} s/m", found))
         checks += [self._all(Kind.READING, text, [self.test(build(cases))]) for text, build in self.extra]
-        return Part(self.statement, self.threshold, self.why, checks, self.reading)
+        return Part(self.statement, self.test.threshold, self.why, checks, self.reading)
 
     def _random(self, cases: Cases, few: Sequence[Start]) -> list[Check]:
         """Cases of which it is always, or never, true together, and others by themselves: none hides in a crowd."""
@@ -98,9 +108,8 @@ class Universal(NamedTuple):
         return f"; not in No. {', '.join(failing)}" if failing else ""
 
     def _extreme(self, found: Sequence[Found]) -> str:
-        name, best = ("smallest", min) if self.least else ("largest", max)
-        each = best(found, key=lambda each: each.value)
-        text = each.text or f"{each.value:.3g}{self.unit}"
+        name, best = ("smallest", min) if self.test.least else ("largest", max)
+        text = self.test.text(best(found, key=lambda each: each.value))
         return f"{name} {text}" if len(found) > 1 else text
 
 
@@ -108,20 +117,18 @@ class Share(NamedTuple):
     """How many of the random starts a statement is true of, with the same start for every case that it needs."""
 
     statement: str
-    threshold: str
-    test: Callable[[Cases, Start], Found]
+    test: Test  # of the cases and a start
     why: str
     of: tuple[int, ...]  # the cases that the test looks at
-    unit: str = ""
-    starts: int = 2 * FEW  # at most
     letter: str = ""  # swept in the first of the cases
     values: tuple[float, ...] = ()
+    starts: int = 2 * FEW  # at most
     reading: bool = False
 
     def judge(self, cases: Cases, starts: Sequence[Start]) -> Part:
         """Test and check."""
         own = self.test(cases, PRINTED)
-        checks = [Check(Kind.PRINTED, "from the printed start", self._text(own), float(own.holds), own.holds)]
+        checks = [Check(Kind.PRINTED, "from the printed start", self.test.text(own), float(own.holds), own.holds)]
         drawn = [self.test(cases, start) for start in starts[: self.starts]]
         checks.append(self._many(Kind.RANDOM, f"seed {SEED}", drawn))
         first = self.of[0]
@@ -132,17 +139,14 @@ class Share(NamedTuple):
             checks.append(self._many(Kind.SWEEP, text, found))
         for name, start in read_starts(*(cases[number] for number in self.of)).items():
             each = self.test(cases, start)
-            checks.append(Check(Kind.READING, name, self._text(each), float(each.holds), each.holds))
-        return Part(self.statement, self.threshold, self.why, checks, self.reading)
-
-    def _text(self, found: Found) -> str:
-        return found.text or f"{found.value:.3g}{self.unit}"
+            checks.append(Check(Kind.READING, name, self.test.text(each), float(each.holds), each.holds))
+        return Part(self.statement, self.test.threshold, self.why, checks, self.reading)
 
     def _many(self, kind: Kind, text: str, drawn: Sequence[Found]) -> Check:
         share = sum(found.holds for found in drawn) / len(drawn)
         values = sorted(found.value for found in drawn)
         value = (
-            f"{100.0 * share:.3g} % of {len(drawn)}; {values[len(values) // 2]:.3g}{self.unit} in the middle, "
+            f"{100.0 * share:.3g} % of {len(drawn)}; {values[len(values) // 2]:.3g}{self.test.unit} in the middle, "
             f"from {values[0]:.3g} to {values[-1]:.3g}"
         )
         return Check(kind, text, value, share, almost_all(share), len(drawn))

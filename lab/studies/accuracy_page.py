@@ -26,7 +26,7 @@ from lab.studies import (
     speed,
     stability,
 )
-from lab.studies.contenders import OURS, all_contenders
+from lab.studies.contenders import all_contenders
 from lab.studies.records import Journal, write_csv
 
 LOOP_SCENE = "case_01"
@@ -59,7 +59,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     if quick:
         *subjects, case = (scene.changed({"time.duration_s": QUICK_S}) for scene in (*subjects[:2], case))
     records = accuracy.run(subjects, directory, measure.QUICK if quick else measure.FULL, [
-        contender for contender in all_contenders() if contender.family == OURS or not quick])
+        contender for contender in all_contenders(case) if contender.family == "grasp_ros" or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
     limits = stability.limits(grasp_of(case).left)

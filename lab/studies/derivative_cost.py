@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -16,6 +16,7 @@ from grasp_ros.sensitivity.directions import directions
 from grasp_ros.simulation.differentiate import carry, complete
 from grasp_ros.simulation.simulate import GRID_POINTS, simulate
 from lab.studies import pages
+from lab.studies.turns import in_turn
 
 NUMBERS = [
     f"{side}_{number}" for side in ("left", "right") for number in (
@@ -27,14 +28,14 @@ ROUNDS = 80
 
 
 def run() -> str:
-    """A table of Markdown: the quickest of ROUNDS, in turn."""
+    """A table of Markdown: the least time of the processor of ROUNDS, in turn."""
     scene, rows = scenes.load("case_01"), []
     for times in (np.array([scene.duration]), np.linspace(0.0, scene.duration, GRID_POINTS)):
-        without, *others = quickest([
+        without, *others = map(min, in_turn([
             partial(simulate, scene, grid=times),
             *(partial(states_alone, scene, NUMBERS[:count], times) for count in (1, len(NUMBERS))),
             *(partial(simulate, scene, grid=times, sensitivity=NUMBERS[:count]) for count in (1, len(NUMBERS))),
-        ])
+        ], ROUNDS, time.thread_time))
         rows.append((f"{len(times)}", f"{1e3 * without:.2f}", *(f"{seconds / without:.1f}" for seconds in others)))
     heads = ("output times", "`simulate`, ms", "states by 1 number", "by 12", "`sensitivity` by 1", "by 12")
     return pages.table(heads, rows)
@@ -47,14 +48,3 @@ def states_alone(scene: Scene, keys: Sequence[str], times: Array) -> Array:
     complete(scene, integrator, False, times)
     carrier.finish(scene.duration)
     return carrier.out
-
-
-def quickest(calls: Sequence[Callable[[], object]]) -> list[float]:
-    """Least time of the processor of each call in s, all of them in turn."""
-    best = [np.inf] * len(calls)
-    for _ in range(ROUNDS):
-        for place, call in enumerate(calls):
-            begin = time.thread_time()
-            call()
-            best[place] = min(best[place], time.thread_time() - begin)
-    return best

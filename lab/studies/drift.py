@@ -53,7 +53,7 @@ def run(directory: Path, seconds: float = SECONDS, methods: dict[str, float] | N
     """Energy drift of each method; resumes from the journal."""
     journal, scene = Journal(directory), elastic(seconds)
     chosen = ENTRIES if methods is None else methods
-    contenders = {contender.name: contender for contender in all_contenders()}
+    contenders = {contender.name: contender for contender in all_contenders(scene)}
     results = []
     for name, setting in (bar := tqdm(chosen.items(), unit="method", file=sys.stderr)):
         bar.set_description(f"energy drift {name}")

@@ -32,6 +32,7 @@ from grasp_ros.simulation.ticks import tick_times
 from lab.drills import recorder
 from lab.studies import page_figures, pages
 from lab.studies.segment_clock import SegmentClock
+from lab.studies.turns import in_turn
 
 PAGE, SCENE, BARE = "costs", "case_01", "bare"
 REPEATS, SAMPLED_REPEATS = 31, 21
@@ -133,8 +134,11 @@ def measure(found: Mapping[str, Scene]) -> dict[str, Cost]:
     for _ in tqdm(range(REPEATS), desc="continuous", file=sys.stderr):
         for name, scene in found.items():
             np.minimum(least[name][1], _segments(scene)[1], out=least[name][1])
-    sampled = _fastest({name: partial(simulate, scene, sampled=True) for name, scene in found.items()}, "sampled")
-    physics = _fastest({name: physics_of(scene) for name, scene in found.items()}, "physics")
+    several = list(found.values())
+    sampled, physics = (  # of the processor, which counts no neighbours
+        dict(zip(found, map(min, in_turn(calls, SAMPLED_REPEATS, time.thread_time, what)), strict=True))
+        for what, calls in (("sampled", [partial(simulate, scene, sampled=True) for scene in several]),
+                            ("physics", [physics_of(scene) for scene in several])))
     return {
         name: Cost(_average(*least[name], Kind.FLIGHT), _average(*least[name], Kind.CONTACT),
                    sampled[name] / scene.ticks, physics[name] / scene.ticks, _bag_size(scene))
@@ -168,17 +172,6 @@ def physics_of(scene: Scene) -> Callable[[], Array]:
         return integrator.state
 
     return again
-
-
-def _fastest(runs: Mapping[str, Callable[[], object]], what: str) -> dict[str, float]:
-    """Least time of each run in s of the processor, which counts no neighbours; they take turns."""
-    times = dict.fromkeys(runs, math.inf)
-    for _ in tqdm(range(SAMPLED_REPEATS), desc=what, file=sys.stderr):
-        for name, call in runs.items():
-            begin = time.thread_time()
-            call()
-            times[name] = min(times[name], time.thread_time() - begin)
-    return times
 
 
 def _bag_size(scene: Scene) -> float:

@@ -48,11 +48,14 @@ def style(method: str) -> dict[str, Any]:
     }
 
 
+@canvas.style()
 def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
     """Error against time, one panel a scene, with the frontier that no method passes."""
     scenes = by_scene(records)
-    figure, panels = _panels(len(scenes) + 1)
-    for axes, (name, here) in zip(panels, scenes.items(), strict=False):
+    columns, rows = min(len(scenes) + 1, 3), -(-(len(scenes) + 1) // 3)
+    figure, grid = canvas.subplots(
+        rows, columns, figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained", squeeze=False)
+    for axes, (name, here) in zip(grid.flat, scenes.items(), strict=False):
         for method, group in by_method(here).items():
             good = [record for record in group if record.good]
             axes.plot(*_points(good), **style(method))
@@ -71,7 +74,9 @@ def work_precision(records: Sequence[Record], metric: str, path: Path) -> None:
             )
         axes.set(xscale="log", yscale="log", ylim=(1e-14, 1e2), xlabel="fastest warm run, s")
         axes.grid(alpha=0.25, which="major")
-    _method_legend(panels[len(scenes)], list(by_method(records)))
+    for axes in grid.flat[len(scenes) :]:
+        axes.axis("off")
+    _method_legend(grid.flat[len(scenes)], list(by_method(records)))
     figure.supylabel("error: " + metric.replace(", against", ",\nagainst"), fontsize="small")
     save(figure, path, DPI)
 
@@ -82,7 +87,6 @@ def _points(records: Sequence[Record]) -> tuple[list[float], list[float]]:
 
 
 def _method_legend(axes: Axes, methods: list[str]) -> None:
-    axes.axis("off")
     handles = [Line2D([], [], label=method, **style(method)) for method in methods]
     handles += [
         Line2D([], [], color="#f0e442", linewidth=7.0, alpha=0.6, label="best of all: the frontier"),
@@ -224,16 +228,3 @@ def stability(curves: dict[str, tuple[Any, Any]], points: Any, limits: dict[str,
     axes.legend(fontsize=8)
     axes.grid(alpha=0.25)
     save(figure, path, DPI)
-
-
-@canvas.style()
-def _panels(number: int) -> tuple[Any, list[Axes]]:
-    columns = min(number, 3)
-    rows = -(-number // columns)
-    figure, grid = canvas.subplots(
-        rows, columns, figsize=(WIDTH * columns, HEIGHT * rows), layout="constrained", squeeze=False
-    )
-    panels = list(grid.flat)
-    for spare in panels[number:]:
-        spare.axis("off")
-    return figure, panels

@@ -27,8 +27,7 @@ def settling(found: Settling, path: Path) -> None:
     figure.suptitle(title, fontsize="medium")
     for axes, plan, data in zip(both, (found.plan, found.zoom), (found.data, found.zoomed), strict=True):
         heat(axes, plan, data["settling_time"].values, "settling time, s")
-        axes.set_xlabel(GAIN)
-        axes.set_ylabel(LOSS)
+        axes.set(xlabel=GAIN, ylabel=LOSS)
     y, x = found.zoom.axes
     both[0].add_patch(Rectangle((x.low, y.low), x.high - x.low, y.high - y.low, fill=False, color="#d55e00"))
     both[1].set_title("the window in which neighbours differ most", fontsize="small")

@@ -43,15 +43,16 @@ def _predict(scene: Scene, seconds: float) -> Prediction:
     grid = np.linspace(0.0, seconds, POINTS)
     signs = np.random.default_rng(1990).choice([-1.0, 1.0], size=(RUNS, 6))
     start = scene.initial_state
-    plain = _states(scene, start, grid)
-    shifted = [_states(scene, start + ROUNDINGS * np.spacing(np.abs(start)) * sign, grid) for sign in signs]
+    plain = states_from(scene, start, grid)
+    shifted = [states_from(scene, start + ROUNDINGS * np.spacing(np.abs(start)) * sign, grid) for sign in signs]
     distance = np.maximum.accumulate(np.abs(np.array(shifted) - plain).max(axis=(0, 2)))
     own = np.linspace(0.0, scene.duration, POINTS)
-    plain = _states(scene, start, own)
+    plain = states_from(scene, start, own)
     pushes = SMALL * np.abs(start).max() * signs
-    grown = max(np.abs(_states(scene, start + push, own) - plain).max() for push in pushes)
+    grown = max(np.abs(states_from(scene, start + push, own) - plain).max() for push in pushes)
     return Prediction(scene.name, grid, distance, float(grown / np.abs(pushes).max()))
 
 
-def _states(scene: Scene, start: Array, grid: Array) -> Array:
+def states_from(scene: Scene, start: Array, grid: Array) -> Array:
+    """States (n, 6) of the motion of a scene that begins in another state (6,), at times in s."""
     return Integrator(system_of(grasp_of(scene), start), continuous=True).advance(float(grid[-1]), grid)

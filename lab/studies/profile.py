@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -17,6 +16,7 @@ from grasp_ros.exact.driver.workspace import new_workspace
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.physics.layout import LANES, LEFT, V, Work, Z
 from grasp_ros.scene import Scene
+from lab.studies.turns import in_turn
 
 RUNS = 100
 EXPANSIONS = 1000
@@ -58,19 +58,10 @@ def profile(scene: Scene, accuracy: float) -> Profile:
         lambda: integrate(grid[-1:]),
         lambda: expand_often(tables.c, tables.f, bodies, system.pairs, order, EXPANSIONS),
     ]
-    times: list[list[float]] = [[] for _ in parts]
-    for _ in range(RUNS):
-        for part, column in zip(parts, times, strict=True):
-            part()
-            begin = time.perf_counter()
-            part()
-            column.append(time.perf_counter() - begin)
-    call, outputs, end, expansions = (statistics.median(column) for column in times)
+    call, outputs, end, expansions = map(statistics.median, in_turn(parts, RUNS))
     work = integrate(grid[-1:]).work
-    return Profile(
-        scene.name, accuracy, order, int(work[Work.CONTACT_STEPS]), call, outputs, end,
-        expansions / EXPANSIONS,
-    )
+    steps = int(work[Work.CONTACT_STEPS])
+    return Profile(scene.name, accuracy, order, steps, call, outputs, end, expansions / EXPANSIONS)
 
 
 @kernel

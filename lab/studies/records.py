@@ -8,6 +8,7 @@ import json
 import os
 import platform
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
@@ -17,12 +18,13 @@ from grasp_ros.exact.compilation.kernel_cache import sources_digest
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene import Scene
 from grasp_ros.scene.files import decoding, read_text, writing
+from grasp_ros.scene.versions import versions
 
 KIND = "the journal of a study"
 LARGE = 2**63  # no count of a study is
 MOST_BYTES = 2**26  # of a journal
 T = TypeVar("T")
-PACKAGES = ("grasp_ros", "numpy", "numba", "llvmlite", "rclpy", "rosbags", "scipy", "scikit-sundae", "heyoka")
+PEERS = ("scipy", "scikit-sundae", "heyoka")
 ADAPTED = {"SUNDIALS": "scikit-sundae"}  # family of a contender: the package, where the names differ
 
 
@@ -32,14 +34,12 @@ def describe_machine() -> dict[str, str]:
     model = platform.processor()
     if cpu.exists():
         model = next((line.split(": ")[1] for line in cpu.read_text().splitlines() if "model name" in line), model)
-    packages = {}
-    for name in PACKAGES:
-        try:
-            packages[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            packages[name] = "not installed"
+    peers = dict.fromkeys(PEERS, "not installed")
+    for name in PEERS:
+        with suppress(metadata.PackageNotFoundError):
+            peers[name] = metadata.version(name)
     system = f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors"
-    return {"system": system, "cpu": model, "python": platform.python_version(), **packages}
+    return {"system": system, "cpu": model, **versions(), **peers}
 
 
 def digest(*parts: object) -> str:

@@ -15,8 +15,9 @@ from grasp_ros.physics import lyapunov
 from grasp_ros.physics.energy import Energy, energy, pairs_of
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.physics.model import impact_force, in_contact, penetration
+from grasp_ros.physics.reach import reach
 from grasp_ros.physics.system import System
-from lab.paper import conditions, equations, quadratic_form, sample
+from lab.paper import by_hand, conditions, equations, sample
 from lab.paper.cases import load_cases
 from lab.paper.equations import CROSSING, rows_of
 from lab.paper.sample import Sample
@@ -86,15 +87,17 @@ BROKEN: list[tuple[set[str], Any, str, Any]] = [
     ({"(9)"}, equations, "with_values", accepts),
     ({"(10)"}, equations, "in_contact", lambda contact, u, d: np.asarray(u) >= 0.0),
     ({"(10)"}, equations, "in_contact", shifted),
-    ({"(11)"}, quadratic_form, "quadratic_form", scaled(quadratic_form.quadratic_form)),
-    ({"(12)", "(14)", "(15)"}, quadratic_form, "matrix", scaled(quadratic_form.matrix)),
-    ({"(16)", "(21)", "(28)"}, sample, "energy", level(lambda found, _, __: found._replace(V=OFF * found.V))),
+    ({"(11)", "(12)", "(14)", "(15)"}, by_hand, "matrix", scaled(by_hand.matrix)),
+    ({"(16)", "(21)"}, by_hand, "level", scaled(by_hand.level)),
+    ({"(18)", "(23)"}, by_hand, "rate", scaled(by_hand.rate)),
+    ({"(28)", "(29)"}, by_hand, "parts", scaled(by_hand.parts)),
+    ({"(11)", "(16)", "(21)", "(28)"}, sample, "energy", level(lambda found, _, __: found._replace(V=OFF * found.V))),
     ({"(17)", "(22)", "(26)"}, conditions, "energy", level(lambda found, _, __: found._replace(V=-found.V))),
     ({"(18)", "(23)"}, sample, "energy", level(lambda found, _, __: found._replace(V_rate=OFF * found.V_rate))),
     ({"(19)", "(24)"}, sample, "energy", level(with_stored)),
     ({"(20)", "(25)", "(27)"}, sample, "energy", level(lambda found, _, __: found._replace(V_rate=-found.V_rate))),
-    ({"(29)", "(30)", "(31)", "(32)", "(33)", "(34)"}, lyapunov, "parts", stretched(lyapunov.parts)),
-    ({"(35)", "(36)", "(37)"}, quadratic_form, "deformation_bound", scaled(quadratic_form.deformation_bound, 1e-3)),
+    ({"(12)", "(29)", "(30)", "(31)", "(32)", "(33)", "(34)"}, lyapunov, "parts", stretched(lyapunov.parts)),
+    ({"(35)", "(36)", "(37)"}, conditions, "reach", scaled(reach, 1e-3)),
 ]
 BY_CONSTRUCTION = {"(13)"}  # the order of the state is that of the arrays that everything here reads
 

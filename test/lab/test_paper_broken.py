@@ -16,7 +16,7 @@ from grasp_ros.simulation import simulate
 from lab.paper import compare, measures, motion, universal
 from lab.paper.cases import Cases, load_cases, random_starts, with_values
 from lab.paper.claims import Kind, Verdict
-from lab.paper.judgement import statements
+from lab.paper.statements import STATEMENTS
 
 CASES = load_cases()
 STARTS = random_starts(3)
@@ -51,7 +51,7 @@ def put(case: int, change: dict[str, float], cases: Cases) -> Cases:
 
 def verdict(key: str, part: int, cases: Cases, looked_at: tuple[int, ...]) -> Verdict:
     """Of one part, without its sweep."""
-    judged: Any = statements()[key].parts[part]
+    judged: Any = STATEMENTS[key].parts[part]
     fields: dict[str, Any] = {"values": ()}
     if "cases" in judged._fields:
         fields |= {"cases": looked_at, "extra": ()}
@@ -107,7 +107,7 @@ OTHERS = {"T2", "T4", "T6", "T9"}  # each has a test below
 
 
 def test_every_statement_is_broken() -> None:
-    assert {each.key for each in BREAKS} | {key for key, _, _ in FALLING} | OTHERS == set(statements())
+    assert {each.key for each in BREAKS} | {key for key, _, _ in FALLING} | OTHERS == set(STATEMENTS)
 
 
 class Backwards(NamedTuple):
@@ -163,7 +163,7 @@ def test_a_grasp_that_does_not_press_is_a_limit() -> None:
 
 def test_a_ratio_over_nothing_decides_nothing() -> None:
     """O8: equal arms from a symmetric start do not differ at all; 0.9233 against 0 once counted as true."""
-    part = statements()["O8"].parts[0].judge(CASES, STARTS)
+    part = STATEMENTS["O8"].parts[0].judge(CASES, STARTS)
     trivial = [check for check in part.checks if check.kind is Kind.TRIVIAL]
     assert trivial
     assert all("against 0: no ratio" in check.value for check in trivial)
@@ -193,7 +193,7 @@ def test_a_law_that_is_wrong_is_seen(
 
 def test_a_share_may_not_hide_in_a_crowd() -> None:
     """T5: one case that never settles is a limit, whatever number of others settle."""
-    judged: Any = statements()["T5"].parts[0]
+    judged: Any = STATEMENTS["T5"].parts[0]
     checks = judged._replace(values=(), cases=(1, 2, 4)).judge(CASES, STARTS).limits
     assert {check.text for check in checks} >= {"No. 2"}
     assert min(check.share for check in checks) == 0.0
@@ -201,6 +201,6 @@ def test_a_share_may_not_hide_in_a_crowd() -> None:
 
 def test_an_unequal_pair_lies_between_the_equal_ones() -> None:
     """C3: later than the better pair, sooner than the other."""
-    part = statements()["C3"].parts[0].judge(CASES, STARTS)
+    part = STATEMENTS["C3"].parts[0].judge(CASES, STARTS)
     shares = {check.text: check.share for check in part.checks if check.kind.name == "RANDOM"}
     assert list(shares.values()) == [1.0, 0.0]
