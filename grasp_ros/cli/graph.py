@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import re
+import shutil
 import signal
 import sys
 import time
@@ -129,6 +130,10 @@ def _run(options: argparse.Namespace) -> int:
     except GraphError as error:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
+    except Refused:
+        if graph.processes and not graph.bag.exists():  # a node refused what it was given: nothing is there to keep
+            shutil.rmtree(directory, ignore_errors=True)
+        raise
     if not begun:
         print("grasp: interrupted before the first tick", file=sys.stderr)
         return 130

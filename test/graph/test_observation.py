@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import rclpy
 from graphs import recordings_of
-from processes import end_nodes
+from processes import DEADLINE, end_nodes
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
@@ -111,3 +111,12 @@ def test_a_node_refuses_a_scene_without_what_its_law_asks_for_and_numbers_that_d
     assert result.reason == f"{gain}: another controller acts in place of this feedback"
     assert controller.set_parameters([Parameter(gain, value=5.0)])[0].successful
     end_nodes(controller)
+
+
+@pytest.mark.slow
+def test_a_run_that_a_node_refuses_leaves_nothing(grasp_run: Any, tmp_path: Path) -> None:
+    (tmp_path / "asking.py").write_text("def law(tick, time, x, v, x_object):\n    return x_object - x\n")
+    run = grasp_run("arm_alone", "--controller", "left=asking:law")
+    err = run.communicate(timeout=DEADLINE)[1]
+    assert (run.returncode, "asks for x_object; the scene has no object" in err) == (2, True), err
+    assert not (tmp_path / "run").exists()
