@@ -76,7 +76,7 @@ class Scene(Frozen):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Valid but suspicious settings, a sentence each: the key, its value, why it is odd, and what may be meant."""
-        return tuple(str(oddity) for effect in self.effects for oddity in effect.oddities(self.values, self.system))
+        return tuple(warning for effect in self.effects for warning in effect.warnings(self.values, self.system))
 
     @property
     def initial_state(self) -> Array:
