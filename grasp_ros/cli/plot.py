@@ -45,23 +45,20 @@ def add_to(commands: Any) -> None:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    span = _span(options)
+    span: Span = None
+    if options.first is not None or options.last is not None:
+        span = options.first or 0.0, math.inf if options.last is None else options.last
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
     if (options.panels and options.animate) or (options.speed != 1.0 and not options.animate):
         raise Refused("--panel: allowed: without --animate; --speed: with it")
     check_output(output, FORMATS if options.animate else figure_endings(output), options.force, options.sources)
-    if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
-        raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
+    if options.sensitivity and (options.animate or len(options.sources) > 1):
+        raise Refused("--sensitivity: allowed: one scene, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]
-    if span is not None:
-        longest = max(motion.scene.duration for motion in motions)
-        if not 0.0 <= span[0] < longest:
-            raise Refused(f"--from {span[0]!r} is not allowed; allowed: 0 to below {longest:g} s")
-        if math.isfinite(span[1]) and span[1] > longest:
-            raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
-        span = span[0], min(span[1], longest)
+    if span is not None and options.last is None:
+        span = span[0], max(motion.scene.duration for motion in motions)
     if options.animate:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")
@@ -72,16 +69,6 @@ def _plot(options: argparse.Namespace) -> int:
     figure = plots.compose(motions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
-
-
-def _span(options: argparse.Namespace) -> Span:
-    """The times that are shown; None: all."""
-    if options.first is None and options.last is None:
-        return None
-    first, last = 0.0 if options.first is None else options.first, math.inf if options.last is None else options.last
-    if not first < last:
-        raise Refused(f"--from {first!r}, --to {last!r} is not allowed; allowed: --from below --to")
-    return first, last
 
 
 def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
@@ -111,7 +98,7 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
     prepare()
     grid = None
     if span is not None and not (options.sampled or scene.sampled):
-        first, last = min(max(span[0], 0.0), scene.duration), min(span[1], scene.duration)
+        first, last = np.clip(sorted(span), 0.0, scene.duration).tolist()
         grid = np.linspace(first, last, GRID_POINTS)
     return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step,
                     sensitivity=options.sensitivity or None)

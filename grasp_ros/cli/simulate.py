@@ -67,8 +67,6 @@ def _simulate(options: argparse.Namespace) -> int:
     setting, controllers = _setting(options), load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
-    if options.sensitivity and (controllers or options.method != EXACT):  # before kernels are compiled
-        raise Refused(f"--sensitivity: allowed: --method {EXACT}, without --controller")
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()

@@ -81,6 +81,6 @@ def _number(scene: Scene, key: str) -> Number:
     if parameter.low < 0.0:
         return Number(key, value, False, max(abs(value), 1.0))
     if value == 0.0:
-        raise Refused(f"free: {key}: the search starts from the scene's value, 0; allowed: a start > 0, as with"
-                      f" --set {key}=VALUE")
+        raise Refused(f"free: {key}: the search starts from the scene's value, 0; allowed: a start > 0, as by the"
+                      f" setting {key}=VALUE")
     return Number(key, value, True)

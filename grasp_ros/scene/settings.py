@@ -1,4 +1,4 @@
-"""What `--set` says: numbers that replace those of a file or come beside them, and sections without numbers."""
+"""Settings: numbers that replace those of a file or come beside them, and sections without numbers."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
     """
     for target, count in Counter(setting.partition("=")[0] for setting in settings).items():
         if count > 1:
-            raise SceneError(f"--set {target}: given {count} times; allowed: once")
+            raise SceneError(f"setting {target}: given {count} times; allowed: once")
     for setting in sorted(settings, key=lambda one: not one.endswith("={}")):  # before others give the section numbers
         _apply(setting, document)
 
@@ -29,21 +29,21 @@ def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
 def _apply(setting: str, document: dict[Any, Any]) -> None:
     match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
     if match is None:
-        raise SceneError(f"--set {setting}: not understood; allowed: section.key=value, or section={{}}")
+        raise SceneError(f"setting {setting}: not understood; allowed: section.key=value, or section={{}}")
     section, key, value = match.groups()
     if key is None:
         if section not in BY_SECTION:
-            raise SceneError(f"--set {setting}: no such section; {allowed(section, BY_SECTION)}")
+            raise SceneError(f"setting {setting}: no such section; {allowed(section, BY_SECTION)}")
         if document.setdefault(section, {}):
-            raise SceneError(f"--set {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
+            raise SceneError(f"setting {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
         return
     known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
     if f"{section}.{key}" not in known:
-        raise SceneError(f"--set {setting}: no such key; {allowed(f'{section}.{key}', known)}")
+        raise SceneError(f"setting {setting}: no such key; {allowed(f'{section}.{key}', known)}")
     try:
         number = load(value)
     except Refused as error:
-        raise SceneError(f"--set {setting}: {error}; allowed: a number") from None
+        raise SceneError(f"setting {setting}: {error}; allowed: a number") from None
     numbers = document.setdefault(section, {})
     if isinstance(numbers, dict):  # anything else is refused with the file
         numbers[key] = number

@@ -84,6 +84,7 @@ def compose(
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
     """The figure that `draw` writes; its panels are by default all of PANELS."""
+    span = shown(motions, span)
     for motion in motions:
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
@@ -93,7 +94,6 @@ def compose(
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
     width = usual if width_mm is None else number("width_mm", width_mm)
-    first_last = None if span is None else ascending("span", rows("span", span, 2), np.inf, strictly=True)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
         raise Refused(f"width_mm: {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
@@ -112,7 +112,7 @@ def compose(
                 panel.draw(axes, motion)
                 shade_contacts(axes, motion)
                 axes.grid(alpha=0.3)
-                axes.set_xlim(*(motion.t[[0, -1]] if first_last is None else first_last))
+                axes.set_xlim(*(motion.t[[0, -1]] if span is None else span))
                 if column == 0:
                     axes.set_ylabel(panel.label)
             grid[-1, column].set_xlabel("time, s")
@@ -121,6 +121,15 @@ def compose(
         figure.align_ylabels(grid[:, 0])
         figure.canvas.draw()  # the layout, with the letters of this context
         return figure
+
+
+def shown(motions: Sequence[Motion], span: tuple[float, float] | None) -> tuple[float, float] | None:
+    """The first and the last time in s that are wanted, which the longest motion has; None: all."""
+    if span is None:
+        return None
+    longest = max(instance("motion", motion, Tabular, A_MOTION).scene.duration for motion in motions)
+    first, last = ascending("span", rows("span", span, 2), longest, strictly=True).tolist()
+    return first, last
 
 
 def _title(motion: Motion, caption: str, width_mm: float, small: bool) -> str:

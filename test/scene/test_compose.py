@@ -152,7 +152,7 @@ def test_naming_a_section_takes_no_number_from_it(order: int) -> None:
     assert load("case_01", settings).values["loop"] == {"delay_ticks": 2}
     held = load("case_01", ["loop={}"]).to_yaml()
     assert parse(held, "held", "held", ["loop={}"]).to_yaml() == held
-    with pytest.raises(SceneError, match=r"^--set loop={}: loop has numbers, which stay; allowed: loop.key=value$"):
+    with pytest.raises(SceneError, match=r"^setting loop={}: loop has numbers, which stay; allowed: loop.key=value$"):
         load("delay", ["loop={}"])
 
 
@@ -166,12 +166,12 @@ def test_a_setting_that_is_given_twice_is_refused(twice: list[str]) -> None:
 @pytest.mark.parametrize(
     ("setting", "complaint"),
     [
-        ("loop=", "--set loop=: not understood; allowed: section.key=value, or section={}"),
-        ("loop=5", "--set loop=5: not understood"),
-        ("loop={1}", "--set loop={1}: not understood"),
+        ("loop=", "setting loop=: not understood; allowed: section.key=value, or section={}"),
+        ("loop=5", "setting loop=5: not understood"),
+        ("loop={1}", "setting loop={1}: not understood"),
         ("loop={delay_ticks: 2}", "not understood"),
-        ("title={}", "--set title={}: no such section; did you mean tilt or time?"),
-        ("wind={}", "--set wind={}: no such section"),
+        ("title={}", "setting title={}: no such section; did you mean tilt or time?"),
+        ("wind={}", "setting wind={}: no such section"),
         ("left_actuator={}", "left_actuator.limit_N: missing"),
         ("loop.delay_ticks={}", "loop.delay_ticks: {} is not allowed; allowed: a whole number"),
     ],
