@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -10,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import grasp_ros
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
 from grasp_ros.graph.processes import Graph
@@ -20,7 +18,6 @@ from grasp_ros.scene import SceneError, compose, load, parse
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.simulation import simulate
 
-ROOT = Path(grasp_ros.__file__).parent
 BARE = [name for name, effect in BY_SECTION.items() if all(parameter.optional for parameter in effect.parameters)]
 OBJECT = {"time": {"duration_s": 1.0, "control_period_s": 0.01},
           "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 1.0}}
@@ -86,27 +83,6 @@ def test_a_change_is_told_by_the_title_and_is_validated() -> None:
             scene.changed({name: 1.0})
     with pytest.raises(SceneError, match="as many forces as times"):
         scene.changed({"left_arm_table.force_N": [1.0]})
-
-
-def called(path: Path) -> set[str]:
-    """Names of the functions and classes that a file calls, without methods of objects."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    functions = [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    modules = ("scenes", "scene", "dataclasses")
-    return {function.id for function in functions if isinstance(function, ast.Name)} | {
-        function.attr for function in functions
-        if isinstance(function, ast.Attribute) and getattr(function.value, "id", "") in modules
-    }
-
-
-def test_nobody_makes_a_scene_around_the_checks() -> None:
-    assert [path.relative_to(ROOT).as_posix() for path in ROOT.rglob("*.py") if "Scene" in called(path)] == [
-        "scene/scene.py"
-    ]
-    assert [path.relative_to(ROOT).as_posix() for path in sorted(ROOT.rglob("*.py")) if "replace" in called(path)] == [
-        "simulation/repeat.py",  # of a run
-        "simulation/simulate.py",  # of a run
-    ]
 
 
 # Sections without numbers.
