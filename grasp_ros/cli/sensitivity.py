@@ -24,16 +24,15 @@ WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
     """Derivatives of the last state, of V_c there, and of the times of the last events, number by number."""
-    level_rates = found.V_c_rates[-1]
-    for place, key in enumerate(found.keys):
-        yield f"d / d {key}", f"at t = {found.t[-1]:.6g} s, by its unit"
+    for key, own in last_rates(found).items():
+        yield f"d / d {key}", f"at t = {own['t']:.6g} s, by its unit"
         for body in found.scene.system.present:
-            x, v = found.state_rates[-1, COLUMN[body] : COLUMN[body] + 2, place]
+            x, v = own["state"][COLUMN[body] : COLUMN[body] + 2]
             yield f"  {NAMES[body]} position, velocity", f"{x:.12g} m, {v:.12g} m/s"
-        yield "  V_c", f"{level_rates[place]:.12g} J"
-        for event, rate in zip(found.event_table[-LAST:], found.event_rates[-LAST:, place], strict=True):
-            kind, body = Transition(int(event[Entry.KIND])), Body(int(event[Entry.BODY]))
-            yield f"  {kind.name.lower()} {body.name.lower()} at {event[Entry.TIME]:.6g} s", f"{rate:.12g} s"
+        yield "  V_c", f"{own['V_c']:.12g} J"
+        for event in own["events"][-LAST:]:
+            what = f"{event['kind'].lower()} {event['body'].lower()}"
+            yield f"  {what} at {event['time_s']:.6g} s", f"{event['rate']:.12g} s"
     if found.corner is not None:
         yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on"
 

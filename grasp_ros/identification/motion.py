@@ -8,12 +8,12 @@ import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.identification.measured import Measured
-from grasp_ros.identification.numbers import OUTSIDE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene, compose
 from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.sensitivity.directions import directions
 from grasp_ros.simulation.differentiate import carry, complete
 from grasp_ros.simulation.sampled_plant import SampledPlant
@@ -52,5 +52,5 @@ def _plant(scene: Scene) -> Scene:
     """What is left of a scene where all that acts from outside is known: bodies and contacts."""
     return compose(scene.name, {
         section: numbers for section, numbers in scene.values.items()
-        if BY_SECTION[section].node == "plant" and section != "loop" and not section.endswith(OUTSIDE)
+        if BY_SECTION[section].node == "plant" and section != "loop" and section not in FORCED
     })

@@ -8,6 +8,7 @@ from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.accuracy.compare import fastest
+from grasp_ros.accuracy.contender import OURS
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
@@ -26,7 +27,7 @@ from lab.studies import (
     speed,
     stability,
 )
-from lab.studies.contenders import OURS, all_contenders
+from lab.studies.contenders import all_contenders
 from lab.studies.records import Journal, write_csv
 
 LOOP_SCENE = "case_01"

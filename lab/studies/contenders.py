@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from functools import partial
 
 import numpy as np
 
-from grasp_ros.accuracy.contender import DONE, Answer, Contender, Solve, simulated
+from grasp_ros.accuracy.contender import DONE, Answer, Contender, Solve, contender_of
 from grasp_ros.methods.equations import parameters
 from grasp_ros.methods.library import slopes
 from grasp_ros.methods.registry import METHODS
@@ -15,23 +14,13 @@ from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.studies import peer_heyoka, peer_sundials
 
-OURS = "grasp_ros"
 MAX_STEPS = 10_000_000
-
-
-def own_contenders() -> list[Contender]:
-    """The methods of `grasp simulate`."""
-    return [
-        Contender(OURS if method.package is None else method.package, name, method.knob, method.ladder,
-                  partial(simulated, name))
-        for name, method in METHODS.items()
-    ]
 
 
 def all_contenders() -> list[Contender]:
     """The methods of `grasp simulate` and the outside peers."""
     odeint = Contender("scipy", "odeint", "tolerance", METHODS["lsoda"].ladder, _odeint)
-    return [*own_contenders(), odeint, *peer_sundials.contenders(), *peer_heyoka.contenders()]
+    return [*map(contender_of, METHODS), odeint, *peer_sundials.contenders(), *peer_heyoka.contenders()]
 
 
 def _odeint(scene: Scene, tolerance: float) -> Solve:

@@ -12,14 +12,13 @@ from typing import NamedTuple
 
 from tqdm import tqdm
 
-from grasp_ros.accuracy.contender import Contender, Solve
+from grasp_ros.accuracy.contender import Contender, Solve, contender_of
 from grasp_ros.accuracy.measure import Record, seconds
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from lab.studies import measure, peer_heyoka
-from lab.studies.contenders import own_contenders
 
 BUDGET_S, FEWEST, MOST = 1.5, 3, 200  # per solver: time for its repeats, and their number
 PATIENCE_S = 2.0  # a solver that needs longer for one run climbs no further
@@ -37,7 +36,7 @@ class Timing(NamedTuple):
 def final_state(scene: Scene, target: Truth, error: float) -> list[Timing]:
     """Time to an error in the last state, of `exact` and of heyoka, its closest rival, where they reach it."""
     target = target._replace(grid=target.grid[-1:])
-    exact = next(contender for contender in own_contenders() if contender.name == EXACT)
+    exact = contender_of(EXACT)
     finer = tuple(10.0 ** (-k / FINER) for k in range(3 * FINER, 16 * FINER + 1))
     finalists = []
     for rival in (exact._replace(ladder=finer), peer_heyoka.contenders()[-1]):

@@ -20,12 +20,12 @@ import pytest
 from jinja2 import Environment, nodes
 
 from grasp_ros import scene as scenes
+from grasp_ros.accuracy.contender import contender_of
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.simulation import GRID_POINTS
 from lab.cases.registry import cases
 from lab.drills.faults import run as faults
 from lab.studies import accuracy, certificate, domain, effects, pages
-from lab.studies.contenders import own_contenders
 
 DOCS = Path(__file__).parents[2] / "docs"
 ALLOWED = timedelta(days=30)
@@ -99,7 +99,7 @@ def test_jumps_and_limits_are_those_of_the_code() -> None:
 
 def test_the_work_of_each_accuracy_is_that_of_the_code() -> None:
     subjects = {scene.name: scene for scene in accuracy.default_scenes()}
-    [exact] = [contender for contender in own_contenders() if contender.name == EXACT]
+    exact = contender_of(EXACT)
     with (DOCS / "accuracy" / "records.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["method"] == EXACT]
     assert len(rows) > 5 * len(subjects)

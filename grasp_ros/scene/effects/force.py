@@ -165,3 +165,4 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
 
 
 EFFECTS = tuple(effect for name, body in SECTIONS.items() for effect in _effects(name, body))
+FORCED = frozenset(effect.section for effect in EFFECTS)
