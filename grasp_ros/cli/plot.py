@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import argparse
 import math
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_ros.cli.arguments import add_command, add_file, add_settings
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import STDOUT, figure_endings, note, write_figure
-from grasp_ros.cli.sensitivity import sensitivity_panels
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
 from grasp_ros.simulation.animation import FORMATS, animate
+from grasp_ros.simulation.canvas import Axes
 from grasp_ros.simulation.tables import Motion
 
+if TYPE_CHECKING:
+    from grasp_ros.simulation.differentiate import Sensitivity
+
 Span = tuple[float, float] | None
+WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 
 def add_to(commands: Any) -> None:
@@ -111,3 +117,22 @@ def _beside(source: str, ending: str) -> Path:
         if not path.exists():
             return Path(f"{path.stem}{ending}")
         return Path(f"{path.resolve()}{ending}") if path.is_dir() else path.with_suffix(ending)
+
+
+def sensitivity_panels(found: Sensitivity) -> list[plots.Panel]:
+    """A panel for each number: derivatives of the positions by it, over time."""
+    return [plots.Panel(partial(_draw, found, place), "derivative, m", 2) for place in range(len(found.keys))]
+
+
+def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
+    rates = found.state_rates[:, ::2, place]
+    sizes = np.abs(rates[rates != 0.0])
+    if len(sizes) and sizes.max() > WIDE * np.median(sizes):
+        axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(np.median(sizes))))
+        axes.locator_params(axis="y", numticks=7)
+    for body in found.scene.system.present:
+        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"$dx_{NAMES[body][0]}$", color=plots.COLORS[body],
+                  linewidth=1.0)
+    if found.corner is not None:
+        axes.axvline(found.corner, color="black", linewidth=0.8, linestyle=":", label="one-sided from here")
+    axes.set_title(f"by {found.keys[place]}", loc="left", fontsize="small", parse_math=False)

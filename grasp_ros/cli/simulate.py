@@ -60,7 +60,7 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _simulate(options: argparse.Namespace) -> int:
-    from grasp_ros.cli.report import describe_trajectory, table
+    from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
     from grasp_ros.simulation.summary import summary
 
     scene = load_scene(options.scene, options.settings)
@@ -81,8 +81,6 @@ def _simulate(options: argparse.Namespace) -> int:
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity
     if rates is not None:
-        from grasp_ros.cli.sensitivity import describe_sensitivity, last_rates
-
         rows, found = [*rows, *describe_sensitivity(rates)], {**found, "sensitivity": last_rates(rates)}
     show(options, table(rows), found)
     if options.output is not None:
