@@ -22,7 +22,7 @@ from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
 from grasp_ros.scene.effects import BY_SECTION, build, named
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, nanoseconds, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import YAML, read_text, reading
 from grasp_ros.scene.parameter import Parameter
@@ -95,7 +95,7 @@ class Scene(Frozen):
     @cached_property
     def ticks(self) -> int:
         """Number of control periods in the run."""
-        return round(self.duration * NANOSECONDS) // self.period_ns
+        return nanoseconds(self.duration) // self.period_ns
 
     @property
     def sampled(self) -> bool:

@@ -121,9 +121,8 @@ class Trajectory(Tabular, Frozen):
         system, ticks = self.scene.system, tick_of(self.scene, self.t)
         inputs: Array = np.zeros((len(self.t), 3))
         inputs[:, [LEFT, RIGHT]] = self.command
-        if system.external:
-            several, place = np.unique(ticks, return_inverse=True)
-            inputs += np.reshape([system.external_at(tick) for tick in several.tolist()], (-1, 3))[place]
+        if system.external and len(ticks):
+            inputs += system.external_over(ticks)
         inputs[ticks == self.scene.ticks] = np.nan
         return inputs
 

@@ -80,13 +80,11 @@ def _place(row: int, array: str, column: int) -> Place:
     return array, 0 if array == "coulomb" else int(row), int(column)
 
 
+def nanoseconds(seconds: float) -> int:
+    """A time in ns, rounded."""
+    return round(seconds * NANOSECONDS)
+
+
 def period_ns(sections: Sections) -> int:
     """Control period of a scene in ns."""
-    seconds: float = sections["time"]["control_period_s"]
-    return round(seconds * NANOSECONDS)
-
-
-def run_ns(sections: Sections) -> int:
-    """Length of a run in ns."""
-    seconds: float = sections["time"]["duration_s"]
-    return round(seconds * NANOSECONDS)
+    return nanoseconds(sections["time"]["control_period_s"])

@@ -15,17 +15,7 @@ from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene.effects.base import (
-    NANOSECONDS,
-    Effect,
-    Output,
-    Sections,
-    nothing,
-    oddity,
-    period_ns,
-    problem,
-    run_ns,
-)
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Sections, nanoseconds, oddity, period_ns, problem
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
@@ -49,10 +39,6 @@ TABLE = (
 NEVER = "comes when the run has ended: nothing ever acts"
 
 
-def _nanoseconds(seconds: float) -> int:
-    return round(seconds * NANOSECONDS)
-
-
 def _add(section: str, force: ExternalForce, system: System) -> None:
     system.external.append(force)
     system.caveats.append(f"{section} does work")
@@ -62,10 +48,10 @@ def _build_steps(section: str, body: int, sections: Sections, system: System) ->
     """A force from each tick to the next: those of a table, or of a pulse, which is one of two entries."""
     numbers, period = sections[section], period_ns(sections)
     if "time_s" in numbers:
-        ticks, forces = [_nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
+        ticks, forces = [nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
     else:
-        begin = _nanoseconds(numbers["start_s"]) // period
-        ticks, forces = [begin, begin + _nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
+        begin = nanoseconds(numbers["start_s"]) // period
+        ticks, forces = [begin, begin + nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
 
     def at(tick: int) -> float:
         return float(forces[bisect_right(ticks, tick)])
@@ -85,19 +71,14 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
     _add(section, ExternalForce(body, at, lambda end: range(1, end)), system)
 
 
-def _is_off(time: float, period: int) -> bool:
-    """Whether a time in s is no whole number of periods in ns."""
-    nanoseconds = _nanoseconds(time)
-    return nanoseconds / NANOSECONDS != time or nanoseconds % period != 0
-
-
 def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[str]:
     """Times must be whole control periods."""
     period = period_ns(sections)
     for key in keys:
         value = sections[section][key]
         times = value if isinstance(value, tuple) else (value,)
-        off = next((time for time in times if _is_off(time, period)), None)
+        off = next((time for time in times if nanoseconds(time) / NANOSECONDS != time or nanoseconds(time) % period),
+                   None)
         if off is not None:
             yield problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
 
@@ -120,24 +101,22 @@ def _sine_problems(section: str, sections: Sections) -> Iterable[str]:
 
 
 def _odd_pulse(section: str, sections: Sections, _: System) -> Iterable[str]:
-    numbers, end = sections[section], run_ns(sections)
-    start, length = numbers["start_s"], numbers["length_s"]
-    over = _nanoseconds(start) + _nanoseconds(length) - end
-    if _nanoseconds(start) >= end:
-        yield oddity(f"{section}.start_s", start, NEVER, f"before time.duration_s, {end / NANOSECONDS!r}")
+    start, length, end = sections[section]["start_s"], sections[section]["length_s"], sections["time"]["duration_s"]
+    over = nanoseconds(start) + nanoseconds(length) - nanoseconds(end)
+    if start >= end:
+        yield oddity(f"{section}.start_s", start, NEVER, f"before time.duration_s, {end!r}")
     elif over > 0:
         why = f"reaches {over / NANOSECONDS!r} s beyond the end of the run"
-        yield oddity(f"{section}.length_s", length, why, f"an end by time.duration_s, {end / NANOSECONDS!r}")
+        yield oddity(f"{section}.length_s", length, why, f"an end by time.duration_s, {end!r}")
 
 
 def _odd_table(section: str, sections: Sections, _: System) -> Iterable[str]:
-    times, forces, end = sections[section]["time_s"], sections[section]["force_N"], run_ns(sections)
-    late = [(time, force) for time, force in zip(times, forces, strict=True) if _nanoseconds(time) >= end]
-    idle = [time for time, force in late if force != 0.0 or _nanoseconds(time) > end]  # 0 at the end closes it
-    key, meant = f"{section}.time_s", f"before time.duration_s, {end / NANOSECONDS!r}"
+    times, forces, end = sections[section]["time_s"], sections[section]["force_N"], sections["time"]["duration_s"]
+    late = [(time, force) for time, force in zip(times, forces, strict=True) if time >= end]
+    idle = [time for time, force in late if force != 0.0 or time > end]  # 0 at the end closes it
+    key, meant = f"{section}.time_s", f"before time.duration_s, {end!r}"
     if not any(forces[: len(forces) - len(late)]):
-        first = next(time for time, force in late if force != 0.0)
-        yield oddity(key, first, NEVER, f"a begin {meant}")
+        yield oddity(key, next(time for time, force in late if force != 0.0), NEVER, f"a begin {meant}")
     elif idle:
         yield oddity(key, idle[0], "comes when the run has ended: its force never acts", f"a last time {meant}")
 
@@ -152,7 +131,8 @@ def _effects(name: str, body: int) -> Iterable[Effect]:
     for kind, parameters, size, build, problems, odd, example in (
         ("pulse", PULSE, "force_N", _build_steps, partial(_off_tick, ("start_s", "length_s")),
          _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
-        ("sine", SINE, "amplitude_N", _build_sine, _sine_problems, nothing, {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
+        ("sine", SINE, "amplitude_N", _build_sine, _sine_problems, lambda *_: (),
+         {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
         ("table", TABLE, "force_N", _build_steps, _table_problems, _odd_table,
          {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}),
     ):

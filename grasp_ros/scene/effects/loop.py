@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Sections, oddity, period_ns, run_ns
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nanoseconds, oddity, period_ns
 from grasp_ros.scene.parameter import Parameter
 
 HELD = "commands are held over control periods and do work of their own"
@@ -25,7 +25,7 @@ def _build(sections: Sections, system: System) -> None:
 
 
 def _odd(sections: Sections, system: System) -> Iterable[str]:
-    numbers, ticks = sections["loop"], run_ns(sections) // period_ns(sections)
+    numbers, ticks = sections["loop"], nanoseconds(sections["time"]["duration_s"]) // period_ns(sections)
     if not system.laws:
         yield oddity("loop", numbers, "holds no command: no side has feedback", "left_feedback or right_feedback too")
     if ticks == 1:
