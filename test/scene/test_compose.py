@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -10,10 +9,6 @@ import numpy as np
 import pytest
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph import bag
-from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.verify import verify
-from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene import SceneError, compose, load, parse
 from grasp_ros.scene.effects import BY_SECTION
 from grasp_ros.simulation import simulate
@@ -161,19 +156,3 @@ def test_what_names_no_section_is_refused(setting: str, complaint: str) -> None:
 def test_a_section_that_holds_nothing_is_refused() -> None:
     with pytest.raises(SceneError, match=r"file: loop: None is not allowed; allowed: a mapping with delay_ticks"):
         parse(load("case_01").to_yaml() + "loop:\n", "case_01", "file")
-
-
-@pytest.mark.slow
-def test_a_graph_runs_a_scene_with_sections_without_numbers(tmp_path: Path) -> None:
-    """The scene goes through a file, the topic `scene` and the bag."""
-    scene = load("case_01", ["time.duration_s=0.5", *(f"{section}={{}}" for section in BARE)])
-    graph = Graph(scene, tmp_path / "run", ACCURACY)
-    graph.start()
-    try:
-        graph.wait([])
-    finally:
-        statuses = graph.stop()
-    assert set(statuses.values()) == {0}
-    recording = bag.read(graph.bag)
-    assert recording.scene.values == scene.values
-    assert verify(recording).holds

@@ -155,7 +155,6 @@ def test_changes_act_from_their_tick_on() -> None:
     [
         ({5: {"left_feedback.position_gain_N_per_m": 9.0}}, False, "continuous"),
         ({5: {"object.mass_kg": 9.0}}, True, "object.mass_kg at tick 5"),
-        ({-1: {"left_feedback.position_gain_N_per_m": 9.0}}, True, "at tick -1"),
     ],
 )
 def test_changes_that_no_graph_would_take_are_refused(changes: dict, sampled: bool, words: str) -> None:
