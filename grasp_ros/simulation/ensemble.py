@@ -169,7 +169,9 @@ def ensemble(
     with showing(progress, variants.rows, "run", scene.name) as told:
         for (first, last), chunk in in_threads(work, spans, threads):
             for name, values in chunk.columns.items():
-                found.setdefault(name, np.full(variants.rows, np.nan))[first:last] = values  # one of them a derivative
+                if name not in found:  # a derivative
+                    found[name] = np.full(variants.rows, np.nan)
+                found[name][first:last] = values
             status[first:last] = chunk.status
             stops.update({first + i: stop for i, stop in chunk.stops.items()})
             reached += last - first
