@@ -9,10 +9,10 @@ from grasp_ros.physics.layout import LEFT as LEFT
 from grasp_ros.physics.layout import OBJECT as OBJECT
 from grasp_ros.physics.layout import RIGHT as RIGHT
 from grasp_ros.physics.layout import Transition as Transition
-from grasp_ros.scene.library import names as names
 from grasp_ros.scene.scene import Scene as Scene
 from grasp_ros.scene.scene import compose as compose
 from grasp_ros.scene.scene import load as load
+from grasp_ros.scene.scene import names as names
 from grasp_ros.scene.scene import parse as parse
 from grasp_ros.sensitivity.spectrum import spectrum as spectrum
 from grasp_ros.simulation.ensemble import ensemble as ensemble

@@ -13,6 +13,8 @@ from grasp_ros.exact.integrator import Status
 from grasp_ros.scene import Scene, load
 from grasp_ros.simulation import simulate
 
+STEPS = tuple(f"{side}_sensor.{key}" for side in ("left", "right")
+              for key in ("position_step_m", "velocity_step_m_per_s"))
 BASE: dict[str, Any] = yaml.safe_load(load("case_01").to_yaml())
 
 
@@ -31,9 +33,21 @@ def text_with(old: str, new: str) -> str:
 
 
 def scene_of(name: str, *settings: str, without: tuple[str, ...] = ()) -> Scene:
-    """A scene of the package with other numbers, or without some of its sections."""
-    scene = scenes.load(name, settings)
-    return scenes.compose(name, {key: numbers for key, numbers in scene.values.items() if key not in without})
+    """A scene of the package with other numbers, or without some of its sections or keys."""
+    return scenes.compose(name, {
+        section: {key: number for key, number in numbers.items() if f"{section}.{key}" not in without}
+        for section, numbers in scenes.load(name, settings).values.items() if section not in without})
+
+
+def body(mass: float = 1.0, x: float = 0.0, v: float = 0.0, **rest: float) -> dict[str, float]:
+    """The section of an arm, or of the object."""
+    return {"mass_kg": mass, "position_m": x, "velocity_m_per_s": v, **rest}
+
+
+def made(seconds: float, period: float | None = None, **sections: dict[str, Any]) -> Scene:
+    """A scene from its sections; the control period is its horizon unless given."""
+    time = {"duration_s": seconds, "control_period_s": period or seconds}
+    return scenes.compose("scene", {"time": time, **sections})
 
 
 def case_of(name: str = "case_01", duration: float = 2.0, period: float = 0.001, *settings: str) -> Scene:

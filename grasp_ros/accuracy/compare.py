@@ -86,8 +86,8 @@ def advise(records: Iterable[Record], error: float | None = None, budget: float 
 
 def check_wish(error: float | None, budget: float | None) -> None:
     """Refuse a wish that is not one positive number."""
-    for name, wish in (("--error", error), ("--budget", budget)):
+    for name, wish in (("error", error), ("budget", budget)):
         if wish is not None and not wish > 0.0:
             raise Refused(f"{name} {wish!r} is not allowed; allowed: a number > 0")
     if (error is None) == (budget is None):
-        raise Refused("--error, --budget: allowed: exactly one of them")
+        raise Refused("error, budget: allowed: exactly one of them")

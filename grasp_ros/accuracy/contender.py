@@ -15,6 +15,7 @@ from grasp_ros.scene import Scene
 from grasp_ros.simulation.simulate import simulate
 
 DONE = "done"
+OURS = "grasp_ros"
 
 
 class Answer(NamedTuple):
@@ -43,15 +44,21 @@ class Contender(NamedTuple):
 def own_contenders(scene: Scene) -> tuple[list[Contender], dict[str, str]]:
     """The methods of `grasp simulate` that can treat a scene, and why the others cannot, by name."""
     found, others = [], {}
-    for name, method in METHODS.items():
+    for name in METHODS:
         try:
             check(name, scene, None, sampled=scene.sampled)
         except Refused as refusal:
             others[name] = str(refusal)
             continue
-        ladder = tuple(setting for setting in method.ladder if setting <= scene.duration)
-        found.append(Contender(method.package or "grasp_ros", name, method.knob, ladder, partial(simulated, name)))
+        own = contender_of(name)
+        found.append(own._replace(ladder=tuple(setting for setting in own.ladder if setting <= scene.duration)))
     return found, others
+
+
+def contender_of(name: str) -> Contender:
+    """A method of `grasp simulate`."""
+    method = METHODS[name]
+    return Contender(method.package or OURS, name, method.knob, method.ladder, partial(simulated, name))
 
 
 def simulated(name: str, scene: Scene, setting: float) -> Solve:

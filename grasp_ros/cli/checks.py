@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import errno
-import os
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
@@ -37,11 +35,11 @@ def check_output(output: Path | None, endings: Collection[str], force: bool, inp
         return
     format_of(output, endings)
     with writing(output):
-        if not (output.is_file() or output.is_dir()):
+        if output.is_dir():
+            raise Refused(f"{output}: cannot be written: Is a directory")
+        if not output.is_file():
             output.parent.stat()
             return  # new, a device or a pipe
-        if output.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
         for given in map(Path, inputs):
             if given.exists() and (given.samefile(output) or output.resolve().is_relative_to(given.resolve())):
                 raise Refused(f"-o {output}: is the input; allowed: another file")

@@ -55,12 +55,8 @@ def add_to(commands: Any) -> None:
                      help="new directory, or one of the same map, which is completed; figures come beside it")
 
 
+@needing("`grasp map`", "map")
 def _map(options: argparse.Namespace) -> int:
-    with needing("`grasp map`", "map"):
-        return _run(options)
-
-
-def _run(options: argparse.Namespace) -> int:
     from grasp_ros.maps import figures, store
     from grasp_ros.maps.plan import Plan, check, read_axis
     from grasp_ros.maps.run import run

@@ -13,12 +13,12 @@ Command = Callable[[argparse.Namespace], int]
 LONGEST = 200  # characters of a line that refuses something
 
 
-def shortened(line: str, most: int = LONGEST) -> str:
+def shortened(line: str) -> str:
     """One line; where it is too long, without the words in its middle."""
-    line, end = " ".join(line.split()), most // 3
-    if len(line) <= most:
+    line, end = " ".join(line.split()), LONGEST // 3
+    if len(line) <= LONGEST:
         return line
-    first, last = line[: most - end - 5], line[-end:]
+    first, last = line[: LONGEST - end - 5], line[-end:]
     part, rest = re.search(r" \S{,25}$", first), re.match(r"\S{,25} ", last)  # of words that are not too long
     return f"{first[: part.start()] if part else first} ... {last[rest.end():] if rest else last}"
 

@@ -4,23 +4,29 @@ from __future__ import annotations
 
 import argparse
 import math
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from grasp_ros.cli.arguments import add_command, add_file, add_settings
 from grasp_ros.cli.checks import check_memory, check_output, load_scene, prepare, warn
 from grasp_ros.cli.output import STDOUT, figure_endings, note, write_figure
-from grasp_ros.cli.sensitivity import sensitivity_panels
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.files import reading
 from grasp_ros.simulation import GRID_POINTS, Trajectory, load, plots, simulate
 from grasp_ros.simulation.animation import FORMATS, animate
+from grasp_ros.simulation.canvas import Axes
 from grasp_ros.simulation.tables import Motion
 
+if TYPE_CHECKING:
+    from grasp_ros.simulation.differentiate import Sensitivity
+
 Span = tuple[float, float] | None
+WIDE = 100.0  # a derivative that grows by more has a logarithmic axis
 
 
 def add_to(commands: Any) -> None:
@@ -45,23 +51,20 @@ def add_to(commands: Any) -> None:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    span = _span(options)
+    span: Span = None
+    if options.first is not None or options.last is not None:
+        span = options.first or 0.0, math.inf if options.last is None else options.last
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
     if (options.panels and options.animate) or (options.speed != 1.0 and not options.animate):
         raise Refused("--panel: allowed: without --animate; --speed: with it")
     check_output(output, FORMATS if options.animate else figure_endings(output), options.force, options.sources)
-    if options.sensitivity and (options.animate or len(options.sources) > 1 or options.method != EXACT):
-        raise Refused(f"--sensitivity: allowed: one scene, --method {EXACT}, without --animate")
+    if options.sensitivity and (options.animate or len(options.sources) > 1):
+        raise Refused("--sensitivity: allowed: one scene, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]
-    if span is not None:
-        longest = max(motion.scene.duration for motion in motions)
-        if not 0.0 <= span[0] < longest:
-            raise Refused(f"--from {span[0]!r} is not allowed; allowed: 0 to below {longest:g} s")
-        if math.isfinite(span[1]) and span[1] > longest:
-            raise Refused(f"--to {span[1]!r} is not allowed; allowed: up to {longest:g} s")
-        span = span[0], min(span[1], longest)
+    if span is not None and options.last is None:
+        span = span[0], max(motion.scene.duration for motion in motions)
     if options.animate:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")
@@ -72,16 +75,6 @@ def _plot(options: argparse.Namespace) -> int:
     figure = plots.compose(motions, width_mm=options.width, span=span, panels=panels)
     write_figure(figure, output)
     return 0
-
-
-def _span(options: argparse.Namespace) -> Span:
-    """The times that are shown; None: all."""
-    if options.first is None and options.last is None:
-        return None
-    first, last = 0.0 if options.first is None else options.first, math.inf if options.last is None else options.last
-    if not first < last:
-        raise Refused(f"--from {first!r}, --to {last!r} is not allowed; allowed: --from below --to")
-    return first, last
 
 
 def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
@@ -111,7 +104,7 @@ def _simulated(reference: str, options: argparse.Namespace, span: Span) -> Traje
     prepare()
     grid = None
     if span is not None and not (options.sampled or scene.sampled):
-        first, last = min(max(span[0], 0.0), scene.duration), min(span[1], scene.duration)
+        first, last = np.clip(sorted(span), 0.0, scene.duration).tolist()
         grid = np.linspace(first, last, GRID_POINTS)
     return simulate(scene, grid=grid, sampled=options.sampled, method=options.method, setting=options.step,
                     sensitivity=options.sensitivity or None)
@@ -124,3 +117,22 @@ def _beside(source: str, ending: str) -> Path:
         if not path.exists():
             return Path(f"{path.stem}{ending}")
         return Path(f"{path.resolve()}{ending}") if path.is_dir() else path.with_suffix(ending)
+
+
+def sensitivity_panels(found: Sensitivity) -> list[plots.Panel]:
+    """A panel for each number: derivatives of the positions by it, over time."""
+    return [plots.Panel(partial(_draw, found, place), "derivative, m", 2) for place in range(len(found.keys))]
+
+
+def _draw(found: Sensitivity, place: int, axes: Axes, _: Motion) -> None:
+    rates = found.state_rates[:, ::2, place]
+    sizes = np.abs(rates[rates != 0.0])
+    if len(sizes) and sizes.max() > WIDE * np.median(sizes):
+        axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(np.median(sizes))))
+        axes.locator_params(axis="y", numticks=7)
+    for body in found.scene.system.present:
+        axes.plot(found.t, rates[:, COLUMN[body] // 2], label=f"$dx_{NAMES[body][0]}$", color=plots.COLORS[body],
+                  linewidth=1.0)
+    if found.corner is not None:
+        axes.axvline(found.corner, color="black", linewidth=0.8, linestyle=":", label="one-sided from here")
+    axes.set_title(f"by {found.keys[place]}", loc="left", fontsize="small", parse_math=False)

@@ -12,7 +12,9 @@ from grasp_ros.methods.contract import UNITS
 from grasp_ros.methods.registry import METHODS
 from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import printable
+from grasp_ros.physics.layout import Body, Entry, Transition
 from grasp_ros.physics.model import Array
+from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import Trajectory
 from grasp_ros.simulation.chunk import SETTLED
@@ -21,8 +23,10 @@ from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
 if TYPE_CHECKING:  # types of bags take long to import, and a simulation has none
     from grasp_ros.graph.recording import Recording
     from grasp_ros.graph.verify import Verification
+    from grasp_ros.simulation.differentiate import Sensitivity
 
 Row = tuple[str, str]
+LAST_EVENTS = 4  # whose derivatives are shown
 
 
 def table(rows: Iterable[Row]) -> str:
@@ -85,6 +89,34 @@ def _touches(found: dict[str, Any]) -> str:
     clamps, sticks = sum(found["clamped"].values()), found["sticks"]
     text = ", ".join(map(str, found["touches"].values()))
     return text + (f"; {clamps} times u' < -1/p" if clamps else "") + (f"; {sticks} times stuck" if sticks else "")
+
+
+def describe_sensitivity(found: Sensitivity) -> Iterable[Row]:
+    """Derivatives of the last state, of V_c there, and of the times of the last events, number by number."""
+    for key, own in last_rates(found).items():
+        yield f"d / d {key}", f"at t = {own['t']:.6g} s, by its unit"
+        for body in found.scene.system.present:
+            x, v = own["state"][COLUMN[body] : COLUMN[body] + 2]
+            yield f"  {NAMES[body]} position, velocity", f"{x:.12g} m, {v:.12g} m/s"
+        yield "  V_c", f"{own['V_c']:.12g} J"
+        for event in own["events"][-LAST_EVENTS:]:
+            what = f"{event['kind'].lower()} {event['body'].lower()}"
+            yield f"  {what} at {event['time_s']:.6g} s", f"{event['rate']:.12g} s"
+    if found.corner is not None:
+        yield "one-sided derivatives differ", f"from t = {found.corner:.6g} s on"
+
+
+def last_rates(found: Sensitivity) -> dict[str, dict[str, Any]]:
+    """Derivatives as data, number by number: at the last time of the state (6,) and V_c, and of the times of events."""
+    level_rates = found.V_c_rates[-1]
+    return {
+        key: {"t": found.t[-1], "state": found.state_rates[-1, :, place], "V_c": level_rates[place],
+              "corner": found.corner, "events": [
+                  {"time_s": event[Entry.TIME], "kind": Transition(int(event[Entry.KIND])).name,
+                   "body": Body(int(event[Entry.BODY])).name, "rate": rate}
+                  for event, rate in zip(found.event_table, found.event_rates[:, place], strict=True)]}
+        for place, key in enumerate(found.keys)
+    }
 
 
 def describe_recording(recording: Recording, found: dict[str, Any]) -> list[Row]:

@@ -12,7 +12,7 @@ from grasp_ros.cli.checks import check_output, load_scene
 from grasp_ros.cli.output import destination, show
 from grasp_ros.scene.commented import commented
 from grasp_ros.scene.files import YAML
-from grasp_ros.scene.library import text_of
+from grasp_ros.scene.scene import text_of
 
 DEFAULT = "case_01"
 

@@ -60,15 +60,13 @@ def _methods(options: argparse.Namespace) -> int:
 
 
 def _simulate(options: argparse.Namespace) -> int:
-    from grasp_ros.cli.report import describe_trajectory, table
+    from grasp_ros.cli.report import describe_sensitivity, describe_trajectory, last_rates, table
     from grasp_ros.simulation.summary import summary
 
     scene = load_scene(options.scene, options.settings)
     setting, controllers = _setting(options), load_controllers(options.controllers)
     sampled = options.sampled or bool(controllers)
     check_memory(scene, sampled, options.grid)
-    if options.sensitivity and (controllers or options.method != EXACT):  # before kernels are compiled
-        raise Refused(f"--sensitivity: allowed: --method {EXACT}, without --controller")
     check_output(options.output, (".npz", ".csv"), options.force, [options.scene])
     grid = None if options.grid is None else np.linspace(0.0, scene.duration, options.grid)
     prepare()
@@ -83,8 +81,6 @@ def _simulate(options: argparse.Namespace) -> int:
     rows = describe_trajectory(trajectory, found)
     rates = trajectory.sensitivity
     if rates is not None:
-        from grasp_ros.cli.sensitivity import describe_sensitivity, last_rates
-
         rows, found = [*rows, *describe_sensitivity(rates)], {**found, "sensitivity": last_rates(rates)}
     show(options, table(rows), found)
     if options.output is not None:

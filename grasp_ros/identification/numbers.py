@@ -13,11 +13,11 @@ from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.model import Array
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.effects.force import FORCED
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.sensitivity.directions import check_key
 
 OFFSET = "offset."  # of a sensor; the name of its channel follows
-OUTSIDE = ("_pulse", "_sine", "_table")  # sections of external forces
 DECADE = math.log(10.0)
 
 
@@ -75,7 +75,7 @@ def numbers_of(scene: Scene, keys: Sequence[str], data: Measured) -> tuple[Numbe
 def acts(key: str) -> bool:
     """Whether a number decides what acts on the bodies from outside: one of a controller, or an external force."""
     section = key.partition(".")[0]
-    return section.endswith(OUTSIDE) or (section in BY_SECTION and BY_SECTION[section].node != "plant")
+    return section in FORCED or (section in BY_SECTION and BY_SECTION[section].node != "plant")
 
 
 def _offset(key: str, data: Measured) -> Number:
@@ -91,6 +91,6 @@ def _number(scene: Scene, key: str) -> Number:
     if parameter.low < 0.0:
         return Number(key, value, False, max(abs(value), 1.0))
     if value == 0.0:
-        raise Refused(f"free: {key}: the search starts from the scene's value, 0; allowed: a start > 0, as with"
-                      f" --set {key}=VALUE")
+        raise Refused(f"free: {key}: the search starts from the scene's value, 0; allowed: a start > 0, as by the"
+                      f" setting {key}=VALUE")
     return Number(key, value, True)

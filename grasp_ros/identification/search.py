@@ -11,16 +11,24 @@ logarithm: so that what the data see is where they see it, 0 included.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.identification.measured import FEWEST, Measured
-from grasp_ros.identification.motion import motion
 from grasp_ros.identification.numbers import Number
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import Entry, Transition
 from grasp_ros.physics.model import Array
-from grasp_ros.scene import Scene
+from grasp_ros.scene import Scene, compose
+from grasp_ros.scene.effects import BY_SECTION
+from grasp_ros.scene.effects.force import FORCED
+from grasp_ros.sensitivity.directions import directions
+from grasp_ros.simulation.differentiate import carry, complete
+from grasp_ros.simulation.sampled_plant import SampledPlant
+from grasp_ros.simulation.ticks import tick_of
 
 GROWTHS = (2.0, math.sqrt(2.0))  # of the horizon; the second where the first does not lead to a fit
 FIRST = 16.0  # part of the motion that is the first horizon
@@ -166,3 +174,39 @@ def fitted(problem: Problem) -> Problem:
         residuals = problem.predict(nothing, rows)[0] - problem.data.state
         problem = problem._replace(noise=_at_least(np.sqrt(np.mean(residuals**2, axis=0)), problem.data))
     return problem.linear_from(refine(problem, nothing, rows))
+
+
+def motion(data: Measured, scene: Scene, keys: Sequence[str], rows: int) -> tuple[Array, Array, Array]:
+    """States (rows, 6) at the first times of a measurement, their derivatives (rows, 6, n), and touches (k, 2).
+
+    A touch is its time in s and its side. Recorded inputs act as they were; without them the controllers of the scene.
+    A run that does not get there is refused.
+    """
+    times, recorded = data.t[:rows], data.inputs is not None
+    scene = _plant(scene) if recorded else _until(scene, times)
+    integrator = Integrator(scene.system, continuous=not data.sampled)
+    carrier = carry(scene, integrator, directions(scene, keys, data.sampled), times, data.sampled)
+    if data.inputs is None:
+        states = complete(scene, integrator, data.sampled, times)
+    else:
+        plant = SampledPlant(scene.system, scene.period_ns, integrator)
+        states = np.vstack([plant.follow(data.inputs[: rows - 1]), plant.state])
+        if plant.status is not Status.DONE:
+            raise Refused(f"{scene.name}: {plant.stop}")
+    carrier.finish(times[-1] if recorded else scene.duration)
+    events = integrator.event_table
+    return states, carrier.out, events[events[:, Entry.KIND] == Transition.TOUCH][:, [Entry.TIME, Entry.BODY]]
+
+
+def _until(scene: Scene, times: Array) -> Scene:
+    """A scene that ends at the first tick behind the last of some times, if not before."""
+    ticks = int(tick_of(scene, times[-1:])[0]) + 1
+    return scene.changed({"time.duration_s": scene.time_of(ticks)}) if ticks < scene.ticks else scene
+
+
+def _plant(scene: Scene) -> Scene:
+    """What is left of a scene where all that acts from outside is known: bodies and contacts."""
+    return compose(scene.name, {
+        section: numbers for section, numbers in scene.values.items()
+        if BY_SECTION[section].node == "plant" and section != "loop" and section not in FORCED
+    })

@@ -36,14 +36,14 @@ def work(document: str, span: Span) -> tuple[dict[str, str], Chunk]:
 
 def connect(workers: int, scheduler: str) -> Any:
     """A client of a new cluster of so many processes on this machine, or of the scheduler at an address."""
-    with needing("--workers or --scheduler", "cluster"):
+    with needing("a cluster", "cluster"):
         from distributed import Client
     if not scheduler:
         return Client(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None)
     try:
         return Client(scheduler, timeout=TIMEOUT_S)
     except (OSError, ValueError) as error:
-        raise Refused(f"--scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
+        raise Refused(f"scheduler {scheduler}: nobody answers: {error or type(error).__name__}") from None
 
 
 def on_cluster(client: Any, plan: Plan, spans: Iterable[Span]) -> Generator[tuple[Span, Chunk], None, None]:

@@ -96,4 +96,4 @@ def read_bound(text: str) -> Bound:
     try:
         return Bound(name, read_number(most))
     except ValueError:
-        raise Refused(f"--subject-to {text}: not understood; allowed: OUTCOME<=NUMBER") from None
+        raise Refused(f"subject_to: {text}: not understood; allowed: OUTCOME<=NUMBER") from None

@@ -18,7 +18,7 @@ OWN = 4  # parameters of every law: tick, time, x and v
 
 
 class Observation(NamedTuple):
-    """What can be seen of a state by the controller of one arm; its properties are what a law may ask for."""
+    """What the controller of one arm may see of a state, see `OBSERVABLES`."""
 
     system: System
     laws: Mapping[int, ControlLaw]  # in force, by side
@@ -26,55 +26,27 @@ class Observation(NamedTuple):
     tick: int
     state: Sequence[float]  # (6,), m and m/s
 
-    @property
-    def x_object(self) -> float:
-        """Position of the object, m."""
-        return self.state[COLUMN[OBJECT]]
-
-    @property
-    def v_object(self) -> float:
-        """Velocity of the object, m/s."""
-        return self.state[COLUMN[OBJECT] + 1]
-
-    @property
-    def x_other(self) -> float:
-        """Position of the other arm, m, as its own sensor measures it."""
-        return self._other[0]
-
-    @property
-    def v_other(self) -> float:
-        """Velocity of the other arm, m/s, as its own sensor measures it."""
-        return self._other[1]
-
-    @property
-    def impact(self) -> float:
-        """Impact force between the arm and the object, N."""
-        return self.system.impact(self.side, self.state)
-
-    @property
-    def impact_other(self) -> float:
-        """Impact force between the other arm and the object, N."""
-        return self.system.impact(opposite(self.side), self.state)
-
-    @property
-    def set_point(self) -> float:
-        """Set-point of the feedback of the scene that the law replaces, m."""
-        return self.laws[self.side].set_point
-
     def values(self, names: Sequence[str]) -> dict[str, float]:
         """What some names ask for."""
-        return {name: getattr(self, name) for name in names}
+        return {name: OBSERVABLES[name](self) for name in names}
 
-    @property
-    def _other(self) -> tuple[float, float]:
+    def other(self) -> tuple[float, float]:
+        """Position in m and velocity in m/s of the other arm, as its own sensor measures them."""
         other = opposite(self.side)
         x, v = self.state[COLUMN[other]], self.state[COLUMN[other] + 1]
         law = self.laws.get(other)
         return law.measured(self.tick, x, v) if law else (x, v)
 
 
-OBSERVABLES = tuple(name for name, value in vars(Observation).items()
-                    if isinstance(value, property) and not name.startswith("_"))
+OBSERVABLES: dict[str, Callable[[Observation], float]] = {
+    "x_object": lambda seen: seen.state[COLUMN[OBJECT]],  # position of the object, m
+    "v_object": lambda seen: seen.state[COLUMN[OBJECT] + 1],  # its velocity, m/s
+    "x_other": lambda seen: seen.other()[0],
+    "v_other": lambda seen: seen.other()[1],
+    "impact": lambda seen: seen.system.impact(seen.side, seen.state),  # force between the arm and the object, N
+    "impact_other": lambda seen: seen.system.impact(opposite(seen.side), seen.state),  # of the other arm, N
+    "set_point": lambda seen: seen.laws[seen.side].set_point,  # of the feedback that the law replaces, m
+}
 CALLABLE = f"a callable of tick, time, x and v, and by name of any of {', '.join(OBSERVABLES)}"
 _OF_OBJECT, _OF_OTHER = ("x_object", "v_object", "impact", "impact_other"), ("x_other", "v_other", "impact_other")
 

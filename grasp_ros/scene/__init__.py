@@ -1,7 +1,6 @@
 """Scenes: strict YAML files that say everything about a run, and the effects that they are composed of."""
 
-from grasp_ros.scene.library import names
-from grasp_ros.scene.scene import PAPER, Scene, compose, load, parse
+from grasp_ros.scene.scene import PAPER, Scene, compose, load, names, parse
 from grasp_ros.scene.validation import SceneError
 
 __all__ = ["PAPER", "Scene", "SceneError", "compose", "load", "names", "parse"]

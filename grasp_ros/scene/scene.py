@@ -15,19 +15,18 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from grasp_ros import CONFIG
 from grasp_ros.physics import given
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.frozen import Frozen
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import System
-from grasp_ros.scene.changes import texts_of_changed
 from grasp_ros.scene.effects import BY_SECTION, build, named
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, period_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, nanoseconds, period_ns
 from grasp_ros.scene.effects.loop import HELD
 from grasp_ros.scene.files import YAML, read_text, reading
-from grasp_ros.scene.library import names, text_of
 from grasp_ros.scene.parameter import Parameter
-from grasp_ros.scene.settings import apply
+from grasp_ros.scene.settings import apply, texts_of_changed
 from grasp_ros.scene.strict_yaml import dump
 from grasp_ros.scene.strict_yaml import load as load_yaml
 from grasp_ros.scene.suggestion import allowed
@@ -76,7 +75,7 @@ class Scene(Frozen):
     @cached_property
     def warnings(self) -> tuple[str, ...]:
         """Valid but suspicious settings, a sentence each: the key, its value, why it is odd, and what may be meant."""
-        return tuple(str(oddity) for effect in self.effects for oddity in effect.oddities(self.values, self.system))
+        return tuple(warning for effect in self.effects for warning in effect.warnings(self.values, self.system))
 
     @property
     def initial_state(self) -> Array:
@@ -96,7 +95,7 @@ class Scene(Frozen):
     @cached_property
     def ticks(self) -> int:
         """Number of control periods in the run."""
-        return round(self.duration * NANOSECONDS) // self.period_ns
+        return nanoseconds(self.duration) // self.period_ns
 
     @property
     def sampled(self) -> bool:
@@ -191,6 +190,17 @@ class Scene(Frozen):
         watch = {"watch": self.watch} if self.watch else {}
         values = {section: dict(numbers) for section, numbers in self.values.items()}
         return {"title": self.title, "readings": self.readings, **watch, **values}
+
+
+def names() -> list[str]:
+    """Names of the scenes that come with the package, the paper's cases first."""
+    found = [entry.name.removesuffix(".yaml") for entry in CONFIG.iterdir() if entry.name.endswith(".yaml")]
+    return sorted(found, key=lambda name: (not name.startswith("case_"), name))
+
+
+def text_of(name: str) -> str:
+    """The file of one of them, as it was written."""
+    return (CONFIG / f"{name}.yaml").read_text(encoding="utf-8")
 
 
 def load(reference: str | os.PathLike[str], settings: Sequence[str] = ()) -> Scene:

@@ -1,10 +1,10 @@
-"""What `--set` says: numbers that replace those of a file or come beside them, and sections without numbers."""
+"""Settings: numbers beside those of a file or in their place; and what a scene with other numbers says of itself."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from grasp_ros.physics.errors import Refused
@@ -13,6 +13,8 @@ from grasp_ros.scene.strict_yaml import load
 from grasp_ros.scene.suggestion import allowed
 from grasp_ros.scene.validation import SceneError
 
+FEW = 2  # changes that a title names
+CHANGED = re.compile(r" \[(other numbers|\w+(\.\w+)?=[^\]]*)\]$")  # at the end of a title
 
 def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
     """Put settings into the document of a scene, which is changed in place, before it is validated; in any order.
@@ -21,7 +23,7 @@ def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
     """
     for target, count in Counter(setting.partition("=")[0] for setting in settings).items():
         if count > 1:
-            raise SceneError(f"--set {target}: given {count} times; allowed: once")
+            raise SceneError(f"setting {target}: given {count} times; allowed: once")
     for setting in sorted(settings, key=lambda one: not one.endswith("={}")):  # before others give the section numbers
         _apply(setting, document)
 
@@ -29,21 +31,45 @@ def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
 def _apply(setting: str, document: dict[Any, Any]) -> None:
     match = re.fullmatch(r"(\w+)(?:\.(\w+)=(.*)|=\{\})", setting)
     if match is None:
-        raise SceneError(f"--set {setting}: not understood; allowed: section.key=value, or section={{}}")
+        raise SceneError(f"setting {setting}: not understood; allowed: section.key=value, or section={{}}")
     section, key, value = match.groups()
     if key is None:
         if section not in BY_SECTION:
-            raise SceneError(f"--set {setting}: no such section; {allowed(section, BY_SECTION)}")
+            raise SceneError(f"setting {setting}: no such section; {allowed(section, BY_SECTION)}")
         if document.setdefault(section, {}):
-            raise SceneError(f"--set {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
+            raise SceneError(f"setting {setting}: {section} has numbers, which stay; allowed: {section}.key=value")
         return
     known = [f"{name}.{parameter.key}" for name, effect in BY_SECTION.items() for parameter in effect.parameters]
     if f"{section}.{key}" not in known:
-        raise SceneError(f"--set {setting}: no such key; {allowed(f'{section}.{key}', known)}")
+        raise SceneError(f"setting {setting}: no such key; {allowed(f'{section}.{key}', known)}")
     try:
         number = load(value)
     except Refused as error:
-        raise SceneError(f"--set {setting}: {error}; allowed: a number") from None
+        raise SceneError(f"setting {setting}: {error}; allowed: a number") from None
     numbers = document.setdefault(section, {})
     if isinstance(numbers, dict):  # anything else is refused with the file
         numbers[key] = number
+
+
+def texts_of_changed(title: str, watch: str, before: Mapping[str, Any] | None, values: Mapping[str, Any]
+                     ) -> tuple[str, str]:
+    """Title, which names what is other than before if it is little, and what to watch for, which was said of that.
+
+    How long a scene lasts does not count. None: nothing was before.
+    """
+    changes = [] if before is None else _differences(before, values)
+    if not changes:
+        return title, watch
+    base = CHANGED.sub("", title)
+    words = ", ".join(changes) if len(changes) <= FEW and base == title else "other numbers"
+    return f"{base} [{words}]", ""
+
+
+def _differences(before: Mapping[str, Any], values: Mapping[str, Any]) -> list[str]:
+    """What is other than before, as settings would say it."""
+    found = [f"{section}={{}}" for section, numbers in values.items() if section not in before and not numbers]
+    for section, numbers in values.items():
+        for key, value in numbers.items():
+            if before.get(section, {}).get(key) != value and (section, key) != ("time", "duration_s"):
+                found.append(f"{section}.{key}={'...' if isinstance(value, tuple) else f'{value:g}'}")
+    return found

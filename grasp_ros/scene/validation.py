@@ -84,7 +84,7 @@ def check_together(source: str, values: Mapping[str, Mapping[str, Any]]) -> None
                 raise SceneError(f"{source}: {effect.section}: needs {section}; allowed: a scene that names both")
     for effect in effects:
         for problem in effect.problems(values):
-            raise SceneError(f"{source}: {problem.key}: {problem.value!r} is not allowed; allowed: {problem.allowed}")
+            raise SceneError(f"{source}: {problem}")
 
 
 def check_domain(source: str, values: Mapping[str, Mapping[str, Any]], system: System) -> None:

@@ -17,7 +17,7 @@ from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene.files import format_of, replaced
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
-from grasp_ros.simulation.plots import COLORS, MM
+from grasp_ros.simulation.plots import COLORS, MM, shown
 from grasp_ros.simulation.tables import Motion
 
 FRONTS: dict[int, float] = {LEFT: 1.5, OBJECT: 0.5, RIGHT: -0.5}  # lengths from the begin of a body to its position
@@ -54,7 +54,7 @@ def _times(motion: Motion, speed: float, span: tuple[float, float] | None) -> Ar
         raise Refused("nothing to draw: the motion has no output times")
     if not 0.0 < speed < np.inf:
         raise Refused(f"speed: {speed!r} is not allowed; allowed: a number > 0")
-    first, last = span or (float(motion.t[0]), float(motion.t[-1]))
+    first, last = shown([motion], span) or (float(motion.t[0]), float(motion.t[-1]))
     count = int((last - first) / speed * RATE) + 1
     if count > MOST_PICTURES:
         raise Refused(f"speed: {speed!r} makes {count} pictures; allowed: at most {MOST_PICTURES}, by a higher speed"

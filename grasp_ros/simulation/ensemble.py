@@ -140,7 +140,7 @@ def ensemble(
     threads : int, optional
         Default: one for each core. The result does not depend on it.
     progress : callable or True, optional
-        True: a bar, in a terminal or in a notebook. A callable is told the number of rows of each chunk that is done.
+        True: a bar, in a terminal or in a notebook. A callable is told how many rows are done.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def ensemble(
             stops.update({first + i: stop for i, stop in chunk.stops.items()})
             reached += last - first
             if told is not None:
-                told(reached if progress is True else last - first)
+                told(reached)
     return Table(scene, setup, variants.changes, found, status, stops)
 
 

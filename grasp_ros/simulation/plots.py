@@ -18,9 +18,7 @@ from grasp_ros.physics.energy import PLANT_ALONE
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.given import ascending, instance, names, number, rows
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
-from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
-from grasp_ros.scene import PAPER
 from grasp_ros.scene.files import format_of, replacing
 from grasp_ros.simulation import canvas
 from grasp_ros.simulation.canvas import Axes, Figure
@@ -33,8 +31,6 @@ COLORS: dict[int, str] = {LEFT: LEFT_COLOR, OBJECT: OBJECT_COLOR, RIGHT: RIGHT_C
 V_COLOR = "#cc79a7"
 SIDES = ((LEFT, "l", LEFT_COLOR), (RIGHT, "r", RIGHT_COLOR))
 LONGEST_TITLE = 200  # characters
-PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
-PAPER_INPUT = (-10.0, 10.0)  # N
 WIDTH_MM = 230.0  # of a figure with one motion
 NARROWEST_MM, WIDEST_MM = 60.0, 1000.0
 MM = 25.4
@@ -84,6 +80,7 @@ def compose(
     span: tuple[float, float] | None = None, panels: Sequence[Panel] | None = None,
 ) -> Figure:
     """The figure that `draw` writes; its panels are by default all of PANELS."""
+    span = shown(motions, span)
     for motion in motions:
         if not len(instance("motion", motion, Tabular, A_MOTION).t) or motion.t[0] == motion.t[-1]:
             raise Refused("nothing to draw: the motion has fewer than two output times")
@@ -93,7 +90,6 @@ def compose(
         raise Refused(f"captions: {len(captions)} for {len(motions)} motions; allowed: a motion, and one for each")
     usual = WIDTH_MM if len(motions) == 1 else 150.0 * len(motions)
     width = usual if width_mm is None else number("width_mm", width_mm)
-    first_last = None if span is None else ascending("span", rows("span", span, 2), np.inf, strictly=True)
     if width_mm is not None and not NARROWEST_MM <= width <= WIDEST_MM:
         raise Refused(f"width_mm: {width!r} is not allowed; allowed: {NARROWEST_MM:g} to {WIDEST_MM:g} mm")
     small = width / len(motions) < ONE_COLUMN_MM
@@ -112,7 +108,7 @@ def compose(
                 panel.draw(axes, motion)
                 shade_contacts(axes, motion)
                 axes.grid(alpha=0.3)
-                axes.set_xlim(*(motion.t[[0, -1]] if first_last is None else first_last))
+                axes.set_xlim(*(motion.t[[0, -1]] if span is None else span))
                 if column == 0:
                     axes.set_ylabel(panel.label)
             grid[-1, column].set_xlabel("time, s")
@@ -121,6 +117,15 @@ def compose(
         figure.align_ylabels(grid[:, 0])
         figure.canvas.draw()  # the layout, with the letters of this context
         return figure
+
+
+def shown(motions: Sequence[Motion], span: tuple[float, float] | None) -> tuple[float, float] | None:
+    """The first and the last time in s that are wanted, which the longest motion has; None: all."""
+    if span is None:
+        return None
+    longest = max(instance("motion", motion, Tabular, A_MOTION).scene.duration for motion in motions)
+    first, last = ascending("span", rows("span", span, 2), longest, strictly=True).tolist()
+    return first, last
 
 
 def _title(motion: Motion, caption: str, width_mm: float, small: bool) -> str:
@@ -137,30 +142,18 @@ def legend_beside(axes: Axes) -> None:
 
 
 def displacements(axes: Axes, motion: Motion) -> None:
-    """x_l, x_o, x_r, on the paper's axes for its cases."""
+    """x_l, x_o, x_r."""
     for body, column in COLUMN.items():
         x = motion.state[:, column]
         if not np.isnan(x).all():
             axes.plot(motion.t, x, label=f"$x_{NAMES[body][0]}$", color=COLORS[body], linewidth=1.2)
-    if motion.scene.values.keys() == PAPER:
-        _widen(axes, PAPER_DISPLACEMENT, motion.state[:, 0::2])
 
 
 def inputs(axes: Axes, motion: Motion) -> None:
-    """f_l, f_r, on the paper's axes for its cases."""
+    """f_l, f_r."""
     for side, letter, color in SIDES:
         if side in motion.scene.system.laws or motion.command[:, side].any():
             axes.plot(motion.t, motion.command[:, side], label=f"$f_{letter}$", color=color, linewidth=1.0)
-    if motion.scene.values.keys() == PAPER:
-        _widen(axes, PAPER_INPUT, motion.command)
-        low, high = axes.get_ylim()
-        if any(low <= 2.0 * edge <= high for edge in PAPER_INPUT):  # the input goes on beyond the paper's axis
-            for edge in PAPER_INPUT:
-                axes.axhline(edge, color="black", linewidth=0.6, linestyle=":")
-            axes.text(
-                0.99, PAPER_INPUT[0], "the paper's axis ends", transform=axes.get_yaxis_transform(), ha="right",
-                va="top", fontsize="x-small",
-            )
 
 
 def impacts(axes: Axes, motion: Motion) -> None:
@@ -226,14 +219,6 @@ def html_of(run: Trajectory) -> str:
         write(compose([run]), picture, ".png", dpi=80)
         found += f"<img src='data:image/png;base64,{b64encode(picture.getvalue()).decode()}'>"
     return found
-
-
-def _widen(axes: Axes, paper: tuple[float, float], values: Array) -> None:
-    """The paper's axes, widened where a motion leaves them; of several motions in a row, the widest."""
-    low, high = axes.get_ylim()
-    drawn = len(axes.lines) > 0 and axes.get_shared_y_axes().get_siblings(axes) != [axes]
-    before = (low, high) if drawn and low <= paper[0] and high >= paper[1] else paper
-    axes.set_ylim(min(before[0], 1.05 * values.min()), max(before[1], 1.05 * values.max()))
 
 
 PANELS = {

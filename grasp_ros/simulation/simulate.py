@@ -69,7 +69,7 @@ def simulate(
         Controllers in place of the scene's feedback, "left" or "right": from the tick, its time in s, and what the
         sensor of the scene measures of the arm, x in m and v in m/s, to a command in N, which is limited and delayed
         as the scene says. Further parameters are given what their names ask for, see
-        `physics.observation.Observation`. The loop is sampled. Each is called once for every tick, the last one
+        `physics.observation.OBSERVABLES`. The loop is sampled. Each is called once for every tick, the last one
         included. A function that numba has compiled and that asks for nothing more runs at full speed. A class is made
         anew for the run; of any other object `reset()` is called before it, if it has one.
     sensitivity : sequence of str, optional

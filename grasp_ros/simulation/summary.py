@@ -18,14 +18,7 @@ from grasp_ros.scene.effects.base import SIDES
 from grasp_ros.simulation.chunk import HORIZONS
 from grasp_ros.simulation.losses import external_work, losses_of, needs_ticks
 from grasp_ros.simulation.outcomes import GROUPS
-from grasp_ros.simulation.quantities import (
-    as_row,
-    last_outside,
-    may_rise,
-    may_settle,
-    settled_distance,
-    settled_of,
-)
+from grasp_ros.simulation.quantities import as_row, last_outside, may_rise, may_settle, settled_distance, settled_of
 from grasp_ros.simulation.repeat import at_every_tick
 from grasp_ros.simulation.trajectory import Trajectory, check_run
 

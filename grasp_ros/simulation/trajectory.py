@@ -121,7 +121,7 @@ class Trajectory(Tabular, Frozen):
         system, ticks = self.scene.system, tick_of(self.scene, self.t)
         inputs: Array = np.zeros((len(self.t), 3))
         inputs[:, [LEFT, RIGHT]] = self.command
-        if system.external:
+        if system.external:  # at these ticks alone: between them there may be more than memory holds
             several, place = np.unique(ticks, return_inverse=True)
             inputs += np.reshape([system.external_at(tick) for tick in several.tolist()], (-1, 3))[place]
         inputs[ticks == self.scene.ticks] = np.nan

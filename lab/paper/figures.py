@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from grasp_ros.simulation.plots import LEFT_COLOR, OBJECT_COLOR, RIGHT_COLOR, le
 from grasp_ros.simulation.quantities import contact_intervals, settling_times
 from grasp_ros.simulation.repeat import integrator_of
 from lab.paper.cases import STANDARD, Figure, Start, start_of, started
+from lab.paper.prints import PAPER_DISPLACEMENT, PAPER_INPUT
 
 CAUSES = (("dampers", "#56b4e9"), ("feedback", "#e69f00"), ("impacts", "#009e73"), ("friction", "#999999"))
 TAKEN = [int(cause) for cause in (Seen.DAMPERS, Seen.FEEDBACK, Seen.IMPACTS, Seen.FRICTION)]  # as in `Losses`
@@ -66,8 +68,8 @@ def sheet(several: Sequence[Pictured]) -> Drawing:
     cells = cells.ravel()
     for cell, each in zip(cells, several, strict=False):
         top, bottom = cell.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-        plots.displacements(top, each.run)
-        plots.inputs(bottom, each.run)
+        _on_its_axis(plots.displacements, top, each.run)
+        _on_its_axis(plots.inputs, bottom, each.run)
         for axes in (top, bottom):
             shade_contacts(axes, each.run)
             axes.grid(alpha=0.25)
@@ -80,6 +82,22 @@ def sheet(several: Sequence[Pictured]) -> Drawing:
     for cell in cells[len(several) :]:
         _key(cell.subplots())
     return figure
+
+
+def _on_its_axis(draw: Callable[[Axes, Trajectory], None], axes: Axes, run: Trajectory) -> None:
+    """Draw a panel, displacements and inputs on the paper's axis, which is widened where a motion leaves it."""
+    draw(axes, run)
+    found = {plots.displacements: (PAPER_DISPLACEMENT, run.state[:, 0::2]), plots.inputs: (PAPER_INPUT, run.command)}
+    if draw not in found:
+        return
+    edges, values = found[draw]
+    low, high = min(edges[0], 1.05 * values.min()), max(edges[1], 1.05 * values.max())
+    axes.set_ylim(low, high)
+    if draw is plots.inputs and any(low <= 2.0 * edge <= high for edge in edges):  # it goes on beyond the paper's axis
+        for edge in edges:
+            axes.axhline(edge, color="black", linewidth=0.6, linestyle=":")
+        axes.text(0.99, edges[0], "the paper's axis ends", transform=axes.get_yaxis_transform(), ha="right", va="top",
+                  fontsize="x-small")
 
 
 def _key(axes: Axes) -> None:
@@ -101,7 +119,8 @@ def large(each: Pictured) -> Drawing:
     halves: Any = figure.subfigures(1, 2, width_ratios=(3.1, 1.0))
     wide, narrow = halves
     left = wide.subplots(5, 1, sharex=True, height_ratios=(3, 2, 2, 2, 2))
-    for axes, (draw, label, _) in zip(left, plots.PANELS.values(), strict=False):
+    for axes, (panel, label, _) in zip(left, plots.PANELS.values(), strict=False):
+        draw = partial(_on_its_axis, panel)
         if each.beside is not None:
             _behind(axes, draw, each.beside)
         draw(axes, each.run)

@@ -12,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.simulation import simulate
-from grasp_ros.simulation.plots import PAPER_DISPLACEMENT, PAPER_INPUT
 from lab.paper.cases import ABSENT, LARGER, STANDARD, TENFOLD, Cases, Figure, value_of
 from lab.paper.claims import Claim, Verdict
 
+PAPER_DISPLACEMENT = (-1.0, 1.0)  # m, the axes of Figs. 2 to 12
+PAPER_INPUT = (-10.0, 10.0)  # N
 WIDTH = 0.01  # of an axis: a line that passes its end by less cannot be told from one that touches it
 LAST = 20.0  # s, at the end of the time axis of each figure
 LETTERS = ("m_l", "m_r", "k", "c", "Kp", "Kv", "p", "H", "m_o")

@@ -8,6 +8,7 @@ from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.accuracy.compare import fastest
+from grasp_ros.accuracy.contender import OURS
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.methods.registry import EXACT, METHODS
 from grasp_ros.scene import Scene
@@ -59,7 +60,7 @@ def write(docs: Path, directory: Path, quick: bool) -> Path:
     if quick:
         *subjects, case = (scene.changed({"time.duration_s": QUICK_S}) for scene in (*subjects[:2], case))
     records = accuracy.run(subjects, directory, measure.QUICK if quick else measure.FULL, [
-        contender for contender in all_contenders(case) if contender.family == "grasp_ros" or not quick])
+        contender for contender in all_contenders(case) if contender.family == OURS or not quick])
     drifts = drift.run(directory, *((QUICK_S, QUICK_DRIFT) if quick else (drift.SECONDS, None)))
     predictions = predictability.run(subjects, QUICK_S if quick else predictability.SECONDS)
     limits = stability.limits(grasp_of(case).left)

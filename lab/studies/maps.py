@@ -167,7 +167,8 @@ def _unstable(scene: Scene, periods: Array, gains: Array) -> Array:
         if f"{side}_sensor" in scene.values:
             changes[f"{side}_sensor.noise_seed"] = np.arange(len(gain)) + 1.0
     with tqdm(total=len(gain), unit="run", desc=scene.certificate_in_words(True)[:40], file=sys.stderr) as bar:
-        found = ensemble(scene, changes, ("extremes",), setup=Setup(max_work=RUNAWAY), progress=bar.update)
+        found = ensemble(scene, changes, ("extremes",), setup=Setup(max_work=RUNAWAY),
+                         progress=lambda done: bar.update(done - bar.n))
     largest = np.max([np.abs(values) for name, values in found.columns.items() if name.startswith("x_")], axis=0)
     start = np.abs(scene.initial_state[0::2]).max()
     return np.asarray(~(largest <= GROWN * start)).reshape(len(gains), len(periods))

@@ -9,7 +9,7 @@ import statistics
 from functools import partial
 from typing import NamedTuple
 
-from grasp_ros.accuracy.contender import Contender, own_contenders
+from grasp_ros.accuracy.contender import Contender, contender_of
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth
 from grasp_ros.methods.registry import EXACT
@@ -32,7 +32,7 @@ class Timing(NamedTuple):
 def final_state(scene: Scene, target: Truth, error: float) -> list[Timing]:
     """Time to an error in the last state, of `exact` and of heyoka, its closest rival, where they reach it."""
     target = target._replace(grid=target.grid[-1:])
-    exact = next(contender for contender in own_contenders(scene)[0] if contender.name == EXACT)
+    exact = contender_of(EXACT)
     finer = tuple(10.0 ** (-k / FINER) for k in range(3 * FINER, 16 * FINER + 1))
     records, calls = [], []
     for rival in (exact._replace(ladder=finer), peer_heyoka.contenders()[-1]):

@@ -137,6 +137,7 @@ def test_a_table_for_other_programs(command: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("program", ["$GRASP scenes >&-", "$GRASP --help >&-", "$GRASP --help | head -n 1",
+                                     "$GRASP scenes | head -n 1",
                                      "$GRASP scenes --json >&- 2>&-"])
 def test_a_closed_output_is_no_traceback(program: str) -> None:
     result = shell(f"{program}; exit ${{PIPESTATUS[0]}}")

@@ -58,10 +58,10 @@ def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("--from", "3", "--to", "2"), "--from 3.0, --to 2.0 is not allowed; allowed: --from below --to"),
-        (("--from", "99"), "--from 99.0 is not allowed; allowed: 0 to below 20 s"),
-        (("--to", "21"), "--to 21.0 is not allowed; allowed: up to 20 s"),
-        (("case_03", "--sensitivity", "object.mass_kg"), "--sensitivity: allowed: one scene, --method exact"),
+        (("--from", "3", "--to", "2"), "span: 2.0 after 3.0 is not allowed; allowed: ascending from 0 to 20.0 s"),
+        (("--from", "99"), "span: 99.0 is not allowed; allowed: ascending from 0 to 20.0 s"),
+        (("--to", "21"), "span: 21.0 after 0.0 is not allowed; allowed: ascending from 0 to 20.0 s"),
+        (("case_03", "--sensitivity", "object.mass_kg"), "--sensitivity: allowed: one scene, without --animate"),
         (("--sensitivity", "object.colour"), "object.colour: not in this scene"),
         (("--animate", "--panel", "input"), "--panel: allowed: without --animate"),
         (("--speed", "2"), "--speed: with it"),

@@ -226,13 +226,13 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
 
 
 @pytest.mark.parametrize(("content", "words", "complaint"), [
-    (ROWS, ("--free", P_LEFT), "a table does not name its scene; allowed: a scene beside it, --scene"),
+    (ROWS, ("--free", P_LEFT), "a table does not name its scene; allowed: a scene beside it"),
     (ROWS, ("--scene", "case_01", "--free", "left_contact.hertz"), f"did you mean {H_LEFT}"),
     (ROWS, ("--scene", "case_01", "--free", "time.duration_s"), "has no derivative: it moves ticks"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", P_LEFT), "given twice"),
     (ROWS, ("--scene", "case_01", "--free", "offset.x_left_m"), "at least one number of the scene"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--free", "offset.v_left_m_per_s"), "not measured"),
-    (ROWS, ("--scene", "case_02", "--free", P_LEFT), f"allowed: a start > 0, as with --set {P_LEFT}=VALUE"),
+    (ROWS, ("--scene", "case_02", "--free", P_LEFT), f"allowed: a start > 0, as by the setting {P_LEFT}=VALUE"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{H_LEFT}=1"), "allowed: a number of the scene that"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", P_LEFT), "allowed: KEY=VALUE, with a number"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=-1"), "dissipation_s_per_m: -1.0 is not"),

@@ -13,7 +13,7 @@ import pytest
 from documents import stalling
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.contender import Answer, Contender, own_contenders
+from grasp_ros.accuracy.contender import Answer, Contender, contender_of
 from grasp_ros.accuracy.measure import Record
 from grasp_ros.accuracy.truth import Truth, finest
 from lab.studies import accuracy, figures, measure
@@ -24,7 +24,7 @@ QUICK = measure.QUICK._replace(stride=1)
 
 
 def contender(name: str, *ladder: float) -> Contender:
-    return next(c for c in own_contenders(scenes.load("case_01"))[0] if c.name == name)._replace(ladder=ladder)
+    return contender_of(name)._replace(ladder=ladder)
 
 
 def test_error_contacts_and_work_are_measured_not_believed(tmp_path: Path) -> None:

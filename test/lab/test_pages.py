@@ -20,7 +20,7 @@ import pytest
 from jinja2 import Environment, nodes
 
 from grasp_ros import scene as scenes
-from grasp_ros.accuracy.contender import own_contenders
+from grasp_ros.accuracy.contender import contender_of
 from grasp_ros.methods.registry import EXACT
 from grasp_ros.simulation import GRID_POINTS
 from lab.cases.registry import cases
@@ -99,7 +99,7 @@ def test_jumps_and_limits_are_those_of_the_code() -> None:
 
 def test_the_work_of_each_accuracy_is_that_of_the_code() -> None:
     subjects = {scene.name: scene for scene in accuracy.default_scenes()}
-    [exact] = [contender for contender in own_contenders(scenes.load("case_01"))[0] if contender.name == EXACT]
+    exact = contender_of(EXACT)
     with (DOCS / "accuracy" / "records.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if row["method"] == EXACT]
     assert len(rows) > 5 * len(subjects)

@@ -8,12 +8,11 @@ from typing import Any
 import gmpy2
 import numpy as np
 import pytest
+from documents import body, made
 from gmpy2 import mpfr
 from scipy.integrate import solve_ivp
 
-from grasp_ros import scene as scenes
 from grasp_ros.physics.model import Contact, impact_force, penetration
-from grasp_ros.scene import Scene
 from lab.cases.regression import load
 from lab.reference import integrate_scene
 
@@ -27,16 +26,6 @@ def _precision() -> Iterator[None]:
         yield
 
 
-def compose(seconds: float, period: float | None = None, **sections: dict[str, Any]) -> Scene:
-    """A scene; the control period is its horizon unless given."""
-    time = {"duration_s": seconds, "control_period_s": period or seconds}
-    return scenes.compose("scene", {"time": time, **sections})
-
-
-def body(mass: float, x: float = 0.0, v: float = 0.0, **rest: float) -> dict[str, float]:
-    return {"mass_kg": mass, "position_m": x, "velocity_m_per_s": v, **rest}
-
-
 def close(found: Any, expected: Any, tolerance: str = "1e-24") -> bool:
     return bool(abs(mpfr(found) - mpfr(expected)) <= mpfr(tolerance))
 
@@ -47,7 +36,7 @@ def kinds(found: Any) -> list[tuple[int, str]]:
 
 def test_a_sliding_object_stops_where_the_closed_form_says() -> None:
     m, c, force, v = mpfr(2), mpfr(0.5), mpfr(0.25), mpfr(1.5)
-    scene = compose(20.0, object=body(2.0, 0.0, 1.5), object_friction={"viscous_Ns_per_m": 0.5, "coulomb_N": 0.25})
+    scene = made(20.0, object=body(2.0, 0.0, 1.5), object_friction={"viscous_Ns_per_m": 0.5, "coulomb_N": 0.25})
     found = integrate_scene(scene, [0.0, 1.0, 20.0])
     decay = gmpy2.exp(-c / m)
     assert close(found.state[1][3], (v + force / c) * decay - force / c)
@@ -58,7 +47,7 @@ def test_a_sliding_object_stops_where_the_closed_form_says() -> None:
 
 
 def test_an_object_that_a_force_pushes_back_turns_around() -> None:
-    scene = compose(
+    scene = made(
         2.0, object=body(1.0, 0.0, 1.0), object_friction={"coulomb_N": 1.0},
         object_table={"time_s": [0.0], "force_N": [-3.0]},
     )
@@ -70,7 +59,7 @@ def test_an_object_that_a_force_pushes_back_turns_around() -> None:
 
 def test_a_stuck_object_is_a_wall_until_it_slips() -> None:
     """O1 beside a wall."""
-    scene = compose(1.0, left_arm=body(1.0, -0.5, 1.0), object=body(3.0), left_contact=CONTACT,
+    scene = made(1.0, left_arm=body(1.0, -0.5, 1.0), object=body(3.0), left_contact=CONTACT,
                     object_friction={"coulomb_N": 1000.0})
     found = integrate_scene(scene, [1.0])
     beta = gmpy2.gamma(mpfr("0.4")) * gmpy2.gamma(mpfr("0.5")) / gmpy2.gamma(mpfr("0.9"))
@@ -85,7 +74,7 @@ def test_a_stuck_object_is_a_wall_until_it_slips() -> None:
 
 def test_a_stuck_object_slips_when_it_is_pushed_at_a_tick() -> None:
     """F = 1 N: 5 N for 0.4 s give 8 m/s^2, then friction takes 2 m/s^2."""
-    scene = compose(1.0, 0.1, left_arm=body(1.0, -1.0), object=body(0.5), left_contact=CONTACT,
+    scene = made(1.0, 0.1, left_arm=body(1.0, -1.0), object=body(0.5), left_contact=CONTACT,
                     object_friction={"coulomb_N": 1.0}, object_pulse={"force_N": 5.0, "start_s": 0.2, "length_s": 0.4})
     found = integrate_scene(scene, [0.2, 0.6, 1.0])
     assert [[float(number) for number in row[2:4]] for row in found.state] == [
@@ -94,7 +83,7 @@ def test_a_stuck_object_slips_when_it_is_pushed_at_a_tick() -> None:
 
 
 def test_forces_change_at_ticks() -> None:
-    scene = compose(1.0, 0.25, left_arm=body(2.0), left_arm_pulse={"force_N": 8.0, "start_s": 0.25, "length_s": 0.5})
+    scene = made(1.0, 0.25, left_arm=body(2.0), left_arm_pulse={"force_N": 8.0, "start_s": 0.25, "length_s": 0.5})
     found = integrate_scene(scene, [0.25, 0.5, 1.0])
     assert [row[:2] for row in found.state] == [(0, 0), (mpfr("0.125"), 1), (1, 2)]
 
@@ -102,7 +91,7 @@ def test_forces_change_at_ticks() -> None:
 @pytest.mark.parametrize("delay", [0, 2])
 def test_a_sampled_arm_follows_its_recursion(delay: int) -> None:
     gains = {"position_gain_N_per_m": 5.0, "velocity_gain_Ns_per_m": 2.0, "set_point_m": 0.5}
-    scene = compose(2.0, 0.125, left_arm=body(4.0, 1.0, -0.5), left_feedback=gains, loop={"delay_ticks": delay})
+    scene = made(2.0, 0.125, left_arm=body(4.0, 1.0, -0.5), left_feedback=gains, loop={"delay_ticks": delay})
     x, v, h = mpfr(1), mpfr("-0.5"), mpfr("0.125")
     waiting = [mpfr(0)] * delay
     for _ in range(scene.ticks):
@@ -115,7 +104,7 @@ def test_a_sampled_arm_follows_its_recursion(delay: int) -> None:
 
 
 def test_what_falls_together_never_meets() -> None:
-    scene = compose(10.0, left_arm=body(1.0), object=body(0.5), left_contact=CONTACT,
+    scene = made(10.0, left_arm=body(1.0), object=body(0.5), left_contact=CONTACT,
                     tilt={"angle_rad": -0.5, "gravity_m_per_s2": 9.81})
     found = integrate_scene(scene, [5.0, 10.0])
     assert found.events == []
@@ -125,7 +114,7 @@ def test_what_falls_together_never_meets() -> None:
 @pytest.mark.parametrize(("push", "together"), [(1.0, True), (-1.0, False)])
 def test_the_first_derivative_that_differs_decides(push: float, together: bool) -> None:
     feedback = {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": push}
-    scene = compose(0.5, left_arm=body(1.0, **FLAT), object=body(1.0), left_contact=CONTACT, left_feedback=feedback)
+    scene = made(0.5, left_arm=body(1.0, **FLAT), object=body(1.0), left_contact=CONTACT, left_feedback=feedback)
     found = integrate_scene(scene, [0.5])
     x, v, x_o, v_o = found.state[0][:4]
     assert close(v + v_o, mpfr(push) / 2)

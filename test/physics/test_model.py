@@ -8,7 +8,6 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from oracles import STANDARD, energy, make_grasp
 
-from grasp_ros.physics import layout
 from grasp_ros.physics.model import (
     Contact,
     Mode,
@@ -35,17 +34,6 @@ STATES = {
     "left, right clamped": ([0.12, 0.7, 0.1, -0.6, 0.07, 0.4], Mode.LEFT),
     "both clamped": ([0.12, -10.5, 0.1, -0.3, 0.07, 0.4], Mode.NONE),
 }
-
-
-def test_layout_indexes_every_column_once() -> None:
-    assert sorted((layout.LEFT, layout.RIGHT, layout.OBJECT)) == [0, 1, 2]
-    assert sorted([*layout.X, *layout.V, *layout.U]) == list(range(8))
-    assert [layout.V[name] - layout.X[name] for name in "LOR"] == [1, 1, 1]
-    assert layout.U.R == layout.U.L + layout.RIGHT
-    assert {layout.Lane.TIME, layout.Lane.CHECK} == {layout.X.L, layout.X.R}
-    assert list(layout.Z) == list(layout.U)
-    for enum in (layout.Of, layout.Law, layout.Entry, layout.Pair, layout.Transition, layout.Outcome, layout.Work):
-        assert sorted(enum) == list(range(min(enum), min(enum) + len(enum)))
 
 
 @given(*[st.floats(0.0, 1e15)] * 2, *[st.floats(-1e9, 1e9)] * 2)
@@ -102,15 +90,6 @@ def test_rate_is_the_derivative_along_the_motion(name: str) -> None:
         coarse, fine = slope(field, 2e-6), slope(field, 1e-6)
         assert (4.0 * fine - coarse) / 3.0 == pytest.approx(level.V_rate, rel=1e-7)
     assert level.V_rate < 0.0  # no state above is at rest
-
-
-def test_rate_of_18_in_contact_is_written_out() -> None:
-    state, _ = STATES["both"]
-    v_l, v_o, v_r = state[1::2]
-    u_l, u_r = state[0] - state[2], state[2] - state[4]
-    expected = -2 * 0.7 * v_l**2 - 2 * 1.1 * v_r**2
-    expected -= 2 * 0.1 * 1e4 * u_l**1.5 * (v_l - v_o) ** 2 + 2 * 2.0 * 3e3 * u_r**1.5 * (v_o - v_r) ** 2
-    assert energy(GRASP, np.array(state)).V_rate == pytest.approx(expected, rel=1e-13)
 
 
 @pytest.mark.parametrize("p", [0.5, 4.0, 1.0 / 1024])

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from documents import STEPS, body, horizon, made, scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT, Of, Transition
-from grasp_ros.scene import Scene, compose
+from grasp_ros.scene import Scene
 from grasp_ros.sensitivity.spectrum import spectrum
 from grasp_ros.simulation import simulate
 from grasp_ros.simulation.differentiate import Sensitivity, differentiate
@@ -39,10 +40,6 @@ FROM_REFERENCE: list[tuple[str, str, float, float, list[float]]] = [
 ]
 
 
-def short(name: str, seconds: float) -> Scene:
-    return scenes.load(name).changed({"time.duration_s": seconds})
-
-
 def derivatives(scene: Scene, *keys: str) -> Sensitivity:
     """Of a run with its last state alone."""
     return differentiate(simulate(scene, grid=[scene.duration]), keys)
@@ -62,7 +59,7 @@ def differences(scene: Scene, key: str, width: float, **settings: Any) -> np.nda
 def test_derivatives_are_those_of_the_reference(
     name: str, key: str, seconds: float, tolerance: float, expected: list[float]
 ) -> None:
-    found = derivatives(short(name, seconds), key).state_rates[-1, :, 0]
+    found = derivatives(horizon(name, seconds), key).state_rates[-1, :, 0]
     assert np.abs(found - expected).max() <= tolerance * np.abs(expected).max()
 
 
@@ -73,7 +70,7 @@ def test_derivatives_are_those_of_the_reference(
     "right_feedback.velocity_gain_Ns_per_m", "left_arm.position_m", "object.position_m", "object.velocity_m_per_s",
 ])
 def test_every_kind_of_number_through_a_joint_touch(key: str) -> None:
-    scene = short("case_01", 1.2)
+    scene = horizon("case_01", 1.2)
     expected = difference(scene, key, [scene.duration])
     found = derivatives(scene, key)
     assert np.abs(found.state_rates[..., 0] - expected.state).max() <= 1e-10 * np.abs(expected.state).max()
@@ -87,12 +84,8 @@ def test_every_kind_of_number_through_a_joint_touch(key: str) -> None:
 def test_restitution_of_two_free_bodies(z: float) -> None:
     """O2: ln(1 - w) + w = ln(1 + z) - z, with z = p v before and w = p v_o after the impact."""
     speed = z / 0.3
-    scene = compose("impact", {
-        "time": {"duration_s": 2.0, "control_period_s": 0.001},
-        "left_arm": {"mass_kg": 1.0, "position_m": -0.1, "velocity_m_per_s": speed},
-        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-        "left_contact": {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.3},
-    })
+    scene = made(2.0, 0.001, left_arm=body(1.0, -0.1, speed), object=body(),
+                 left_contact={"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.3})
     found = derivatives(scene, "left_arm.velocity_m_per_s", P)
     w = 0.3 * (found.state[-1, 3] - found.state[-1, 1])
     slope = z * (1.0 - w) / (w * (1.0 + z))  # dw/dz, of the line above
@@ -114,9 +107,7 @@ def test_restitution_of_two_free_bodies(z: float) -> None:
 ])
 def test_inputs_friction_and_rest(name: str, key: str, width: float) -> None:
     if name == "everything_smooth":
-        changes = {f"{side}_sensor.{number}": 0.0 for side in ("left", "right")
-                   for number in ("position_step_m", "velocity_step_m_per_s")}
-        scene = without_steps(short("everything", 1.0), list(changes))
+        scene = scene_of("everything", "time.duration_s=1", without=STEPS)
     else:
         scene = scenes.load(name)
         scene = scene.changed({"time.duration_s": min(scene.duration, 4.0)})
@@ -125,17 +116,9 @@ def test_inputs_friction_and_rest(name: str, key: str, width: float) -> None:
     assert np.nanmax(np.abs(found - expected)) <= 3e-5 * np.nanmax(np.abs(expected))
 
 
-def without_steps(scene: Scene, keys: list[str]) -> Scene:
-    sections = {section: dict(numbers) for section, numbers in scene.values.items()}
-    for key in keys:
-        section, _, name = key.partition(".")
-        del sections[section][name]
-    return compose(scene.name, sections)
-
-
 @pytest.mark.parametrize("name", ["case_01", "delay", "sine", "friction"])
 def test_the_motion_is_that_of_a_plain_run(name: str) -> None:
-    scene = short(name, 2.0)
+    scene = horizon(name, 2.0)
     grid = np.linspace(0.0, 2.0, 37)
     plain = simulate(scene, grid=grid)
     found = differentiate(plain, [P if name != "sine" else "object.mass_kg"])
@@ -145,7 +128,7 @@ def test_the_motion_is_that_of_a_plain_run(name: str) -> None:
 
 @pytest.mark.parametrize("sampled", [False, True])
 def test_a_run_that_is_asked_has_its_derivatives(sampled: bool) -> None:
-    scene, grid = short("case_01", 2.0), np.linspace(0.5, 2.0, 4)
+    scene, grid = horizon("case_01", 2.0), np.linspace(0.5, 2.0, 4)
     assert simulate(scene, grid=grid, sampled=sampled).sensitivity is None
     run = simulate(scene, grid=grid, sampled=sampled, sensitivity=[P])
     assert run.sensitivity is not None
@@ -155,7 +138,7 @@ def test_a_run_that_is_asked_has_its_derivatives(sampled: bool) -> None:
 
 
 def test_a_run_of_something_else_has_no_derivatives() -> None:
-    scene = short("case_01", 2.0)
+    scene = horizon("case_01", 2.0)
     change = {500: {"left_feedback.velocity_gain_Ns_per_m": 5.0}}
     for settings in ({"method": "dopri5"}, {"controllers": {"left": lambda tick, time, x, v: -x}},
                      {"changes": change, "sampled": True}):
@@ -165,7 +148,7 @@ def test_a_run_of_something_else_has_no_derivatives() -> None:
         differentiate(simulate(scene, sampled=True, changes=change), [P])
     alone = {250: {"left_feedback.velocity_gain_Ns_per_m": 5.0}}
     with pytest.raises(Refused, match="cannot be repeated here"):  # no event tells
-        differentiate(simulate(short("arm_alone", 1.0), sampled=True, changes=alone), ["left_arm.mass_kg"])
+        differentiate(simulate(horizon("arm_alone", 1.0), sampled=True, changes=alone), ["left_arm.mass_kg"])
     with pytest.raises(Refused, match="work"):
         simulate(scene, sensitivity=[P], max_work=10)
     with pytest.raises(Refused, match="sensitivity: nothing; allowed: numbers of the scene"):
@@ -173,7 +156,7 @@ def test_a_run_of_something_else_has_no_derivatives() -> None:
 
 
 def test_directions_do_not_touch_each_other() -> None:
-    scene = short("case_01", 3.0)
+    scene = horizon("case_01", 3.0)
     keys = ["left_arm.mass_kg", P, "object.position_m", "right_arm.stiffness_N_per_m", "object.mass_kg"]
     several = derivatives(scene, *keys)
     for place, key in enumerate(keys):
@@ -182,7 +165,7 @@ def test_directions_do_not_touch_each_other() -> None:
 
 
 def test_rates_of_the_energy() -> None:
-    scene = short("preload", 0.8)
+    scene = horizon("preload", 0.8)
     for key, width in (("left_arm.mass_kg", 1e-6), ("left_contact.hertz_N_per_m1_5", 1e-2),
                        ("left_feedback.set_point_m", 1e-8)):
         section, _, name = key.partition(".")
@@ -204,12 +187,8 @@ def test_what_has_no_derivative_is_refused(name: str, key: str, word: str) -> No
 
 
 def test_an_object_that_could_as_well_stay_is_flagged(command: Any, tmp_path: Path) -> None:
-    scene = compose("corner", {
-        "time": {"duration_s": 0.1, "control_period_s": 0.001},
-        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-        "left_arm": {"mass_kg": 1.0, "position_m": -1.0, "velocity_m_per_s": 0.0},
-        "object_friction": {"coulomb_N": 0.2}, "tilt": {"angle_rad": 0.1, "gravity_m_per_s2": 9.81},
-    })
+    scene = made(0.1, 0.001, object=body(), left_arm=body(1.0, -1.0), object_friction={"coulomb_N": 0.2},
+                 tilt={"angle_rad": 0.1, "gravity_m_per_s2": 9.81})
     assert derivatives(scene, "object.velocity_m_per_s").corner == 0.0
     assert derivatives(scene, "object_friction.coulomb_N").corner is None
     (tmp_path / "corner.yaml").write_text(scene.to_yaml(), "utf-8")
@@ -227,7 +206,7 @@ def test_a_command_just_at_its_limit_is_flagged(limit: float, corner: float | No
 
 def test_what_is_printed_as_data_are_the_derivatives(command: Any) -> None:
     words = "simulate", "case_01", "--set", "time.duration_s=1", "--sensitivity", P, "--json"
-    printed, found = json.loads(command(*words).stdout)["sensitivity"][P], derivatives(short("case_01", 1.0), P)
+    printed, found = json.loads(command(*words).stdout)["sensitivity"][P], derivatives(horizon("case_01", 1.0), P)
     assert (printed["state"], printed["corner"]) == (found.state_rates[-1, :, 0].tolist(), None)
     assert [event["rate"] for event in printed["events"]] == found.event_rates[:, 0].tolist()
     assert {event["kind"] for event in printed["events"]} == {"TOUCH", "RELEASE"}
@@ -236,12 +215,8 @@ def test_what_is_printed_as_data_are_the_derivatives(command: Any) -> None:
 @pytest.mark.parametrize(("stiffness", "corner"), [(0.0, 0.0), (1.0, None)])
 def test_a_pair_that_glides_where_its_force_ends_is_flagged(stiffness: float, corner: float | None) -> None:
     """At u' = -1/p for good: a smaller p gives a force, a larger one none."""
-    scene = compose("glide", {
-        "time": {"duration_s": 0.01, "control_period_s": 0.001},
-        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-        "left_arm": {"mass_kg": 1.0, "position_m": 0.5, "velocity_m_per_s": -4.0, "stiffness_N_per_m": stiffness},
-        "left_contact": {"hertz_N_per_m1_5": 100.0, "dissipation_s_per_m": 0.25},
-    })
+    scene = made(0.01, 0.001, object=body(), left_arm=body(1.0, 0.5, -4.0, stiffness_N_per_m=stiffness),
+                 left_contact={"hertz_N_per_m1_5": 100.0, "dissipation_s_per_m": 0.25})
     assert derivatives(scene, P).corner == corner
     assert derivatives(scene, "left_arm.position_m").corner is None
 
@@ -253,7 +228,7 @@ def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
     bound = 2.0 / arm.duration  # what the first and the last direction may differ by
     assert np.abs(spectrum(arm) + decay).max() <= bound
     assert spectrum(arm).sum() == pytest.approx(-2.0 * decay, rel=1e-9)
-    elastic = spectrum(short("case_02", 10.0))
+    elastic = spectrum(horizon("case_02", 10.0))
     assert elastic.sum() == pytest.approx(0.0, abs=1e-9)
     assert elastic[0] > 0.3
     stiff = arm.changed({"left_arm.damping_Ns_per_m": 300.0})  # which nothing is left of after half a second
@@ -264,7 +239,7 @@ def test_spectrum_of_a_damped_arm_and_of_an_elastic_grasp() -> None:
 @pytest.mark.parametrize("duration", [1.0, 4.0])
 def test_spectrum_of_an_object_that_sticks_is_that_of_the_directions_that_are_left(duration: float) -> None:
     """One in their midst that was lost once took a part of those behind it along."""
-    scene = short("friction", duration)
+    scene = horizon("friction", duration)
     keys = ("left_arm.position_m", "left_arm.velocity_m_per_s", "object.position_m", "right_arm.position_m",
             "right_arm.velocity_m_per_s")
     grown = np.abs(np.diag(np.linalg.qr(derivatives(scene, *keys).state_rates[-1])[1]))
@@ -272,6 +247,6 @@ def test_spectrum_of_an_object_that_sticks_is_that_of_the_directions_that_are_le
 
 
 def test_times_of_sides_in_a_mirror() -> None:
-    found = derivatives(short("v_jump_symmetric", 1.0), P, P.replace("left", "right"))
+    found = derivatives(horizon("v_jump_symmetric", 1.0), P, P.replace("left", "right"))
     left = found.event_table[:, 1] == LEFT
     np.testing.assert_allclose(found.event_rates[left][:, 0], found.event_rates[~left][:, 1], rtol=1e-9, atol=1e-12)

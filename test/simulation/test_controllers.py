@@ -10,6 +10,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from documents import scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
@@ -102,9 +103,7 @@ def test_a_controller_is_called_once_for_every_tick_with_what_is_measured() -> N
 
 @pytest.mark.slow
 def test_an_arm_without_feedback_takes_one_and_the_energy_is_that_of_the_plant(tmp_path: Path) -> None:
-    sections = {key: numbers for key, numbers in scenes.load("case_01", [SHORT]).values.items()
-                if key != "left_feedback"}
-    scene = scenes.compose("passive", sections)
+    scene = scene_of("case_01", SHORT, without=("left_feedback",))
     run = simulate(scene, controllers={"left": paper})
     assert run.status is Status.DONE
     assert run.state.tobytes() == simulate(scenes.load("case_01", [SHORT]), sampled=True).state.tobytes()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from documents import case_of
+from documents import body, case_of, made
 from oracles import energy
 
 from grasp_ros import scene as scenes
@@ -51,10 +51,9 @@ def test_the_energy_balance_notices_a_gain() -> None:
 
 def test_a_weak_spring_under_a_constant_force_raises_no_alarm() -> None:
     for stiffness in (1e-6, 1e-4, 1e-2):
-        document = {"time": {"duration_s": 2.0, "control_period_s": 0.001},
-                    "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": stiffness, "position_m": 0.0,
-                                 "velocity_m_per_s": 0.0}, "tilt": {"angle_rad": 0.1, "gravity_m_per_s2": 9.81}}
-        motion = simulate(scenes.compose("weak", document), sampled=True)
+        weak = made(2.0, 0.001, left_arm=body(stiffness_N_per_m=stiffness),
+                    tilt={"angle_rad": 0.1, "gravity_m_per_s2": 9.81})
+        motion = simulate(weak, sampled=True)
         assert not balance(motion).alarm.any()
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from documents import scene_of
+from documents import body, made, scene_of
 from mpmath import mpf
 
 from grasp_ros import scene as scenes
@@ -72,9 +72,7 @@ def test_a_set_point_is_a_constant_force() -> None:
     ],
 )
 def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]], impulse: float) -> None:
-    document = {"time": {"duration_s": 1.0, "control_period_s": 0.01},
-                "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 1.0}, **section}
-    scene = scenes.compose("push", document)
+    scene = made(1.0, 0.01, object=body(2.0, 0.0, 1.0), **section)
     for sampled in (False, True):
         motion = simulate(scene, sampled=sampled)
         assert motion.state[-1, 3] == pytest.approx(1.0 + impulse / 2.0, rel=1e-14)
@@ -85,10 +83,8 @@ def test_external_forces_give_their_impulse(section: dict[str, dict[str, object]
 
 
 def test_a_sine_force_is_a_staircase_with_the_values_of_the_sine() -> None:
-    document = {"time": {"duration_s": 1.0, "control_period_s": 0.001},
-                "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-                "object_sine": {"amplitude_N": 2.0, "frequency_Hz": 3.0, "phase_rad": 0.5}}
-    scene = scenes.compose("shake", document)
+    scene = made(1.0, 0.001, object=body(),
+                 object_sine={"amplitude_N": 2.0, "frequency_Hz": 3.0, "phase_rad": 0.5})
     turn = 2 * np.pi * 3.0
     exact = 2.0 / turn * (np.cos(0.5) - np.cos(turn * tick_times(scene) + 0.5))
     found = simulate(scene, sampled=True).state[:, 3]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from documents import scene_of
+from documents import body, made, scene_of
 
 from grasp_ros import scene as scenes
 from grasp_ros.exact.integrator import Status
@@ -15,13 +15,10 @@ from grasp_ros.simulation import simulate
 
 def against_the_slope(gap: float, friction: float = 1.0) -> Scene:
     """An arm at rest beside an object that friction holds on a slope."""
-    document = {"time": {"duration_s": 3.0, "control_period_s": 0.001},
-                "left_arm": {"mass_kg": 1.0, "stiffness_N_per_m": 5.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-                "left_feedback": {"position_gain_N_per_m": 1.0, "velocity_gain_Ns_per_m": 0.0, "set_point_m": 0.001},
-                "object": {"mass_kg": 1.0, "position_m": gap, "velocity_m_per_s": 0.0},
-                "object_friction": {"coulomb_N": friction}, "left_contact": {"hertz_N_per_m1_5": 1e4},
-                "tilt": {"angle_rad": 0.2, "gravity_m_per_s2": 9.81}}
-    return scenes.compose("slope", document)
+    return made(
+        3.0, 0.001, left_arm=body(stiffness_N_per_m=5.0), object=body(1.0, gap), left_contact={"hertz_N_per_m1_5": 1e4},
+        left_feedback={"position_gain_N_per_m": 1.0, "velocity_gain_Ns_per_m": 0.0, "set_point_m": 0.001},
+        object_friction={"coulomb_N": friction}, tilt={"angle_rad": 0.2, "gravity_m_per_s2": 9.81})
 
 
 def test_a_pair_that_touches_at_rest_is_judged_with_the_friction() -> None:
@@ -45,9 +42,7 @@ def test_impacts_die_out_against_a_stuck_object_without_a_stall() -> None:
 
 def sliding(**friction: float) -> Scene:
     """An object of 2 kg alone with 1.5 m/s."""
-    document = {"time": {"duration_s": 10.0, "control_period_s": 0.01},
-                "object": {"mass_kg": 2.0, "position_m": 0.25, "velocity_m_per_s": 1.5}, "object_friction": friction}
-    return scenes.compose("slide", document)
+    return made(10.0, 0.01, object=body(2.0, 0.25, 1.5), object_friction=friction)
 
 
 def test_dry_friction_stops_the_object_where_and_when_it_must() -> None:
@@ -78,11 +73,9 @@ def test_viscous_friction_alone_never_stops_it() -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_stuck_object_gives_way_only_to_more_than_the_friction(sign: float) -> None:
-    document = {"time": {"duration_s": 4.0, "control_period_s": 0.01},
-                "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-                "object_friction": {"coulomb_N": 1.0},
-                "object_table": {"time_s": [0.0, 1.0, 2.0], "force_N": [sign, 1.5 * sign, 0.5 * sign]}}
-    motion = simulate(scenes.compose("pull", document))
+    motion = simulate(made(
+        4.0, 0.01, object=body(mass=2.0), object_friction={"coulomb_N": 1.0},
+        object_table={"time_s": [0.0, 1.0, 2.0], "force_N": [sign, 1.5 * sign, 0.5 * sign]}))
     slip, stick = motion.events
     assert (slip.kind, stick.kind) == (Transition.SLIP, Transition.STICK)
     assert slip.time == 1.0
@@ -93,10 +86,8 @@ def test_a_stuck_object_gives_way_only_to_more_than_the_friction(sign: float) ->
 def test_friction_holds_the_object_against_the_slope() -> None:
     """It slides if tan(angle) > F / (m g cos(angle)): here m g sin(angle) against F."""
     for angle, moves in ((0.05, False), (0.06, True)):
-        document = {"time": {"duration_s": 2.0, "control_period_s": 0.01},
-                    "object": {"mass_kg": 2.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-                    "object_friction": {"coulomb_N": 1.1}, "tilt": {"angle_rad": angle, "gravity_m_per_s2": 9.81}}
-        end = simulate(scenes.compose("slope", document)).state[-1]
+        end = simulate(made(2.0, 0.01, object=body(mass=2.0), object_friction={"coulomb_N": 1.1},
+                            tilt={"angle_rad": angle, "gravity_m_per_s2": 9.81})).state[-1]
         pull = 9.81 * np.sin(angle) - 0.55
         assert end[2] == (pytest.approx(-0.5 * pull * 4.0, rel=1e-13) if moves else 0.0)
 
@@ -138,13 +129,10 @@ def test_an_object_pushed_by_exactly_its_friction_sticks(beside: int) -> None:
     """A finger rests on it with 10 N, a rounding more or less than the friction: noise must not make it slip."""
     force = 1e4 * 0.01**1.5
     limit = force * (1.0 + beside * 2.0**-52)
-    scene = scenes.compose("limit", {
-        "time": {"duration_s": 1.0, "control_period_s": 0.001},
-        "left_arm": {"mass_kg": 1.0, "position_m": 0.01, "velocity_m_per_s": 0.0},
-        "left_feedback": {"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": force},
-        "left_contact": {"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.5},
-        "object": {"mass_kg": 1.0, "position_m": 0.0, "velocity_m_per_s": 0.0},
-        "object_friction": {"coulomb_N": limit}})
+    scene = made(
+        1.0, 0.001, left_arm=body(1.0, 0.01), object=body(), object_friction={"coulomb_N": limit},
+        left_feedback={"position_gain_N_per_m": 0.0, "velocity_gain_Ns_per_m": 0.0, "feed_forward_N": force},
+        left_contact={"hertz_N_per_m1_5": 1e4, "dissipation_s_per_m": 0.5})
     assert simulate(scene).events == []
     more = scene.changed({"left_feedback.feed_forward_N": 1.01 * force})
     assert [event.kind for event in simulate(more).events] == [Transition.SLIP]

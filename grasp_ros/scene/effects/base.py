@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, Place, System
@@ -26,25 +28,14 @@ class Output(NamedTuple):
     value: Callable[[System, int, Array], float]  # system, tick, state (6,) to N
 
 
-class Problem(NamedTuple):
+def problem(key: str, value: object, allowed: str) -> str:
     """Why numbers that are each in their range do not go together."""
-
-    key: str
-    value: object
-    allowed: str
+    return f"{key}: {value!r} is not allowed; allowed: {allowed}"
 
 
-class Oddity(NamedTuple):
-    """A setting that is valid but suspicious."""
-
-    key: str
-    value: object
-    why: str
-    meant: str
-
-    def __str__(self) -> str:
-        value = dict(self.value) if isinstance(self.value, Mapping) else self.value
-        return f"{self.key}: {value!r} {self.why}; meant: {self.meant}"
+def oddity(key: str, value: object, why: str, meant: str) -> str:
+    """What is suspicious about a setting that is valid."""
+    return f"{key}: {dict(value) if isinstance(value, Mapping) else value!r} {why}; meant: {meant}"
 
 
 def nothing(*_: object) -> Any:
@@ -66,14 +57,21 @@ class Effect:
     node: str = "plant"  # the executable that declares its parameters
     commands: Topic | None = None  # topic of the controller that it brings
     outputs: tuple[Output, ...] = ()  # what the plant publishes about it
-    problems: Callable[[Sections], Iterable[Problem]] = nothing  # what is wrong beyond ranges
-    oddities: Callable[[Sections, System], Iterable[Oddity]] = nothing  # suspicious settings
+    problems: Callable[[Sections], Iterable[str]] = nothing  # what is wrong beyond ranges
+    oddities: Callable[[Sections, System], Iterable[str]] = nothing  # suspicious settings
+    acts_by: tuple[str, ...] = ()  # keys of numbers without which, or where all are 0, it does nothing
     example: Numbers = field(default_factory=dict)  # keys to add to a scene to see what it does; none: the paper has it
 
     @cached_property
     def places(self) -> dict[str, Place]:
         """Where numbers go that enter in one place of the arrays alone, by key."""
         return {own.key: _place(self.row, *own.place) for own in self.parameters if own.place is not None}
+
+    def warnings(self, sections: Sections, system: System) -> Iterable[str]:
+        """Suspicious settings."""
+        if self.acts_by and not any(np.any(sections[self.section].get(key, 0.0)) for key in self.acts_by):
+            return [f"{self.section}: has no effect without {' or '.join(self.acts_by)}; meant: a number that is not 0"]
+        return self.oddities(sections, system)
 
 
 def _place(row: int, array: str, column: int) -> Place:
@@ -82,13 +80,11 @@ def _place(row: int, array: str, column: int) -> Place:
     return array, 0 if array == "coulomb" else int(row), int(column)
 
 
+def nanoseconds(seconds: float) -> int:
+    """A time in ns, rounded."""
+    return round(seconds * NANOSECONDS)
+
+
 def period_ns(sections: Sections) -> int:
     """Control period of a scene in ns."""
-    seconds: float = sections["time"]["control_period_s"]
-    return round(seconds * NANOSECONDS)
-
-
-def run_ns(sections: Sections) -> int:
-    """Length of a run in ns."""
-    seconds: float = sections["time"]["duration_s"]
-    return round(seconds * NANOSECONDS)
+    return nanoseconds(sections["time"]["control_period_s"])

@@ -7,7 +7,7 @@ from functools import partial
 
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Of
-from grasp_ros.scene.effects.base import SIDES, Effect, Problem, Sections, nothing
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nothing, problem
 from grasp_ros.scene.parameter import Parameter
 
 MASS_KG = Parameter("mass_kg", *RANGES["mass"].bounds, "mass", place=("bodies", Of.MASS))
@@ -22,7 +22,7 @@ DAMPER = Parameter("damping_Ns_per_m", *RANGES["damping, drag"].bounds, "damper 
                    place=("bodies", Of.DAMPING))
 
 
-def _negative_sums(side: str, sections: Sections) -> Iterable[Problem]:
+def _negative_sums(side: str, sections: Sections) -> Iterable[str]:
     arm, gains = sections[f"{side}_arm"], sections.get(f"{side}_feedback", {})
     for own, gain in (
         ("stiffness_N_per_m", "position_gain_N_per_m"),
@@ -30,7 +30,7 @@ def _negative_sums(side: str, sections: Sections) -> Iterable[Problem]:
     ):
         total = arm.get(own, 0.0) + gains.get(gain, 0.0)
         if total < 0.0:
-            yield Problem(f"{side}_arm, {side}_feedback: {own} + {gain}", total, "a sum >= 0")
+            yield problem(f"{side}_arm, {side}_feedback: {own} + {gain}", total, "a sum >= 0")
 
 
 EFFECTS = (

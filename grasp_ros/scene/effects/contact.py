@@ -10,7 +10,7 @@ from grasp_ros.physics.impact_law import stored_energy
 from grasp_ros.physics.layout import LEFT, OBJECT, Law, Of
 from grasp_ros.physics.model import Array, penetration
 from grasp_ros.physics.system import COLUMN, System
-from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Output, Sections, nothing
+from grasp_ros.scene.effects.base import SIDES, Effect, Output, Sections, nothing, oddity
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import CONTACTS
 
@@ -28,7 +28,7 @@ def _force(side: int, system: System, _: int, state: Array) -> float:
     return system.impact(side, state.tolist())
 
 
-def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
+def _odd(side: str, sections: Sections, system: System) -> Iterable[str]:
     """An arm may start inside the object, as every state of a run may be a start, but hardly beyond its other side.
 
     And where one arm hits the object, the other one is hardly meant to pass through it.
@@ -36,7 +36,7 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
     at, far = SIDES[side], "right" if side == "left" else "left"
     if f"{far}_arm" in sections and SIDES[far] not in system.contacts:
         why = f"touches nothing: without {far}_contact it passes through the object, which the {side} arm hits"
-        yield Oddity(f"{far}_arm", sections[f"{far}_arm"], why, f"{far}_contact too, or no {far}_arm")
+        yield oddity(f"{far}_arm", sections[f"{far}_arm"], why, f"{far}_contact too, or no {far}_arm")
     depths = penetration(system.state)[0::2]
     depth, gap = float(depths[at]), float(-depths[SIDES[far]])
     key, value = f"{side}_arm.position_m", sections[f"{side}_arm"]["position_m"]
@@ -46,11 +46,11 @@ def _odd(side: str, sections: Sections, system: System) -> Iterable[Oddity]:
     stored, pressing = stored_energy(system.pairs[at, Law.HERTZIAN], depth), _pressing(system, at, depth)
     if SIDES[far] in system.contacts and 0.0 < gap < depth:
         why = f"lies {far} of the {far} arm, which does not touch the object"
-        yield Oddity(key, value, why, f"each arm on its side of the object at {place!r}")
+        yield oddity(key, value, why, f"each arm on its side of the object at {place!r}")
     elif stored > pressing:
         why = (f"lies {depth:.6g} m inside the object: the contact stores {stored:.3g} J, where motion and forces"
                f" press in {pressing:.3g} J")
-        yield Oddity(key, value, why, f"{side} of the object at {place!r}, or a little {far} of it")
+        yield oddity(key, value, why, f"{side} of the object at {place!r}, or a little {far} of it")
 
 
 def _pressing(system: System, side: int, depth: float) -> float:

@@ -8,7 +8,7 @@ from functools import partial
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections, nothing
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nothing, oddity
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import COMMANDS
 
@@ -25,15 +25,11 @@ PARAMETERS = (
 )
 
 
-def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
-    section = f"{side}_feedback"
-    numbers = sections[section]
-    gains = numbers["position_gain_N_per_m"], numbers["velocity_gain_Ns_per_m"]
-    if not (any(gains) or numbers.get("feed_forward_N")):
-        yield Oddity(section, numbers, "has no effect: both gains are 0", "a gain or a feed_forward_N that is not 0")
-    elif numbers.get("set_point_m", 0.0) and gains[0] == 0.0:
-        meant = "a position_gain_N_per_m that is not 0"
-        yield Oddity(f"{section}.set_point_m", numbers["set_point_m"], "has no effect without a position gain", meant)
+def _odd(side: str, sections: Sections, _: System) -> Iterable[str]:
+    section, meant = f"{side}_feedback", "a position_gain_N_per_m that is not 0"
+    aim = sections[section].get("set_point_m", 0.0)
+    if aim != 0.0 and sections[section]["position_gain_N_per_m"] == 0.0:
+        yield oddity(f"{section}.set_point_m", aim, "has no effect without a position gain", meant)
 
 
 EFFECTS = tuple(
@@ -42,6 +38,7 @@ EFFECTS = tuple(
         "Kp x^2, with a set-point or a constant force (k + Kp) (x - x_e)^2; the feedback takes 2 Kv x'^2",
         needs=(f"{side}_arm",), row=SIDES[side], node=f"{side}_controller", commands=COMMANDS[side],
         example={"set_point_m": 0.05, "feed_forward_N": 0.5}, oddities=partial(_odd, side),
+        acts_by=("position_gain_N_per_m", "velocity_gain_Ns_per_m", "feed_forward_N"),
     )
     for side in SIDES
 )

@@ -15,7 +15,7 @@ from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import ExternalForce, System
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Oddity, Output, Problem, Sections, period_ns, run_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Output, Sections, nanoseconds, oddity, period_ns, problem
 from grasp_ros.scene.parameter import Parameter
 from grasp_ros.scene.topics import EXTERNAL_FORCES
 
@@ -36,13 +36,7 @@ TABLE = (
               several=True),
 )
 
-NO_EFFECT = "has no effect"
-ROUNDING = 1e-9  # of the amplitude
 NEVER = "comes when the run has ended: nothing ever acts"
-
-
-def _nanoseconds(seconds: float) -> int:
-    return round(seconds * NANOSECONDS)
 
 
 def _add(section: str, force: ExternalForce, system: System) -> None:
@@ -54,10 +48,10 @@ def _build_steps(section: str, body: int, sections: Sections, system: System) ->
     """A force from each tick to the next: those of a table, or of a pulse, which is one of two entries."""
     numbers, period = sections[section], period_ns(sections)
     if "time_s" in numbers:
-        ticks, forces = [_nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
+        ticks, forces = [nanoseconds(time) // period for time in numbers["time_s"]], (0.0, *numbers["force_N"])
     else:
-        begin = _nanoseconds(numbers["start_s"]) // period
-        ticks, forces = [begin, begin + _nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
+        begin = nanoseconds(numbers["start_s"]) // period
+        ticks, forces = [begin, begin + nanoseconds(numbers["length_s"]) // period], (0.0, numbers["force_N"], 0.0)
 
     def at(tick: int) -> float:
         return float(forces[bisect_right(ticks, tick)])
@@ -77,84 +71,54 @@ def _build_sine(section: str, body: int, sections: Sections, system: System) -> 
     _add(section, ExternalForce(body, at, lambda end: range(1, end)), system)
 
 
-def _is_off(time: float, period: int) -> bool:
-    """Whether a time in s is no whole number of periods in ns."""
-    nanoseconds = _nanoseconds(time)
-    return nanoseconds / NANOSECONDS != time or nanoseconds % period != 0
-
-
-def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[Problem]:
+def _off_tick(keys: tuple[str, ...], section: str, sections: Sections) -> Iterable[str]:
     """Times must be whole control periods."""
     period = period_ns(sections)
     for key in keys:
         value = sections[section][key]
         times = value if isinstance(value, tuple) else (value,)
-        off = next((time for time in times if _is_off(time, period)), None)
+        off = next((time for time in times if nanoseconds(time) / NANOSECONDS != time or nanoseconds(time) % period),
+                   None)
         if off is not None:
-            yield Problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
+            yield problem(f"{section}.{key}", off, f"whole control periods of {period / NANOSECONDS!r} s")
 
 
-def _table_problems(section: str, sections: Sections) -> Iterable[Problem]:
+def _table_problems(section: str, sections: Sections) -> Iterable[str]:
     yield from _off_tick(("time_s",), section, sections)
     times, forces = sections[section]["time_s"], sections[section]["force_N"]
     if any(later <= earlier for earlier, later in pairwise(times)):
-        yield Problem(f"{section}.time_s", times, "ascending times")
+        yield problem(f"{section}.time_s", times, "ascending times")
     if len(times) != len(forces):
-        yield Problem(f"{section}.force_N", forces, f"as many forces as times, {len(times)}")
+        yield problem(f"{section}.force_N", forces, f"as many forces as times, {len(times)}")
 
 
-def _highest(sections: Sections) -> float:
-    """The frequency in Hz of half a turn per control period."""
-    return 0.5 * NANOSECONDS / period_ns(sections)
-
-
-def _sine_problems(section: str, sections: Sections) -> Iterable[Problem]:
+def _sine_problems(section: str, sections: Sections) -> Iterable[str]:
     """A staircase of one step per control period shows faster sines as slower ones."""
-    frequency, highest = sections[section]["frequency_Hz"], _highest(sections)
+    frequency, highest = sections[section]["frequency_Hz"], 0.5 * NANOSECONDS / period_ns(sections)
     if frequency > highest:
         allowed = f"at most {highest!r} Hz, half a turn per control period of time.control_period_s"
-        yield Problem(f"{section}.frequency_Hz", frequency, allowed)
+        yield problem(f"{section}.frequency_Hz", frequency, allowed)
 
 
-def _odd_pulse(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
-    numbers, end = sections[section], run_ns(sections)
-    start, length = numbers["start_s"], numbers["length_s"]
-    if numbers["force_N"] == 0.0:
-        yield Oddity(f"{section}.force_N", 0.0, NO_EFFECT, "a force that is not 0")
-    over = _nanoseconds(start) + _nanoseconds(length) - end
-    if _nanoseconds(start) >= end:
-        yield Oddity(f"{section}.start_s", start, NEVER, f"before time.duration_s, {end / NANOSECONDS!r}")
+def _odd_pulse(section: str, sections: Sections, _: System) -> Iterable[str]:
+    start, length, end = sections[section]["start_s"], sections[section]["length_s"], sections["time"]["duration_s"]
+    over = nanoseconds(start) + nanoseconds(length) - nanoseconds(end)
+    if start >= end:
+        yield oddity(f"{section}.start_s", start, NEVER, f"before time.duration_s, {end!r}")
     elif over > 0:
         why = f"reaches {over / NANOSECONDS!r} s beyond the end of the run"
-        yield Oddity(f"{section}.length_s", length, why, f"an end by time.duration_s, {end / NANOSECONDS!r}")
+        yield oddity(f"{section}.length_s", length, why, f"an end by time.duration_s, {end!r}")
 
 
-def _odd_sine(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
-    numbers = sections[section]
-    amplitude, phase = numbers["amplitude_N"], numbers.get("phase_rad", 0.0)
-    if amplitude == 0.0:
-        yield Oddity(f"{section}.amplitude_N", 0.0, NO_EFFECT, "an amplitude above 0")
-    elif run_ns(sections) == period_ns(sections):
-        period = sections["time"]["control_period_s"]
-        why = f"is as long as the run: {section} is one constant force"
-        yield Oddity("time.control_period_s", period, why, "a part of time.duration_s")
-    elif numbers["frequency_Hz"] == _highest(sections) and abs(math.cos(phase)) < ROUNDING:
-        why = "is 0 in the middle of every control period: the force has no effect"
-        yield Oddity(f"{section}.phase_rad", phase, why, "another phase, or a lower frequency_Hz")
-
-
-def _odd_table(section: str, sections: Sections, _: System) -> Iterable[Oddity]:
-    times, forces, end = sections[section]["time_s"], sections[section]["force_N"], run_ns(sections)
-    late = [(time, force) for time, force in zip(times, forces, strict=True) if _nanoseconds(time) >= end]
-    idle = [time for time, force in late if force != 0.0 or _nanoseconds(time) > end]  # 0 at the end closes it
-    key, meant = f"{section}.time_s", f"before time.duration_s, {end / NANOSECONDS!r}"
-    if not any(forces):
-        yield Oddity(f"{section}.force_N", 0.0, "is every force: they have no effect", "a force that is not 0")
-    elif not any(forces[: len(forces) - len(late)]):
-        first = next(time for time, force in late if force != 0.0)
-        yield Oddity(key, first, NEVER, f"a begin {meant}")
+def _odd_table(section: str, sections: Sections, _: System) -> Iterable[str]:
+    times, forces, end = sections[section]["time_s"], sections[section]["force_N"], sections["time"]["duration_s"]
+    late = [(time, force) for time, force in zip(times, forces, strict=True) if time >= end]
+    idle = [time for time, force in late if force != 0.0 or time > end]  # 0 at the end closes it
+    key, meant = f"{section}.time_s", f"before time.duration_s, {end!r}"
+    if not any(forces[: len(forces) - len(late)]):
+        yield oddity(key, next(time for time, force in late if force != 0.0), NEVER, f"a begin {meant}")
     elif idle:
-        yield Oddity(key, idle[0], "comes when the run has ended: its force never acts", f"a last time {meant}")
+        yield oddity(key, idle[0], "comes when the run has ended: its force never acts", f"a last time {meant}")
 
 
 def _total(body: int, system: System, tick: int, _: Array) -> float:
@@ -164,19 +128,21 @@ def _total(body: int, system: System, tick: int, _: Array) -> float:
 def _effects(name: str, body: int) -> Iterable[Effect]:
     outputs = (Output(EXTERNAL_FORCES[name], partial(_total, body)),)
     work = "the force does work: V_c rises by 2 f times the way at most"
-    for kind, parameters, build, problems, odd, example in (
-        ("pulse", PULSE, _build_steps, partial(_off_tick, ("start_s", "length_s")),
+    for kind, parameters, size, build, problems, odd, example in (
+        ("pulse", PULSE, "force_N", _build_steps, partial(_off_tick, ("start_s", "length_s")),
          _odd_pulse, {"force_N": 2.0, "start_s": 0.5, "length_s": 0.1}),
-        ("sine", SINE, _build_sine, _sine_problems, _odd_sine, {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
-        ("table", TABLE, _build_steps, _table_problems, _odd_table,
+        ("sine", SINE, "amplitude_N", _build_sine, _sine_problems, lambda *_: (),
+         {"amplitude_N": 1.0, "frequency_Hz": 2.0}),
+        ("table", TABLE, "force_N", _build_steps, _table_problems, _odd_table,
          {"time_s": [0.25, 0.5, 0.75], "force_N": [1.0, -1.0, 0.0]}),
     ):
         section = f"{name}_{kind}"
         yield Effect(
             section, f"external force on the {name.replace('_', ' ')}: a {kind}", parameters,
             partial(build, section, body), work, needs=(name,), outputs=outputs, problems=partial(problems, section),
-            oddities=partial(odd, section), example=example,
+            oddities=partial(odd, section), acts_by=(size,), example=example,
         )
 
 
 EFFECTS = tuple(effect for name, body in SECTIONS.items() for effect in _effects(name, body))
+FORCED = frozenset(effect.section for effect in EFFECTS)

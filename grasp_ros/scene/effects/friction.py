@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import OBJECT, Of
-from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import Effect, Oddity, Sections, nothing
+from grasp_ros.scene.effects.base import Effect, nothing
 from grasp_ros.scene.parameter import Parameter
-
-
-def _odd(sections: Sections, _: System) -> Iterable[Oddity]:
-    numbers = sections["object_friction"]
-    if not any(numbers.values()):
-        yield Oddity("object_friction", numbers, "has no effect", "viscous_Ns_per_m or coulomb_N above 0")
-
 
 EFFECTS = (
     Effect(
@@ -26,7 +16,7 @@ EFFECTS = (
             Parameter("coulomb_N", 0.0, RANGES["force"].high, "dry friction, sliding and sticking alike",
                       optional=True, place=("coulomb", 0)),
         ),
-        nothing, "takes 2 c x_o'^2 + 2 F |x_o'|", needs=("object",), row=OBJECT, oddities=_odd,
-        example={"viscous_Ns_per_m": 0.2, "coulomb_N": 0.2},
+        nothing, "takes 2 c x_o'^2 + 2 F |x_o'|", needs=("object",), row=OBJECT,
+        acts_by=("viscous_Ns_per_m", "coulomb_N"), example={"viscous_Ns_per_m": 0.2, "coulomb_N": 0.2},
     ),
 )

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.sampled import spectral_radius
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections, period_ns, run_ns
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections, nanoseconds, oddity, period_ns
 from grasp_ros.scene.parameter import Parameter
 
 HELD = "commands are held over control periods and do work of their own"
@@ -24,24 +24,24 @@ def _build(sections: Sections, system: System) -> None:
         system.caveats.append(f"commands come {system.delay} control periods late")
 
 
-def _odd(sections: Sections, system: System) -> Iterable[Oddity]:
-    numbers, ticks = sections["loop"], run_ns(sections) // period_ns(sections)
+def _odd(sections: Sections, system: System) -> Iterable[str]:
+    numbers, ticks = sections["loop"], nanoseconds(sections["time"]["duration_s"]) // period_ns(sections)
     if not system.laws:
-        yield Oddity("loop", numbers, "holds no command: no side has feedback", "left_feedback or right_feedback too")
+        yield oddity("loop", numbers, "holds no command: no side has feedback", "left_feedback or right_feedback too")
     if ticks == 1:
         period = sections["time"]["control_period_s"]
         why = "is as long as the run: no command answers a later state than the first"
-        yield Oddity("time.control_period_s", period, why, "a part of time.duration_s")
+        yield oddity("time.control_period_s", period, why, "a part of time.duration_s")
     if numbers.get("delay_ticks") == 0:
-        yield Oddity("loop.delay_ticks", 0, "has no effect", "a delay above 0, or loop: {}")
+        yield oddity("loop.delay_ticks", 0, "has no effect", "a delay above 0, or loop: {}")
     if system.delay >= ticks:
         why = f"is the whole run of {ticks} control periods or more: no command arrives"
-        yield Oddity("loop.delay_ticks", system.delay, why, f"less than {ticks}")
+        yield oddity("loop.delay_ticks", system.delay, why, f"less than {ticks}")
     elif system.delay <= MOST_DELAY:
         yield from _unstable(sections, system, ticks)
 
 
-def _unstable(sections: Sections, system: System, ticks: int) -> Iterable[Oddity]:
+def _unstable(sections: Sections, system: System, ticks: int) -> Iterable[str]:
     """Held feedback that overshoots more from tick to tick, in an arm that no contact stops nor its limit."""
     period = sections["time"]["control_period_s"]
     for name, side in SIDES.items():
@@ -53,7 +53,7 @@ def _unstable(sections: Sections, system: System, ticks: int) -> Iterable[Oddity
             why = (f"is too long for {name}_feedback: while the {name} arm touches nothing, it swings {factor:.3g}"
                    f" times as far every period, 1e{decades:.0f} times as far in this run")
             meant = "a shorter period, less delay or smaller gains"
-            yield Oddity("time.control_period_s", period, why, meant)
+            yield oddity("time.control_period_s", period, why, meant)
 
 
 EFFECTS = (

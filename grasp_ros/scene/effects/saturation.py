@@ -8,7 +8,7 @@ from functools import partial
 from grasp_ros.physics.control import Column
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import SIDES, Effect, Oddity, Sections
+from grasp_ros.scene.effects.base import SIDES, Effect, Sections, oddity
 from grasp_ros.scene.parameter import Parameter
 
 PARAMETERS = (
@@ -21,14 +21,14 @@ def _build(side: str, sections: Sections, system: System) -> None:
     system.caveats.append(f"the {side} command is limited, so that less damping may act than V_c counts on")
 
 
-def _odd(side: str, sections: Sections, _: System) -> Iterable[Oddity]:
+def _odd(side: str, sections: Sections, _: System) -> Iterable[str]:
     section = f"{side}_actuator"
     limit, constant = sections[section]["limit_N"], abs(sections[f"{side}_feedback"].get("feed_forward_N", 0.0))
     if limit == 0.0:
-        yield Oddity(f"{section}.limit_N", 0.0, f"lets no force of the {side} feedback through", "a limit above 0")
+        yield oddity(f"{section}.limit_N", 0.0, f"lets no force of the {side} feedback through", "a limit above 0")
     elif limit < constant:
         why = f"is less than {side}_feedback.feed_forward_N alone"
-        yield Oddity(f"{section}.limit_N", limit, why, f"a limit above {constant!r}, or a smaller force")
+        yield oddity(f"{section}.limit_N", limit, why, f"a limit above {constant!r}, or a smaller force")
 
 
 EFFECTS = tuple(

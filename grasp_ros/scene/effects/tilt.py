@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from grasp_ros.physics.domain import RANGES
 from grasp_ros.physics.layout import Of
 from grasp_ros.physics.system import System
-from grasp_ros.scene.effects.base import Effect, Oddity, Sections
+from grasp_ros.scene.effects.base import Effect, Sections, oddity
 from grasp_ros.scene.parameter import Parameter
 
 
@@ -20,10 +20,10 @@ def _build(sections: Sections, system: System) -> None:
         system.bodies[body, Of.FORCE] -= system.bodies[body, Of.MASS] * pull
 
 
-def _odd(sections: Sections, _: System) -> Iterable[Oddity]:
+def _odd(sections: Sections, _: System) -> Iterable[str]:
     for key, value in sections["tilt"].items():
         if value == 0.0:
-            yield Oddity(f"tilt.{key}", value, "leaves the whole section without effect", "a number that is not 0")
+            yield oddity(f"tilt.{key}", value, "leaves the whole section without effect", "a number that is not 0")
 
 
 EFFECTS = (

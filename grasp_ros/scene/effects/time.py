@@ -5,20 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from grasp_ros.physics.domain import RANGES
-from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Problem, Sections, nothing, period_ns
+from grasp_ros.scene.effects.base import NANOSECONDS, Effect, Sections, nanoseconds, nothing, period_ns, problem
 from grasp_ros.scene.parameter import Parameter
 
 
-def _problems(sections: Sections) -> Iterable[Problem]:
+def _problems(sections: Sections) -> Iterable[str]:
     numbers = sections["time"]
     for key in ("control_period_s", "duration_s"):
-        seconds = numbers[key]
-        if round(seconds * NANOSECONDS) / NANOSECONDS != seconds or seconds < 1 / NANOSECONDS:
-            yield Problem(f"time.{key}", seconds, "whole nanoseconds")
+        if nanoseconds(numbers[key]) / NANOSECONDS != numbers[key]:
+            yield problem(f"time.{key}", numbers[key], "whole nanoseconds")
             return
-    if round(numbers["duration_s"] * NANOSECONDS) % period_ns(sections):
+    if nanoseconds(numbers["duration_s"]) % period_ns(sections):
         allowed = f"a whole number of control periods of {numbers['control_period_s']!r} s"
-        yield Problem("time.duration_s", numbers["duration_s"], allowed)
+        yield problem("time.duration_s", numbers["duration_s"], allowed)
 
 
 EFFECTS = (
