@@ -45,7 +45,10 @@ def _fit(options: argparse.Namespace) -> int:
         own = measured(options.source, None, options.by_sensors).scene
         scene = scenes.parse(own.to_yaml(), own.name, own.name, options.settings)
         warn(scene)
-    against = dict(map(_value, options.against))
+    against: dict[str, float] = {}
+    for key, value in map(_value, options.against):
+        if against.setdefault(key, value) != value:
+            raise Refused(f"--against {key}: given twice, with {against[key]!r} and {value!r}; allowed: one value")
     prepare()
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
     show(options, printable(str(found)), _data(found))

@@ -131,7 +131,7 @@ def _run(options: argparse.Namespace) -> int:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
     except Refused:
-        if graph.processes and not graph.bag.exists():  # a node refused what it was given: nothing is there to keep
+        if graph.processes and not _what_is_there(graph.bag):  # a node refused what it was given
             shutil.rmtree(directory, ignore_errors=True)
         raise
     if not begun:

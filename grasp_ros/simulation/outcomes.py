@@ -93,8 +93,9 @@ _GROUPS: dict[str, tuple[Outcome, ...]] = {
             ("lost_impacts", "energy that the impacts took", Seen.IMPACTS),
             ("work_inputs", "work of held commands and external forces", Seen.WORK),
         )),
-    "V_c_rise": (Outcome("V_c_rise", "J", "largest rise of V_c above what it was before, at events, steps and ticks",
-                         Wanted.RISE, _column("seen", Seen.RISE)),),
+    "V_c_rise": (Outcome(
+        "V_c_rise", "J", "largest rise of V_c above what it was before, as events, steps and changes of inputs show it",
+        Wanted.RISE, _column("seen", Seen.RISE)),),
     "extremes": tuple(
         Outcome(f"{column.name}_{which}", column.unit, f"{word} {column.text}", Wanted.MOTION,
                 _column("seen", first + place))
