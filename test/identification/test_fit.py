@@ -261,7 +261,7 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     ("# mine\n" + ROWS, ("--scene", "case_01", "--free", P_LEFT), "line 1: # mine; allowed: t_s and at least one of"),
     (re.sub("0$", "0,ok", ROWS.replace("object_m", "object_m,why"), flags=re.MULTILINE),
      ("--scene", "case_01", "--free", P_LEFT), "column 'why': not known"),
-], ids=range(28))
+], ids=range(29))
 def test_refusals(tmp_path: Path, command: Any, content: str, words: tuple[str, ...], complaint: str) -> None:
     (tmp_path / "data.csv").write_text(content)
     result = command("fit", "data.csv", *words)
