@@ -101,14 +101,15 @@ DONE = STATUSES.index(Status.DONE.name)
 
 
 def data_of(data: Any) -> dict[str, Any]:
-    """Of each outcome its quantiles, unit and numbers of infinite values and of nan; and how the runs ended."""
+    """Of each outcome its quantiles, without nan, unit and numbers of infinite values and of nan; and how runs ended."""
     from grasp_ros.maps import store
 
     found: dict[str, Any] = {}
     for name in store.columns_of(data):
         values = data[name].values.ravel()
-        finite = values[np.isfinite(values)]
-        cells = np.quantile(finite, [*HEADS.values()]).tolist() if len(finite) else [np.nan] * len(HEADS)
+        known = values[~np.isnan(values)]
+        parts = [*HEADS.values()]  # each a value: between a finite and an infinite one there is nothing
+        cells = np.quantile(known, parts, method="inverted_cdf").tolist() if len(known) else [np.nan] * len(HEADS)
         found[name] = {"units": data[name].attrs["units"], **dict(zip(HEADS, cells, strict=True)),
                        **{head: int(count(values).sum()) for head, count in COUNTS.items()}}
     codes, counts = np.unique(data["status"].values, return_counts=True)
