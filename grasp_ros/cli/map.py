@@ -101,7 +101,7 @@ DONE = STATUSES.index(Status.DONE.name)
 
 
 def data_of(data: Any) -> dict[str, Any]:
-    """Of each outcome its quantiles, without nan, unit and numbers of infinite values and of nan; and how runs ended."""
+    """Of each outcome its quantiles but for nan, its unit, how many are infinite or nan; and how the runs ended."""
     from grasp_ros.maps import store
 
     found: dict[str, Any] = {}

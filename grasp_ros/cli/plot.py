@@ -60,6 +60,8 @@ def _plot(options: argparse.Namespace) -> int:
     if (options.panels and options.animate) or (options.speed != 1.0 and not options.animate):
         raise Refused("--panel: allowed: without --animate; --speed: with it")
     check_output(output, FORMATS if options.animate else figure_endings(output), options.force, options.sources)
+    if options.step is not None and options.method == EXACT:
+        raise Refused(f"--step: allowed: with another --method than {EXACT}")
     if options.sensitivity and (options.animate or len(options.sources) > 1):
         raise Refused("--sensitivity: allowed: one scene, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]

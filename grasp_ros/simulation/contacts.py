@@ -63,8 +63,8 @@ def contact_table(run: Trajectory, side: Body) -> np.ndarray:
     found = found[found[:, 1] > found[:, 0]]
     rows = np.zeros(len(found), dtype=[(name, "f8") for name in UNITS])
     rows["begin"], rows["end"], rows["speed_in"], rows["speed_out"] = *found.T[:3], -found[:, 3]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        rows["restitution"] = rows["speed_out"] / rows["speed_in"]
+    rows["restitution"] = np.nan  # of what does not come in
+    np.divide(rows["speed_out"], rows["speed_in"], out=rows["restitution"], where=rows["speed_in"] > 0.0)
     if not len(found):
         return rows
     begins, ends = breaks[:-1], breaks[1:]

@@ -28,7 +28,7 @@ def of(name: str, duration: float, **changes: float) -> Scene:
     return scenes.load(name).changed({"time.duration_s": duration, **numbers})
 
 
-@pytest.mark.parametrize("name", ["preload", "preload_feed_forward", "tilt_hold", "arm_alone"])
+@pytest.mark.parametrize("name", ["preload", "preload_feed_forward", "tilt_hold", "arm_alone", "friction"])
 def test_what_rests_is_where_its_forces_balance_and_costs_nothing_more(name: str) -> None:
     short, long = simulate(of(name, 200.0)), simulate(of(name, 1e6))
     assert short.at_rest is not None

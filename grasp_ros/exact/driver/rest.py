@@ -12,7 +12,7 @@ from grasp_ros.exact.impact import elastic_slope
 from grasp_ros.exact.kinematics import own_acceleration, own_size
 from grasp_ros.exact.records import Level, Plant, State
 from grasp_ros.exact.tolerances import DERIVATIVE, REST
-from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, U, V, X
+from grasp_ros.physics.layout import LEFT, OBJECT, RIGHT, Body, Law, Of, Pair, Slide, U, V, X
 
 ENERGY, LENGTH, SINCE = range(3)  # places of `State.rest`: J of V and m, so far, and the time of rest in s
 
@@ -39,7 +39,10 @@ def stays(plant: Plant, state: State, body: Body) -> bool:
     """Whether a body stays where it is, but for a part REST of the largest position.
 
     A spring or a contact holds what is near its balance; a body without either rests if nothing moves it at all.
+    Dry friction holds an object that sticks, whatever pushes it, as long as all others stay.
     """
+    if body == OBJECT and state.mode[OBJECT] == Slide.STUCK:
+        return True
     row, lane = plant.bodies[body], velocity_lane(body)
     x, v, push, held = state.y[lane - 1], state.y[lane], 0.0, 0.0
     if row[Of.DAMPING] < 0.0:
