@@ -235,6 +235,8 @@ def _watch(options: argparse.Namespace) -> int:
             raise Refused(f"--from {options.first!r} is not allowed; allowed: with a bag")
         _reach(options)
         become("watch", {}, options.namespace)
+    if options.namespace != "/" or options.network:
+        raise Refused("--namespace, --network: allowed: without a bag")
     from grasp_ros.cli.watch import play
     from grasp_ros.graph import bag
 

@@ -171,8 +171,9 @@ class Recorder:
         room = limit - self._sink.tell() if limit != resource.RLIM_INFINITY else RESERVE_BYTES + index
         if self._sink.full or room < RESERVE_BYTES + index:
             why = "files may not be larger" if self._sink.full in (0, errno.EFBIG) else "no space is left on the disk"
-            end = f"the recording ends at {self._last_ns / NANOSECONDS} s"
-            self._error = f"{self._path}: {end}: {why}; the bag is closed, and whole up to there"
+            until = f"the recording ends at {self._last_ns / NANOSECONDS} s"
+            self._error = (f"{self._path}: {until}: {why}; the bag is closed, and whole up to there" if self._next else
+                           f"{self._path}: not a tick could be recorded: {why}")
             self._finish(why, {})
 
     def _flush_regularly(self) -> None:

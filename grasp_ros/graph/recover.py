@@ -42,8 +42,8 @@ def recover(path: str | os.PathLike[str], new: str | os.PathLike[str]) -> Recove
     ticks = _ticks(opened, refused)
     begin = next(ticks, None)
     if begin is None:
-        why = opened.storage.left_out[0][2] if opened.storage.left_out else "it holds no complete tick"
-        raise BagError(f"{path}: nothing can be recovered: {why}")
+        reasons = (*(why for _, _, why in opened.storage.left_out), *refused, "it holds no tick")
+        raise BagError(f"{path}: nothing can be recovered: {reasons[0]}")
     recorder, written = Recorder(Path(new), opened.scene, opened.versions, opened.names, opened.running), 0
     try:
         for time_ns, stamp_ns, tick, beside in chain([begin], ticks):
@@ -91,9 +91,11 @@ def _ticks(
                     tick[topic] = stored.cdr
             elif topic not in (SCENE, RUN, CLOCK):  # these three the recorder writes itself
                 beside.append((topic, stored.cdr))
-        if time_ns % period_ns or not before < time_ns <= MOST_NS or not tick.keys() >= wanted:
+        if time_ns % period_ns or not before < time_ns <= MOST_NS:
             continue
         with _noting(refused, number):
+            if missing := sorted(topic.name for topic in wanted - tick.keys()):
+                raise BagError(f"no message on {', '.join(missing)}")
             found = stamp_of(columns, tick)
             none = found % period_ns or not 0 <= found <= scene.ticks * period_ns
             if none or not follows(found - at[1], time_ns - at[0], period_ns):

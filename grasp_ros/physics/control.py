@@ -142,4 +142,6 @@ class ControlLaw:
     def command(self, tick: int, x: Any, v: Any) -> Any:
         """Command in N that answers the state (x, v) of a tick, in the arithmetic of x and v."""
         row = self.row.tolist()  # once: this is called at every tick of a graph
-        return limited(row, feedback(row, *measured(row, self.noise(tick).tolist(), x, v)))
+        if any(row[Column.POSITION_NOISE : Column.LIMIT]):
+            x, v = measured(row, self.noise(tick).tolist(), x, v)
+        return limited(row, feedback(row, x, v))

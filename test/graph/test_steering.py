@@ -106,9 +106,12 @@ def test_a_bag_is_published_again_with_its_clock(
         assert {stamp % 1_000_000 for stamp in rows} == {0}
 
 
-def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(grasp_run: Any, launch: Any) -> None:
-    """The monitor closed its bag at the last tick, and the plant that was still there failed without it."""
-    run = grasp_run("arm_alone", "--set", "time.duration_s=0.2", "--paused", "--no-figure")
+@pytest.mark.parametrize("kind", [(), ("--free-running",)])
+def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(
+    grasp_run: Any, launch: Any, kind: tuple[str, ...]
+) -> None:
+    """The monitor closed its bag at the last tick, and lost a free run's steps, which did not wait for it."""
+    run = grasp_run("arm_alone", "--set", "time.duration_s=4", "--paused", "--no-figure", *kind)
     shell = launch(*GRASP, "ctl", **PIPES)
 
     def ask(words: str) -> str:
@@ -117,12 +120,12 @@ def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(grasp_run
         return str(shell.stdout.readline())
 
     wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
-    assert ask("step 200").startswith("arm_alone: paused at tick 200 of 200")
-    assert ask("reset").startswith("arm_alone: paused at tick 0 of 200, t = 0 s, 1 resets")
-    assert ask("step 200").startswith("arm_alone: paused at tick 200 of 200")
+    assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
+    assert ask("reset").startswith("arm_alone: paused at tick 0 of 4000, t = 0 s, 1 resets")
+    assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
     shell.communicate("resume\n", timeout=DEADLINE)
     out, err = run.communicate(timeout=DEADLINE)
-    assert (run.returncode, "402 states follow" in out) == (0, True), out + err
+    assert (run.returncode, "8002 states follow" in out) == (0, True), out + err
 
 
 def test_a_bag_of_another_program_is_published_from_its_first_message_on_or_refused(

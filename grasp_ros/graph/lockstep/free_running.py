@@ -116,7 +116,7 @@ class FreeRunning:
             self._steering.reset_done()
             self._set_anchor()
         if self._steering.steps:  # asked for: not with the clock
-            while not plant.finished and self._steering.steps and self._steering.go_on():
+            while not (plant.finished or plant.outrun()) and self._steering.steps and self._steering.go_on():
                 self._step()
         if self._steering.stands:
             self._timing.pause()

@@ -51,6 +51,7 @@ from grasp_ros.scene.topics import (
 )
 from grasp_ros.scene.versions import versions
 
+ALARM, CLOSED = map(LYAPUNOV_NAMES.index, ("alarm", "closed"))
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
@@ -254,7 +255,8 @@ class Monitor(PeerNode):
             own = self._published = self._template.fill(tick.time_ns, values)
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
-            self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
+            if values[ALARM] or not values[CLOSED]:
+                self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
             self._at_end = tick.time_ns == self._synchronizer.end_ns
             self.finished = bool(self.exit_code) or self._is_over()
             if self.finished:
