@@ -51,7 +51,8 @@ class Sink:
 
     def check(self) -> None:
         """Raise an OSError if the file is shorter than what was written."""
-        if os.fstat(self.file).st_size < self._size:
+        written = self._size  # first: another thread may write meanwhile
+        if os.fstat(self.file).st_size < written:
             raise OSError(errno.EIO, "was cut off by another program during the recording")
 
     def tell(self) -> int:

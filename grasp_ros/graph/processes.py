@@ -109,7 +109,7 @@ class Graph:
         except Refused:
             self.stop()
             raise
-        environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ}
+        environment = {"ROS_LOG_DIR": str(self.directory / "log"), **os.environ, "PYTHONINSPECT": ""}  # none asks on
         # A child inherits the mask and lifts it when its handlers are in place: it cannot be interrupted half started.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, STOP_SIGNALS)
         shared_memory.remove_left()

@@ -35,6 +35,13 @@ SEED, CALLS = 13, 40
 PIPES = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
 
 
+def answer_of(shell: Any, words: str) -> str:
+    """What a shell of `ctl` says to a line."""
+    shell.stdin.write(f"{words}\n")
+    shell.stdin.flush()
+    return str(shell.stdout.readline())
+
+
 @pytest.fixture(scope="module")
 def steered(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[int]]:
     """A run that was steered at random: its directory, and the states that its bag must have from each beginning on."""
@@ -113,12 +120,7 @@ def test_a_plant_that_was_stepped_to_the_end_is_put_back_or_let_finish(
     """The monitor closed its bag at the last tick, and lost a free run's steps, which did not wait for it."""
     run = grasp_run("arm_alone", "--set", "time.duration_s=4", "--paused", "--no-figure", *kind)
     shell = launch(*GRASP, "ctl", **PIPES)
-
-    def ask(words: str) -> str:
-        shell.stdin.write(f"{words}\n")
-        shell.stdin.flush()
-        return str(shell.stdout.readline())
-
+    ask = partial(answer_of, shell)
     wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
     assert ask("step 4000").startswith("arm_alone: paused at tick 4000 of 4000")
     assert ask("reset").startswith("arm_alone: paused at tick 0 of 4000, t = 0 s, 1 resets")
@@ -157,12 +159,7 @@ def test_a_shell_steers_asks_and_sets(tmp_path: Path, launch: Any) -> None:
     launch(*plant, stderr=subprocess.DEVNULL)
     launch(*START, "left_controller", stderr=subprocess.DEVNULL)
     shell = launch(*GRASP, "ctl", **PIPES)
-
-    def ask(words: str) -> str:
-        shell.stdin.write(f"{words}\n")
-        shell.stdin.flush()
-        return str(shell.stdout.readline())
-
+    ask = partial(answer_of, shell)
     wait_for(lambda: "paused at tick 0 of" in ask("status"), "the first state")
     assert ask("step 7").startswith("arm_alone: paused at tick 7 of")
     gain = "left_feedback.position_gain_N_per_m"
