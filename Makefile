@@ -20,7 +20,7 @@ demo: install
 # The tests of every commit. While one core checks types, the other compiles what both halves of the tests would.
 test: install
 	$(BIN)/ruff check .
-	$(BIN)/mypy & PYTHONPATH=. $(BIN)/python -m grasp_ros.cli simulate case_01 --sensitivity left_arm.mass_kg >/dev/null && wait $$!
+	$(BIN)/mypy & PYTHONPATH=. $(BIN)/python -m grasp_ros.cli simulate case_01 --sensitivity left_arm.mass_kg >/dev/null; wait $$!
 	$(BIN)/pytest -n 2 --dist loadfile -m "not thorough" --durations 20
 
 # All tests, before a release and after a change of what only these look at.

@@ -47,8 +47,9 @@ def _fit(options: argparse.Namespace) -> int:
         warn(scene)
     against: dict[str, float] = {}
     for key, value in map(_value, options.against):
-        if against.setdefault(key, value) != value:
-            raise Refused(f"--against {key}: given twice, with {against[key]!r} and {value!r}; allowed: one value")
+        if key in against:
+            raise Refused(f"--against {key}: given twice; allowed: one value")
+        against[key] = value
     prepare()
     found = fit(options.source, options.free, scene, against=against, by_sensors=options.by_sensors)
     show(options, printable(str(found)), _data(found))

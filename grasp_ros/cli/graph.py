@@ -131,7 +131,7 @@ def _run(options: argparse.Namespace) -> int:
         print(f"grasp: {error}{_what_is_there(graph.bag)}", file=sys.stderr)
         return 1
     except Refused:
-        if graph.processes and not _what_is_there(graph.bag):  # a node refused what it was given
+        if graph.processes and _is_without_ticks(graph.bag):  # a node refused what it was given
             shutil.rmtree(directory, ignore_errors=True)
         raise
     if not begun:
@@ -155,11 +155,16 @@ def _has_ticks(path: Path) -> bool:
     return any(topic == JOINT_STATES for topic, _ in messages)
 
 
+def _is_without_ticks(bag: Path) -> bool:
+    """Whether there is nothing to keep; a bag that cannot be read may have ticks."""
+    with suppress(Refused):
+        return not _has_ticks(bag)
+    return False
+
+
 def _what_is_there(bag: Path) -> str:
     """What a run that failed has left, as the end of a sentence."""
-    with suppress(Refused):
-        return f"; {bag} has what was recorded" if _has_ticks(bag) else ""
-    return ""
+    return "" if _is_without_ticks(bag) else f"; {bag} has what was recorded"
 
 
 def _in_words(spent: Sequence[tuple[float, str]]) -> str:
@@ -236,7 +241,7 @@ def _watch(options: argparse.Namespace) -> int:
         _reach(options)
         become("watch", {}, options.namespace)
     if options.namespace != "/" or options.network:
-        raise Refused("--namespace, --network: allowed: without a bag")
+        raise Refused("--namespace and --network are of a graph; allowed: without a bag")
     from grasp_ros.cli.watch import play
     from grasp_ros.graph import bag
 

@@ -54,6 +54,8 @@ def _plot(options: argparse.Namespace) -> int:
     span: Span = None
     if options.first is not None or options.last is not None:
         span = options.first or 0.0, math.inf if options.last is None else options.last
+        if not 0.0 <= span[0] < span[1]:
+            raise Refused(f"--from {span[0]:g} --to {span[1]:g} is not allowed; allowed: ascending from 0 s on")
     output = options.output or _beside(options.sources[0], ".gif" if options.animate else ".png")
     if options.animate and (len(options.sources) > 1 or output == STDOUT):
         raise Refused("--animate: allowed: one source, and a file")
@@ -66,7 +68,7 @@ def _plot(options: argparse.Namespace) -> int:
         raise Refused("--sensitivity: allowed: one scene, without --animate")
     motions = [_motion(source, options, span) for source in options.sources]
     if span is not None and options.last is None:
-        span = span[0], max(motion.scene.duration for motion in motions)
+        span = span[0], max(map(plots.end_of, motions))
     if options.animate:
         animate(motions[0], output, speed=options.speed, span=span, width_mm=options.width)
         note(f"written to {output}")

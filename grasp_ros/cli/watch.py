@@ -9,10 +9,10 @@ import numpy as np
 from rich.live import Live
 
 from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.terminal import Key, Keys, Moment, View, named
+from grasp_ros.graph.terminal import Key, Keys, Moment, View
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import CONTACTS
+from grasp_ros.scene.topics import CONTACTS, named
 
 FRAME_SECONDS = 0.1
 HINT = "Space pause   ← → step   q quit"

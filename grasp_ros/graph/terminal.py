@@ -8,7 +8,7 @@ import select
 import sys
 import termios
 import tty
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from enum import Enum
 from typing import Any, NamedTuple
@@ -23,7 +23,6 @@ from grasp_ros.physics.model import Array, Mode
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene import Scene
 from grasp_ros.scene.effects.base import SIDES
-from grasp_ros.scene.topics import LYAPUNOV_NAMES
 
 STYLES = {"left": "bold blue", "object": "bold white", "right": "bold red"}
 SIGNS = {"left": "[L]", "object": "(O)", "right": "[R]"}
@@ -114,11 +113,6 @@ class View:
         alarm = level.get("alarm", 0.0) == 1.0
         table.add_row("balance", Text("ALARM", style="bold red") if alarm else "closes", "")
         return [table] if closed else [table, "V: no law is announced, or another one ran"]
-
-
-def named(values: Iterable[float]) -> dict[str, float]:
-    """What `lyapunov` carries, by name."""
-    return dict(zip(LYAPUNOV_NAMES, (float(value) for value in values), strict=True))
 
 
 class Key(Enum):

@@ -23,8 +23,8 @@ def fit(data: Source, free: Sequence[str], scene: Scene | None = None, *,
         against: Mapping[str, float] = MappingProxyType({}), by_sensors: bool = False) -> Fit:
     """Estimate numbers of a scene from a measured motion, with confidence intervals.
 
-    Positive numbers are searched by their logarithm; their intervals are symmetric, but never below 0. The noise of
-    each channel is estimated as well, and weights it.
+    Positive numbers are searched by their logarithm, and at last as they are; their intervals are symmetric, but never
+    below 0. The noise of each channel is estimated as well, and weights it.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         found = _of_trajectory(source, "run")
     elif Path(source).suffix.lower() == ".csv":
         if scene is None:
-            raise Refused(f"{source}: a table does not name its scene; allowed: a scene beside it")
+            raise Refused(f"{source}: a table does not name its scene; allowed: with a scene given")
         return _checked(_of_table(Path(source), scene))
     else:
         path = Path(source)

@@ -65,8 +65,8 @@ class Fit(Frozen):
     covariance : array (n, n)
         In the units of the keys; NaN for what is not identifiable.
     not_identifiable : tuple of tuples of str
-        Numbers that can change together without a trace in these data: by a factor of ten, or, where negative ones
-        are allowed, by their size or unit.
+        Numbers that can change together without a trace in these data: by a factor of ten of their value or start,
+        whichever is larger, or, where negative ones are allowed, by their size or unit.
     t : array (m,), s
     measured, fitted : arrays (m, 6), m and m/s
         NaN for channels that are not measured.

@@ -41,8 +41,8 @@ class Observation(NamedTuple):
 OBSERVABLES: dict[str, Callable[[Observation], float]] = {
     "x_object": lambda seen: seen.state[COLUMN[OBJECT]],  # position of the object, m
     "v_object": lambda seen: seen.state[COLUMN[OBJECT] + 1],  # its velocity, m/s
-    "x_other": lambda seen: seen.other()[0],
-    "v_other": lambda seen: seen.other()[1],
+    "x_other": lambda seen: seen.other()[0],  # position of the other arm, as its own sensor measures it, m
+    "v_other": lambda seen: seen.other()[1],  # its velocity, m/s
     "impact": lambda seen: seen.system.impact(seen.side, seen.state),  # force between the arm and the object, N
     "impact_other": lambda seen: seen.system.impact(opposite(seen.side), seen.state),  # of the other arm, N
     "set_point": lambda seen: seen.laws[seen.side].set_point,  # of the feedback that the law replaces, m

@@ -174,7 +174,7 @@ class Scene(Frozen):
         section, _, key = str(name).partition(".")
         if key not in self.values.get(section, {}):
             if section in self.values and any(own.key == key for own in BY_SECTION[section].parameters):
-                raise SceneError(f"{self.name}: {name}: not set in this scene; allowed: one that sets it, to 0 perhaps")
+                raise SceneError(f"{self.name}: {name}: not set in this scene; set it first, to 0 for instance")
             known = [f"{own}.{key}" for own, found in self.values.items() for key in found]
             raise SceneError(f"{self.name}: {name}: not in this scene; {allowed(str(name), known)}")
         return next(own for own in BY_SECTION[section].parameters if own.key == key)

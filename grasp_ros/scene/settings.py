@@ -16,6 +16,7 @@ from grasp_ros.scene.validation import SceneError
 FEW = 2  # changes that a title names
 CHANGED = re.compile(r" \[(other numbers|\w+(\.\w+)?=[^\]]*)\]$")  # at the end of a title
 
+
 def apply(settings: Sequence[str], document: dict[Any, Any]) -> None:
     """Put settings into the document of a scene, which is changed in place, before it is validated; in any order.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 FRAME = "line"  # in which the forces are given: x along the line on which all moves
@@ -76,6 +77,11 @@ LYAPUNOV_VALUES = {
     "closed": "1 while every controller runs the law that it announced",
 }
 LYAPUNOV_NAMES = [*LYAPUNOV_VALUES]
+
+
+def named(values: Iterable[float]) -> dict[str, float]:
+    """What `lyapunov` carries, by name."""
+    return dict(zip(LYAPUNOV_NAMES, (float(value) for value in values), strict=True))
 
 
 class Numbers:

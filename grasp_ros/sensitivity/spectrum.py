@@ -13,6 +13,7 @@ import numpy as np
 from grasp_ros.exact.integrator import Integrator, Status
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
+from grasp_ros.physics.layout import OBJECT, Entry, Of, Slide
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN
 from grasp_ros.scene import Scene
@@ -20,15 +21,16 @@ from grasp_ros.scene.places import check_scene
 from grasp_ros.sensitivity.directions import no_directions
 from grasp_ros.sensitivity.run import Carrier
 
-PIECE_S, MOST_PIECES = 0.5, 2**20  # of time: the longest, and how many
+PIECE_S, MOST_PIECES = 0.5, 2**16  # of time: the longest, and how many
 FALL = 1e-10  # of a tangent within a piece, to what is left of it at right angles to others: below, it has few digits
-LOST = 1e-14  # the same where an object that sticks has lost it
+DECAY = 10.0  # time constants of the dampers in a piece, at most
 
 
 def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     """Lyapunov exponents (2 b,) of a run of b bodies under continuous feedback, descending, 1/s.
 
-    Lengths are those of states (x, v) in m and m/s. An object that sticks loses a direction: its exponent is -inf.
+    Lengths are those of states (x, v) in m and m/s. An object that sticks loses a direction: its exponent is -inf, and
+    so is that of another one of which no digit is left when it sticks again.
 
     Raises
     ------
@@ -39,7 +41,9 @@ def spectrum(scene: Scene, *, accuracy: float = ACCURACY) -> Array:
     if scene.sampled or scene.system.external:
         raise Refused(f"{scene.name}: Lyapunov exponents: allowed: continuous feedback, no external force")
     places = [place for body in scene.system.present for place in (COLUMN[body], COLUMN[body] + 1)]
-    pieces = max(math.ceil(scene.duration / PIECE_S), 1)
+    bodies = scene.system.closed_loop[scene.system.present]
+    rate = max(1.0 / PIECE_S, float((bodies[:, Of.DAMPING] / bodies[:, Of.MASS]).max()) / DECAY)
+    pieces = max(math.ceil(scene.duration * rate), 1)
     while (grown := _growth(scene, places, accuracy, pieces)) is None:
         pieces *= 2
         if pieces > MOST_PIECES:
@@ -62,7 +66,9 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
         if integrator.status is not Status.DONE:
             raise Refused(f"{scene.name}: no Lyapunov exponents of a run that {integrator.stop}")
         carrier.finish(begin + piece_s)
-        found = _at_right_angles(carrier.x[places][:, : len(grown)], scene.system.coulomb > 0.0)
+        events, slide = integrator.event_table, integrator.records.mode[OBJECT]
+        stuck = slide == Slide.STUCK or bool((events[:, Entry.BODY] == OBJECT).any())  # stick and slip
+        found = _at_right_angles(carrier.x[places][:, : len(grown)], stuck)
         if found is None:
             return None
         kept, square, lengths = found
@@ -72,14 +78,18 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
     return grown
 
 
-def _at_right_angles(moved: Array, sticks: bool) -> tuple[np.ndarray, Array, Array] | None:
-    """Which tangents (n, k) are kept, the same at right angles, and how long each was beside those before it."""
+def _at_right_angles(moved: Array, stuck: bool) -> tuple[np.ndarray, Array, Array] | None:
+    """Which tangents (n, k) are kept, the same at right angles, and how long each was beside those before it.
+
+    Without those that an object that has stuck has lost; None if another one has hardly any part of its own.
+    """
     kept: np.ndarray = np.arange(moved.shape[1])
     while True:
         square, triangle = np.linalg.qr(moved[:, kept])
-        lengths = np.abs(np.diag(triangle))
-        own = np.linalg.norm(moved[:, kept], axis=0)
-        lost = np.flatnonzero(lengths <= LOST * own)
-        if not (sticks and len(lost)):
-            return None if (lengths < FALL * own).any() or not own.all() else (kept, square, lengths)
+        lengths, own = np.abs(np.diag(triangle)), np.linalg.norm(moved[:, kept], axis=0)
+        lost = np.flatnonzero(~((lengths >= FALL * own) & (own > 0.0)))
+        if not len(lost):
+            return kept, square, lengths
+        if not stuck:
+            return None
         kept = np.delete(kept, lost[0])  # what follows it was laid at right angles to nothing

@@ -119,11 +119,16 @@ def compose(
         return figure
 
 
+def end_of(motion: Motion) -> float:
+    """The end of its scene in s, or of a recording whose time goes on behind a reset."""
+    return float(max(motion.scene.duration, *motion.t[-1:]))
+
+
 def shown(motions: Sequence[Motion], span: tuple[float, float] | None) -> tuple[float, float] | None:
     """The first and the last time in s that are wanted, which the longest motion has; None: all."""
     if span is None:
         return None
-    longest = max(instance("motion", motion, Tabular, A_MOTION).scene.duration for motion in motions)
+    longest = max(end_of(instance("motion", motion, Tabular, A_MOTION)) for motion in motions)
     first, last = ascending("span", rows("span", span, 2), longest, strictly=True).tolist()
     return first, last
 

@@ -29,7 +29,7 @@ PUBLIC = {  # modules and their public names; what has `__all__` says it itself,
     "grasp_ros.simulation.outcomes": ("OUTCOMES",),
     "grasp_ros.physics.energy": ("energy", "Energy", "energy_balance", "EnergyBalance"),
     "grasp_ros.physics.layout": ("Transition",), "grasp_ros.physics.model": ("Mode",),
-    "grasp_ros.physics.errors": ("Refused",), "grasp_ros.physics.observation": ("Observation",),
+    "grasp_ros.physics.errors": ("Refused",), "grasp_ros.physics.observation": ("OBSERVABLES",),
     "grasp_ros.graph.bag": ("read", "Recording", "BagError"), "grasp_ros.graph.verify": ("verify", "laws_of"),
     "grasp_ros.graph.summary": ("summary",),
 }

@@ -52,7 +52,7 @@ SETTINGS = [
 
 def test_the_page_lists_what_a_law_may_ask_for() -> None:
     text = PAGE.read_text(encoding="utf-8")
-    assert tuple(re.findall(r"^\| `(\w+)` \|", text, re.M)) == OBSERVABLES
+    assert tuple(re.findall(r"^\| `(\w+)` \|", text, re.M)) == tuple(OBSERVABLES)
 
 
 def from_the_bag(recording: Recording, side: int, law: Any) -> list[float]:

@@ -218,7 +218,7 @@ def test_what_cannot_be_shown_is_refused(path: Path, command: Any, options: list
     found = command("watch", str(path), *options)
     assert (found.returncode, found.stderr) == (2, f"grasp: {words}\n")
     assert command("watch", "--from", "1").stderr == "grasp: --from 1.0 is not allowed; allowed: with a bag\n"
-    assert command("watch", "bag", "--namespace", "/x").stderr.endswith("--network: allowed: without a bag\n")
+    assert command("watch", "bag", "--namespace", "/x").stderr.endswith("of a graph; allowed: without a bag\n")
 
 
 def test_keys_pause_and_step_a_running_plant(

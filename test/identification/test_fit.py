@@ -237,7 +237,7 @@ HELD = "".join(f"{line},{'input_left_N,input_object_N,input_right_N' if line[0] 
     (ROWS, ("--scene", "case_02", "--free", P_LEFT), f"allowed: a start > 0, as by the setting {P_LEFT}=VALUE"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{H_LEFT}=1"), "allowed: a number of the scene that"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=1", "--against", f"{P_LEFT}=0"),
-     f"--against {P_LEFT}: given twice, with 1.0 and 0.0; allowed: one value"),
+     f"--against {P_LEFT}: given twice; allowed: one value"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", P_LEFT), "allowed: KEY=VALUE, with a number"),
     (ROWS, ("--scene", "case_01", "--free", P_LEFT, "--against", f"{P_LEFT}=-1"), "dissipation_s_per_m: -1.0 is not"),
     (ROWS.replace("t_s", "t"), ("--scene", "case_01", "--free", P_LEFT), "allowed: t_s and at least one of x_left_m"),

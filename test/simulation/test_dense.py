@@ -58,7 +58,10 @@ def test_what_is_no_kind_or_side_is_refused(kind: Any, side: Any) -> None:
 def test_records_are_equal_whose_content_is(tmp_path: Path) -> None:
     run = simulate(case_of(), sensitivity=["object.mass_kg"])
     table = ensemble(run.scene, {"object.mass_kg": [1.0, -1.0]}, ["touches"])
-    assert copy.deepcopy(run) == run
+    for record in (run, run.scene, table):
+        again = copy.deepcopy(record)
+        assert again == record
+        assert {again} == {record}
     other = simulate(case_of(), max_events=3)
     assert run != other
     other.save(tmp_path / "run.npz")

@@ -42,16 +42,15 @@ from grasp_ros.scene.topics import (
     DIAGNOSTICS,
     JOINT_STATES,
     LYAPUNOV,
-    LYAPUNOV_NAMES,
     RUN,
     SCENE,
     TIMING,
     Numbers,
     Topic,
+    named,
 )
 from grasp_ros.scene.versions import versions
 
-ALARM, CLOSED = map(LYAPUNOV_NAMES.index, ("alarm", "closed"))
 MOST_TICKS, MOST_SECONDS = 128, 0.05  # that are evaluated at once, and of wall time that a tick waits for others
 BEHIND_SECONDS, QUIET_SECONDS = 1.0, 0.1  # at most for what came before a signal, and without any more of it
 MOST_BYTES, MOST_BESIDE_BYTES = 2**16, 2**24  # beside the states: of a message; of a topic from report to report
@@ -81,13 +80,11 @@ class Monitor(PeerNode):
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
-        self._published = b""  # of the last tick
+        self._published, self._advanced = b"", 0.0  # of the last tick: what was, and its wall time
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
-        self._plant = ""  # identity of the one that is recorded
-        self._advanced = 0.0  # wall time of the last tick
+        self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is
         self._sources: dict[Topic, Sources] = {}  # of commands that come with every state
-        self._at_end = False  # whether the last tick of the scene is recorded
         self._bag_ns = self._offset_ns = 0  # time in the bag, and what it is ahead of simulated time
         self.counters.update(ticks=0, resets=0, **{
             "lost messages": 0, "messages without a state": 0, "refused announcements": 0, "lost announcements": 0,
@@ -255,8 +252,7 @@ class Monitor(PeerNode):
             own = self._published = self._template.fill(tick.time_ns, values)
             self._recorder.write_tick(bag_ns, [*beside, *tick.found.items(), (LYAPUNOV, own)], tick.time_ns)
             self._output.publish(own)
-            if values[ALARM] or not values[CLOSED]:
-                self._heed(tick, dict(zip(LYAPUNOV_NAMES, values, strict=True)))
+            self._heed(tick, named(values))
             self._at_end = tick.time_ns == self._synchronizer.end_ns
             self.finished = bool(self.exit_code) or self._is_over()
             if self.finished:

@@ -9,6 +9,7 @@ from typing import Any
 from grasp_ros.graph.opening import Opened
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
+from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 
@@ -28,7 +29,10 @@ class Player(GraspNode):
         if not 0.0 < self._rate < math.inf:
             raise Refused(f"rate: {self._rate!r} is not allowed; allowed: a number > 0")
         self._rows = bag.messages
-        self._next = next(self._rows)  # a bag has one
+        first = next(self._rows, None)
+        if first is None:
+            raise BagError(f"{bag.path}: holds no tick")
+        self._next = first
         self._first_ns = self._next[1].time_ns
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
