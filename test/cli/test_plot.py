@@ -58,7 +58,7 @@ def test_panels_are_chosen(command: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (("--from", "3", "--to", "2"), "span: 2.0 after 3.0 is not allowed; allowed: ascending from 0 to 20.0 s"),
+        (("--from", "3", "--to", "2"), "--from 3 --to 2 is not allowed; allowed: ascending from 0 s on"),
         (("--from", "99"), "span: 99.0 is not allowed; allowed: ascending from 0 to 20.0 s"),
         (("--to", "21"), "span: 21.0 after 0.0 is not allowed; allowed: ascending from 0 to 20.0 s"),
         (("case_03", "--sensitivity", "object.mass_kg"), "--sensitivity: allowed: one scene, without --animate"),
