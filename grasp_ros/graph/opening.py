@@ -16,17 +16,19 @@ from grasp_ros.graph.recorder import OWN_RECORD, VERSION
 from grasp_ros.graph.rosbag2 import TOPIC, BagError, decode, names_of, topics_of
 from grasp_ros.graph.storage import CONVERT, Storage, Stored
 from grasp_ros.physics import given
-from grasp_ros.scene.files import decoding
+from grasp_ros.scene.files import DAMAGE, decoding
 from grasp_ros.scene.topics import DIAGNOSTICS, RUN, SCENE, Topic
 
 KIND = "a bag of this package"
 MOST_AHEAD = 16  # messages, of which two say what the bag holds
+# What is raised for bytes that are no message, by rosbags the last two.
+UNREADABLE: tuple[type[Exception], ...] = (*DAMAGE, SerdeError, AttributeError)
 ZSTD = b"\x28\xb5\x2f\xfd"
 
 
 def decoding_bag(path: Path) -> AbstractContextManager[None]:
     """Refuse a bag of which something is not as it should be."""
-    return decoding(path, KIND, BagError, (SerdeError, AttributeError))
+    return decoding(path, KIND, BagError, UNREADABLE)
 
 
 def open_storage(path: Path, salvage: bool = False) -> Storage:

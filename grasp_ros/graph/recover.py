@@ -9,17 +9,13 @@ from itertools import chain, groupby
 from pathlib import Path
 from typing import NamedTuple
 
-from rosbags.serde import SerdeError
-
 from grasp_ros.graph.bag import MOST_NS, NOT_NEXT, Changes, columns_of, follows, stamp_of
-from grasp_ros.graph.opening import Opened
+from grasp_ros.graph.opening import UNREADABLE, Opened
 from grasp_ros.graph.recorder import Recorder
 from grasp_ros.graph.rosbag2 import BagError
-from grasp_ros.scene.files import DAMAGE
 from grasp_ros.scene.topics import CHANGES, CLOCK, LYAPUNOV, RUN, SCENE, Topic
 
 MOST_REASONS = 20  # that are told apart
-UNREADABLE: tuple[type[Exception], ...] = (*DAMAGE, SerdeError, AttributeError)
 
 
 class Recovery(NamedTuple):

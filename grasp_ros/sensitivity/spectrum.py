@@ -60,14 +60,16 @@ def _growth(scene: Scene, places: list[int], accuracy: float, pieces: int) -> Ar
     start[places, range(n)] = 1.0
     integrator = Integrator(scene.system, continuous=True, accuracy=accuracy)
     integrator.observer = carrier = Carrier(integrator, no_directions(n)._replace(state=start), np.zeros(0))
+    stuck = False
     for piece in range(pieces):
         begin = scene.duration * piece / pieces
         integrator.advance(piece_s, start=begin)
         if integrator.status is not Status.DONE:
             raise Refused(f"{scene.name}: no Lyapunov exponents of a run that {integrator.stop}")
         carrier.finish(begin + piece_s)
-        events, slide = integrator.event_table, integrator.records.mode[OBJECT]
-        stuck = slide == Slide.STUCK or bool((events[:, Entry.BODY] == OBJECT).any())  # stick and slip
+        slide = integrator.records.mode[OBJECT]  # FREE without dry friction
+        stuck = stuck or slide == Slide.STUCK or (
+            slide != Slide.FREE and bool((integrator.event_table[:, Entry.BODY] == OBJECT).any()))  # stick and slip
         found = _at_right_angles(carrier.x[places][:, : len(grown)], stuck)
         if found is None:
             return None

@@ -80,7 +80,7 @@ class Monitor(PeerNode):
         self._recorder: Recorder | None = None
         self._due: list[tuple[int, Tick, list[tuple[Topic, bytes]]]] = []  # time in the bag, tick, what comes beside
         self._others: list[Subscription] = []  # of what does not come with every state
-        self._published, self._advanced = b"", 0.0  # of the last tick: what was, and its wall time
+        self._published, self._advanced = b"", 0.0  # for the last tick, and the wall time at which it came
         self._numbers = {side: Numbers() for side in CHANGES}  # of the announcements
         self._beside: Counter[Topic] = Counter()  # bytes since the last report, of what does not come with every state
         self._plant, self._at_end = "", False  # identity of the one that is recorded; whether its last tick is

@@ -163,10 +163,12 @@ class Plant(PeerNode):
         missing += self.loop.missing()
         monitor = [LYAPUNOV] if self.monitored else []
         missing += [] if self.linked(self._states, monitor) else [LYAPUNOV.name]
-        deaf = [topic.name for topic in self.loop.topics if not self.linked(self._states, [topic])]
-        self.words = (f"waiting for {', '.join(missing)}" if missing else
-                      f"waiting until whoever publishes {' and '.join(deaf) or 'a command'} listens to"
-                      f" {JOINT_STATES.name}, and all are connected")
+        if missing:
+            self.words = f"waiting for {', '.join(missing)}"
+        else:
+            deaf = [topic.name for topic in self.loop.topics if not self.linked(self._states, [topic])]
+            self.words = (f"waiting until whoever publishes {' and '.join(deaf) or 'a command'} listens to"
+                          f" {JOINT_STATES.name}, and all are connected")
         # Who has been here with another plant must have this scene before its first state.
         told = (*self._descriptions, self.heartbeats.publisher)
         known = all(publisher.get_subscription_count() >= len(self.readers(publisher))

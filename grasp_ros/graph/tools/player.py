@@ -32,8 +32,7 @@ class Player(GraspNode):
         first = next(self._rows, None)
         if first is None:
             raise BagError(f"{bag.path}: holds no tick")
-        self._next = first
-        self._first_ns = self._next[1].time_ns
+        self._next, self._first_ns = first, first[1].time_ns
         self._outputs = {topic: self.create_publisher(messages.TYPES[topic.type], name, messages.qos(topic))
                          for topic, name in bag.names.items()}
         self.counters["messages"] = 0
@@ -54,12 +53,15 @@ class Player(GraspNode):
 
     def _play(self) -> None:
         now = (time.monotonic() - self._begin) * self._rate
-        while not self.finished and (self._next[1].time_ns - self._first_ns) / NANOSECONDS <= now:
+        while (self._next[1].time_ns - self._first_ns) / NANOSECONDS <= now:
             topic, stored = self._next
             self._outputs[topic].publish(stored.cdr)
             self.count("messages")
             following = next(self._rows, None)
-            self._next, self.finished = following or self._next, following is None
+            if following is None:
+                self.finished = True
+                return
+            self._next = following
 
     def close(self) -> None:
         """Let every reader have the end."""
