@@ -28,7 +28,7 @@ _PLACES = {  # module, and the name there where it is another one; their types: 
     "Transition": "physics.layout", "compose": "scene.scene", "design": "optimization.search",
     "draw": "simulation.plots", "ensemble": "simulation.ensemble", "fit": "identification.fit", "load": "scene.scene",
     "load_run": "simulation.trajectory_file:load", "names": "scene.scene", "parse": "scene.scene",
-    "read_bag": "graph.bag:read", "simulate": "simulation.simulate", "spectrum": "sensitivity.spectrum",
+    "read_bag": "graph.bag.reading:read", "simulate": "simulation.simulate", "spectrum": "sensitivity.spectrum",
 }
 __all__ = sorted(_PLACES)
 

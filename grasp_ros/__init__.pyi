@@ -1,7 +1,7 @@
 from pathlib import Path
 
 from grasp_ros.exact.integrator import Status as Status
-from grasp_ros.graph.bag import read as read_bag
+from grasp_ros.graph.bag.reading import read as read_bag
 from grasp_ros.identification.fit import fit as fit
 from grasp_ros.optimization.search import design as design
 from grasp_ros.physics.errors import Refused as Refused

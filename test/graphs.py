@@ -14,15 +14,16 @@ from processes import DEADLINE
 from std_srvs.srv import Trigger
 
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.recorder import Recorder
+from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.recording import Recording
 from grasp_ros.scene import Scene
 from lab.drills.recorder import Tick
 
 
 def written(path: Path, scene: Scene, ticks: Iterable[Tick], counters: Mapping[str, object] | None = None) -> Path:
     """A new bag of some ticks, closed with counters of what was lost."""
-    recorder = bag.Recorder(path, scene, {"python": "3"})
+    recorder = Recorder(path, scene, {"python": "3"})
     for tick in ticks:
         recorder.write_tick(*tick)
     recorder.close(counters)

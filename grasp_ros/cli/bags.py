@@ -14,7 +14,7 @@ from grasp_ros.cli.output import destination, show
 from grasp_ros.physics.errors import Refused
 
 if TYPE_CHECKING:  # what is not asked for is not imported, which takes a while
-    from grasp_ros.graph.recording import Recording
+    from grasp_ros.graph.bag.recording import Recording
 
 
 def add_to(commands: Any) -> None:
@@ -62,7 +62,7 @@ def keeps(recording: Recording, options: argparse.Namespace) -> bool:
 
 
 def _recover(options: argparse.Namespace) -> int:
-    from grasp_ros.graph.recover import recover
+    from grasp_ros.graph.bag.recover import recover
 
     new = options.output or options.bag.parent / f"{options.bag.stem}_recovered"
     found = recover(options.bag, new)
@@ -74,12 +74,12 @@ def _recover(options: argparse.Namespace) -> int:
 
 def _inspect(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
-    from grasp_ros.graph import bag
-    from grasp_ros.graph.summary import summary, verified
-    from grasp_ros.graph.verify import verify
+    from grasp_ros.graph.bag.reading import read
+    from grasp_ros.graph.bag.summary import summary, verified
+    from grasp_ros.graph.bag.verify import verify
 
     check_output(options.output, (".csv",), options.force, [options.bag])
-    recording = bag.read(options.bag)
+    recording = read(options.bag)
     check_limits(options, recording.running.lockstep)
     warn(recording.scene)
     found, holds = summary(recording), True
@@ -98,11 +98,11 @@ def _inspect(options: argparse.Namespace) -> int:
 
 def _verify(options: argparse.Namespace) -> int:
     from grasp_ros.cli import report
-    from grasp_ros.graph import bag
-    from grasp_ros.graph.summary import verified
-    from grasp_ros.graph.verify import verify
+    from grasp_ros.graph.bag.reading import read
+    from grasp_ros.graph.bag.summary import verified
+    from grasp_ros.graph.bag.verify import verify
 
-    recording = bag.read(options.bag)
+    recording = read(options.bag)
     prepare()
     found = verify(recording)
     rows = [("bag", str(recording.path)), ("run", recording.running.words),

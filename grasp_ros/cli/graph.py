@@ -149,7 +149,7 @@ def _has_begun(path: Path) -> bool:
 
 def _has_ticks(path: Path) -> bool:
     """Whether there is a bag with a state: a run that waits for a controller from elsewhere has one without."""
-    from grasp_ros.graph.opening import Opened
+    from grasp_ros.graph.bag.opening import Opened
 
     messages = Opened(path).messages if path.exists() else ()
     return any(topic == JOINT_STATES for topic, _ in messages)
@@ -194,11 +194,11 @@ def _live(graph: Graph, spent: list[tuple[float, str]]) -> bool:
 def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options: argparse.Namespace) -> int:
     """Print and draw what a run has recorded; the exit status says whether it is all there and right."""
     from grasp_ros.cli import report
-    from grasp_ros.graph import bag
-    from grasp_ros.graph.summary import summary
-    from grasp_ros.graph.verify import verify
+    from grasp_ros.graph.bag.reading import read
+    from grasp_ros.graph.bag.summary import summary
+    from grasp_ros.graph.bag.verify import verify
 
-    recording = bag.read(graph.bag)
+    recording = read(graph.bag)
     rows, whole = report.describe_recording(recording, summary(recording)), keeps(recording, options)
     spent.append((time.monotonic(), "reading"))
     if stopped:
@@ -225,7 +225,7 @@ def _report(graph: Graph, stopped: bool, spent: list[tuple[float, str]], options
 
 
 def _replay(options: argparse.Namespace) -> int:
-    from grasp_ros.graph.opening import Opened
+    from grasp_ros.graph.bag.opening import Opened
 
     states = Opened(options.bag).names[JOINT_STATES]
     _reach(options)
@@ -243,9 +243,9 @@ def _watch(options: argparse.Namespace) -> int:
     if options.namespace != "/" or options.network:
         raise Refused("--namespace and --network are of a graph; allowed: without a bag")
     from grasp_ros.cli.watch import play
-    from grasp_ros.graph import bag
+    from grasp_ros.graph.bag.reading import read
 
-    play(bag.read(options.bag), options.rate, options.first)
+    play(read(options.bag), options.rate, options.first)
     return 0
 
 

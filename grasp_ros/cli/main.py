@@ -19,7 +19,7 @@ from importlib import import_module
 
 from grasp_ros.cli.commands import COMMANDS, overview
 from grasp_ros.cli.parser import Command, Parser, add_levels, shortened
-from grasp_ros.graph.disk import FULL
+from grasp_ros.graph.bag.disk import FULL
 from grasp_ros.graph.stopping import raise_on_signals, stop_if_signalled
 from grasp_ros.physics.errors import Refused
 

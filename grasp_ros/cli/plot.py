@@ -83,7 +83,7 @@ def _plot(options: argparse.Namespace) -> int:
 
 def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
     """A motion of a bag, a file or a scene; the warnings of its scene go to the standard error output."""
-    from grasp_ros.graph import bag
+    from grasp_ros.graph.bag.reading import read
 
     path = Path(source)
     with reading(path):
@@ -96,7 +96,7 @@ def _motion(source: str, options: argparse.Namespace, span: Span) -> Motion:
                       " scenes")
     if not recorded:
         return _simulated(source, options, span)
-    motion: Motion = load(path) if ending == ".npz" else bag.read(path)
+    motion: Motion = load(path) if ending == ".npz" else read(path)
     warn(motion.scene)
     return motion
 

@@ -21,8 +21,8 @@ from grasp_ros.simulation.chunk import SETTLED
 from grasp_ros.simulation.summary import MOTION, OUTPUTS, TICKS
 
 if TYPE_CHECKING:  # types of bags take long to import, and a simulation has none
-    from grasp_ros.graph.recording import Recording
-    from grasp_ros.graph.verify import Verification
+    from grasp_ros.graph.bag.recording import Recording
+    from grasp_ros.graph.bag.verify import Verification
     from grasp_ros.simulation.differentiate import Sensitivity
 
 Row = tuple[str, str]

@@ -8,7 +8,7 @@ from contextlib import closing
 import numpy as np
 from rich.live import Live
 
-from grasp_ros.graph.recording import Recording
+from grasp_ros.graph.bag.recording import Recording
 from grasp_ros.graph.terminal import Key, Keys, Moment, View
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import SIDES

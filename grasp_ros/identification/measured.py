@@ -11,9 +11,9 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from grasp_ros.graph import bag
-from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.verify import answers_of
+from grasp_ros.graph.bag.reading import read
+from grasp_ros.graph.bag.recording import Recording
+from grasp_ros.graph.bag.verify import answers_of
 from grasp_ros.physics import given
 from grasp_ros.physics.domain import LARGEST_POSITION
 from grasp_ros.physics.errors import Refused
@@ -71,7 +71,7 @@ def measured(source: Source, scene: Scene | None, by_sensors: bool = False) -> M
         path = Path(given.instance("data", source, (str, os.PathLike), "a path, a Recording or a Trajectory"))
         with reading(path):
             directory = S_ISDIR(path.stat().st_mode)
-        source = bag.read(path) if directory or path.suffix.lower() == ".mcap" else path
+        source = read(path) if directory or path.suffix.lower() == ".mcap" else path
     if by_sensors and not isinstance(source, Recording):
         raise Refused("measured by sensors: allowed: of a bag")
     if isinstance(source, Recording):

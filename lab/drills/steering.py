@@ -22,8 +22,8 @@ import numpy as np
 from tqdm import tqdm
 
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.scene import Scene
 from grasp_ros.simulation import simulate

@@ -30,8 +30,8 @@ PUBLIC = {  # modules and their public names; what has `__all__` says it itself,
     "grasp_ros.physics.energy": ("energy", "Energy", "energy_balance", "EnergyBalance"),
     "grasp_ros.physics.layout": ("Transition",), "grasp_ros.physics.model": ("Mode",),
     "grasp_ros.physics.errors": ("Refused",), "grasp_ros.physics.observation": ("OBSERVABLES",),
-    "grasp_ros.graph.bag": ("read", "Recording", "BagError"), "grasp_ros.graph.verify": ("verify", "laws_of"),
-    "grasp_ros.graph.summary": ("summary",),
+    "grasp_ros.graph.bag": ("read", "Recording", "BagError"), "grasp_ros.graph.bag.verify": ("verify", "laws_of"),
+    "grasp_ros.graph.bag.summary": ("summary",),
 }
 
 

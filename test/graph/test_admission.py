@@ -18,10 +18,10 @@ from std_msgs.msg import String
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.lockstep.synchronizer import PATIENCE_TICKS, Arrival, Synchronizer
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import MOST_BYTES, raw_force
-from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, SCENE
 from lab.drills.nodes import plain_messages
 

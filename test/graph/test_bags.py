@@ -24,9 +24,9 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.graph.processes import Graph
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.energy import energy
 from grasp_ros.physics.layout import LEFT, OBJECT

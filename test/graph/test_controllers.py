@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
-from grasp_ros.graph.verify import laws_of, verify
+from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 from lab.site.examples import titled

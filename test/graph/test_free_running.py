@@ -22,8 +22,8 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.ros import messages
-from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV, LYAPUNOV_NAMES, WINDOW
 from lab.drills.nodes import plain_messages
 from lab.site.examples import titled

@@ -23,11 +23,11 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.health.heartbeat import Heartbeats
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode
-from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import RUN as RUNNING
 
 pytestmark = pytest.mark.slow

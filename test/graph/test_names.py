@@ -18,8 +18,8 @@ from processes import DEADLINE
 
 from grasp_ros import scene
 from grasp_ros.graph import bag, host
+from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.verify import laws_of, verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.simulation import simulate

@@ -14,9 +14,9 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.recover import recover
+from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.serialization import list_message
-from grasp_ros.graph.verify import verify
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.system import COLUMN, NAMES
 from grasp_ros.scene.topics import JOINT_STATES, LEFT_COMMAND, LYAPUNOV, LYAPUNOV_NAMES, Topic

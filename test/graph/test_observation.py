@@ -14,10 +14,10 @@ from processes import DEADLINE, end_nodes
 from rclpy.parameter import Parameter
 
 from grasp_ros import scene as scenes
+from grasp_ros.graph.bag.recording import Recording
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.processes import Graph
-from grasp_ros.graph.recording import Recording
-from grasp_ros.graph.verify import verify
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
 from grasp_ros.physics.layout import LEFT, RIGHT

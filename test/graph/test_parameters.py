@@ -20,12 +20,12 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import laws_of
 from grasp_ros.graph.nodes.controller import Controller
 from grasp_ros.graph.nodes.monitor import Monitor
 from grasp_ros.graph.nodes.plant import Plant
 from grasp_ros.graph.parameters import FREE, NODES
 from grasp_ros.graph.serialization import list_message
-from grasp_ros.graph.verify import laws_of
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import CHANGES, NAMED_LIST
 from grasp_ros.simulation import simulate

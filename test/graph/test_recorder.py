@@ -31,11 +31,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.chunks import HEAD, Messages
-from grasp_ros.graph.recorder import NOT_RECORDED, RESERVE_BYTES, Recorder
-from grasp_ros.graph.recover import recover
-from grasp_ros.graph.rosbag2 import INFORMATION
-from grasp_ros.graph.storage import DATA_END_BYTES, SUM
+from grasp_ros.graph.bag.chunks import HEAD, Messages
+from grasp_ros.graph.bag.recorder import NOT_RECORDED, RESERVE_BYTES, Recorder
+from grasp_ros.graph.bag.recover import recover
+from grasp_ros.graph.bag.rosbag2 import INFORMATION
+from grasp_ros.graph.bag.storage import DATA_END_BYTES, SUM
 from grasp_ros.scene.topics import DIAGNOSTICS, JOINT_STATES
 from grasp_ros.simulation import Trajectory, simulate
 from lab.drills import recorder as study
@@ -213,7 +213,7 @@ def test_the_index_of_many_chunks_is_whole_and_takes_little_memory(
     tmp_path: Path, run: Trajectory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each tick a chunk: what a recording of minutes has."""
-    monkeypatch.setattr("grasp_ros.graph.recorder.CHUNK_BYTES", 0)
+    monkeypatch.setattr("grasp_ros.graph.bag.recorder.CHUNK_BYTES", 0)
     recorder = Recorder(tmp_path / "bag", run.scene, {"python": "3"})
     ticks = list(study.ticks_of(run))
     for tick in ticks[:100]:
@@ -254,8 +254,8 @@ def test_the_library_would_write_the_same_bytes(
         recorder.close()
         return storage(path / "bag").read_bytes()
 
-    monkeypatch.setattr("grasp_ros.graph.recorder.FLUSH_SECONDS", SECONDS)
-    monkeypatch.setattr("grasp_ros.graph.recorder.CHUNK_BYTES", 20_000)
+    monkeypatch.setattr("grasp_ros.graph.bag.recorder.FLUSH_SECONDS", SECONDS)
+    monkeypatch.setattr("grasp_ros.graph.bag.recorder.CHUNK_BYTES", 20_000)
     own = record(tmp_path / "own")
     monkeypatch.setattr(Messages, "add", add)
     assert record(tmp_path / "library") == own
@@ -394,7 +394,7 @@ from collections.abc import Callable
 from pathlib import Path
 from grasp_ros import scene as scenes
 from grasp_ros.graph import bag
-from grasp_ros.graph.recorder import Recorder
+from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.simulation import simulate
 from lab.drills import recorder as study
 run = simulate(scenes.load("case_01"), sampled=True)

@@ -24,9 +24,9 @@ from std_srvs.srv import Trigger
 
 from grasp_ros import scene
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.serialization import raw_stamp_ns
-from grasp_ros.graph.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES
 from lab.drills import steering
 

@@ -21,9 +21,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.graph.lockstep.synchronizer import GIVE_UP_SECONDS, UNCERTAIN_SECONDS, Arrival, Synchronizer
 from grasp_ros.graph.serialization import force_message, raw_force
-from grasp_ros.graph.verify import verify
 from grasp_ros.physics.layout import LEFT
 from grasp_ros.scene.topics import ALIVE, JOINT_STATES, LEFT_COMMAND, LEFT_CONTACT, SCENE
 from lab.drills.nodes import plain_messages

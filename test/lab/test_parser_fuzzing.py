@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from grasp_ros.graph import recorder
+from grasp_ros.graph.bag import recorder
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.parameter import Parameter
 from lab.drills import parser_fuzzing as readers

@@ -20,8 +20,8 @@ import xarray
 from grasp_ros import design, draw, read_bag, simulation
 from grasp_ros import scene as scenes
 from grasp_ros.exact import Integrator
-from grasp_ros.graph.summary import summary as bag_summary
-from grasp_ros.graph.verify import laws_of, verify
+from grasp_ros.graph.bag.summary import summary as bag_summary
+from grasp_ros.graph.bag.verify import laws_of, verify
 from grasp_ros.identification.fit import fit
 from grasp_ros.maps.plan import Axis, Plan
 from grasp_ros.maps.run import run as run_map

@@ -15,6 +15,7 @@ from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.exact.integrator import Integrator
 from grasp_ros.graph import bag
+from grasp_ros.graph.bag.recorder import Recorder
 from grasp_ros.graph.processes import Graph
 from grasp_ros.physics.accuracy import ACCURACY
 from grasp_ros.physics.errors import Refused
@@ -43,7 +44,7 @@ REFUSALS: dict[str, Callable[[Path], object]] = {
     "simulation": lambda path: simulation.load(path / "nothing.npz"),
     "fit": lambda path: grasp_ros.fit(path / "nothing.csv", ["object.mass_kg"], scenes.load("case_01")),
     "bag": lambda path: bag.read(path),
-    "new bag": lambda path: bag.Recorder(path, scenes.load("case_01"), {}),
+    "new bag": lambda path: Recorder(path, scenes.load("case_01"), {}),
     "graph": lambda path: Graph(scenes.load("case_01"), path, ACCURACY).start(),
     "figure": lambda path: plots.draw(simulate(scenes.load("arm_alone")), path / "figure.nonsense", ""),
     "page": lambda path: pages.put(path / "file" / "page.md", ""),

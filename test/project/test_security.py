@@ -20,8 +20,9 @@ from processes import DEADLINE, START, wait_for
 from grasp_ros import scene as scenes
 from grasp_ros import simulation
 from grasp_ros.graph import bag, host, running
-from grasp_ros.graph.opening import Opened
-from grasp_ros.graph.recover import recover
+from grasp_ros.graph.bag.opening import Opened
+from grasp_ros.graph.bag.recorder import Recorder
+from grasp_ros.graph.bag.recover import recover
 from grasp_ros.graph.running import Running
 from grasp_ros.maps import store
 from grasp_ros.physics.errors import Refused
@@ -138,7 +139,7 @@ def test_words_of_a_stranger_do_nothing_to_a_terminal(tmp_path: Path, command: A
     assert result.returncode == 2
     assert "\\x1b]0;mine\\x07: unknown key" in result.stderr
     run = simulate(scenes.load("case_01", ["time.duration_s=0.01"]), sampled=True)
-    writer = bag.Recorder(tmp_path / "bag", run.scene, {"python": "\x1b[31m3"})
+    writer = Recorder(tmp_path / "bag", run.scene, {"python": "\x1b[31m3"})
     for tick in recorder.ticks_of(run):
         writer.write_tick(*tick)
     writer.close({"\x1b[2J": 1})

@@ -18,16 +18,16 @@ from sensor_msgs.msg import JointState
 
 from grasp_ros import scene as scenes
 from grasp_ros.graph import running as runnings
+from grasp_ros.graph.bag.recorder import NOT_RECORDED, Recorder
+from grasp_ros.graph.bag.rosbag2 import BagError
 from grasp_ros.graph.health.heartbeat import digest
 from grasp_ros.graph.health.peers import Gone, Need, PeerNode
 from grasp_ros.graph.lockstep.admission import Limits, Sources
 from grasp_ros.graph.lockstep.synchronizer import UNCERTAIN_SECONDS, Arrival, Synchronizer, Tick
 from grasp_ros.graph.nodes.lyapunov_monitor import Announcement, LyapunovMonitor
 from grasp_ros.graph.nodes.picture import Picture
-from grasp_ros.graph.recorder import NOT_RECORDED, Recorder
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import Phase
-from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import lyapunov_template
 from grasp_ros.physics.errors import Refused

@@ -6,10 +6,10 @@ import math
 import time
 from typing import Any
 
-from grasp_ros.graph.opening import Opened
+from grasp_ros.graph.bag.opening import Opened
+from grasp_ros.graph.bag.rosbag2 import BagError
 from grasp_ros.graph.ros import messages
 from grasp_ros.graph.ros.node import GraspNode, Phase
-from grasp_ros.graph.rosbag2 import BagError
 from grasp_ros.physics.errors import Refused
 from grasp_ros.scene.effects.base import NANOSECONDS
 

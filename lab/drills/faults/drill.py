@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.graph import bag
-from grasp_ros.graph.verify import verify
+from grasp_ros.graph.bag.verify import verify
 from grasp_ros.scene.topics import JOINT_STATES, LYAPUNOV_NAMES, WINDOW, Topic
 from lab.drills.faults.companion import Failed
 from lab.drills.faults.output import NO_NEWS, SENTENCE, plain

@@ -21,9 +21,9 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, Header, Metadata, Schema
 
-from grasp_ros.graph.chunks import HEAD
-from grasp_ros.graph.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
-from grasp_ros.graph.rosbag2 import PROFILE, BagError
+from grasp_ros.graph.bag.chunks import HEAD
+from grasp_ros.graph.bag.recorder import DIGEST, LOST_RECORD, OWN_RECORD, signed
+from grasp_ros.graph.bag.rosbag2 import PROFILE, BagError
 
 MAGIC = b"\x89MCAP0\r\n"
 MESSAGE = struct.Struct("<H4xQ8x")  # channel and time of a message; the library's reader takes ten times as long

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.recorder import NOT_RECORDED
+from grasp_ros.graph.bag.recorder import NOT_RECORDED
 from grasp_ros.graph.running import Running
 from grasp_ros.physics.energy import PLANT_ALONE, PLANT_AND_FEEDBACK, Energy, energy
 from grasp_ros.physics.errors import Refused

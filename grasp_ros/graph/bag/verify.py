@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from grasp_ros.exact.integrator import Integrator, Status
-from grasp_ros.graph.recording import Recording, check_recording
+from grasp_ros.graph.bag.recording import Recording, check_recording
 from grasp_ros.physics.energy import energy, energy_balance
 from grasp_ros.physics.layout import LEFT, RIGHT
 from grasp_ros.physics.model import Array, Contact, impact_force, penetration

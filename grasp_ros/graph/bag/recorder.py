@@ -18,10 +18,10 @@ from pathlib import Path
 
 from mcap.writer import CompressionType, IndexType, Writer
 
-from grasp_ros.graph import rosbag2
-from grasp_ros.graph.chunks import Messages
-from grasp_ros.graph.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
-from grasp_ros.graph.rosbag2 import BagError
+from grasp_ros.graph.bag import rosbag2
+from grasp_ros.graph.bag.chunks import Messages
+from grasp_ros.graph.bag.disk import CHUNK_BYTES, FULL, RESERVE_BYTES, Sink
+from grasp_ros.graph.bag.rosbag2 import BagError
 from grasp_ros.graph.running import Running
 from grasp_ros.graph.serialization import clock_template
 from grasp_ros.scene import Scene

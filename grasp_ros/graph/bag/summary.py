@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from grasp_ros.graph.recording import Recording, check_recording
-from grasp_ros.graph.verify import Verification
+from grasp_ros.graph.bag.recording import Recording, check_recording
+from grasp_ros.graph.bag.verify import Verification
 from grasp_ros.physics.model import Array, Mode
 from grasp_ros.scene.topics import LYAPUNOV_NAMES
 

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 
 from grasp_ros import scene as scenes
-from grasp_ros.graph.opening import Opened, decoding_bag
-from grasp_ros.graph.recorder import BESIDE, LOST_RECORD, Recorder, checksum
-from grasp_ros.graph.recording import Recording, acted_from
-from grasp_ros.graph.rosbag2 import BagError, decode
+from grasp_ros.graph.bag.opening import Opened, decoding_bag
+from grasp_ros.graph.bag.recorder import BESIDE, LOST_RECORD, Recorder, checksum
+from grasp_ros.graph.bag.recording import Recording, acted_from
+from grasp_ros.graph.bag.rosbag2 import BagError, decode
+from grasp_ros.graph.bag.storage import Storage, Stored
 from grasp_ros.graph.serialization import clock_template, force_template, lyapunov_template, state_template
-from grasp_ros.graph.storage import Storage, Stored
 from grasp_ros.physics.layout import OBJECT
 from grasp_ros.physics.model import Array
 from grasp_ros.physics.system import COLUMN, NAMES
